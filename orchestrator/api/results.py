@@ -10,6 +10,8 @@ import numpy as np
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
 from orchestrator.api.show import Axes, axes_or_new, curves_on, page
+from orchestrator.api.sources import Sources, sources_of
+from orchestrator.api.values import Time
 from orchestrator.errors import CosimError, InputError
 from orchestrator.late import Late
 from orchestrator.results.mode_json import eigenvalue_json
@@ -20,8 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from orchestrator.analysis.stability import Stability
-    from orchestrator.api.source import Sources
-    from orchestrator.api.values import Time
     from orchestrator.study.modes import ModesResult
     from orchestrator.study.run import RunResult
     from orchestrator.watch.finding import Finding
@@ -277,9 +277,7 @@ class Run:
         start, stop
             The part of the run that is used [s]; by default all of it.
         """
-        from orchestrator.api.source import source  # noqa: PLC0415 - needs this module
-
-        return source(self, start, stop)
+        return sources_of(self.dataset, str(self.dataset.attrs.get("scenario", "run")), start, stop)
 
     def summary(self) -> dict[str, Any]:
         """The same as ``gfor run --json`` prints of this scenario, as JSON's types."""

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.api.source import Sources, contest_sources, source
+from orchestrator.api.source import source
+from orchestrator.api.sources import Sources, contest_sources
 from orchestrator.cli.arguments import seconds, seconds_or_none
 from orchestrator.cli.terminal import make_console, saying_warnings
 from orchestrator.cli.verdict import add_details_argument

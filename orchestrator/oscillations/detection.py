@@ -30,7 +30,7 @@ class Signals:
 
 
 @dataclass(frozen=True)
-class Oscillation:
+class SpectralLine:
     """One line of the spectrum.
 
     Attributes
@@ -70,7 +70,7 @@ def signals_of(measured: Measurements) -> Signals:
     return Signals(measured.times, tuple(columns), flat)
 
 
-def find_oscillations(signals: Signals) -> list[Oscillation]:
+def find_oscillations(signals: Signals) -> list[SpectralLine]:
     """Lines of the spectrum, the strongest first; multiples of one belong to it."""
     n, step = len(signals.times), float(signals.times[1] - signals.times[0])
     length = n * step
@@ -83,7 +83,7 @@ def find_oscillations(signals: Signals) -> list[Oscillation]:
             lines.append((float(power[k]), refined(signals, float(grid[k]))))
     lines.sort(reverse=True)
     kept: list[float] = []
-    found: list[Oscillation] = []
+    found: list[SpectralLine] = []
     for strength, frequency in lines:
         clear = all(abs(frequency - other) * length > 3 for other in kept)
         if strength < _LEAST_SHARE * lines[0][0] or not clear or len(found) == _MOST:
@@ -156,7 +156,7 @@ def envelope(times: Numbers, values: Numbers, frequency: float, periods: float =
     return np.convolve(turned, 2 * window / window.sum(), mode="valid"), half
 
 
-def _described(signals: Signals, frequency: float) -> Oscillation:
+def _described(signals: Signals, frequency: float) -> SpectralLine:
     amplitude = np.abs(phasors(signals.times, signals.values, [frequency]))
     spread = signals.values.std(axis=0)
     order = np.argsort(-amplitude / np.maximum(spread, 1e-300))
@@ -170,10 +170,10 @@ def _described(signals: Signals, frequency: float) -> Oscillation:
     used = slice(first, last)
     strength = np.abs(phasors(signals.times[used], signals.values[used], [frequency]))
     amplitudes = {signals.names[k]: float(strength[k]) for k in order if strength[k] > 0}
-    return Oscillation(frequency, begin, first, last, {}, amplitudes)
+    return SpectralLine(frequency, begin, first, last, {}, amplitudes)
 
 
-def _relative(signals: Signals, base: Oscillation, order: int) -> float:
+def _relative(signals: Signals, base: SpectralLine, order: int) -> float:
     """Largest amplitude of a multiple beside that of the oscillation itself, among the signals that show it well."""
     used = slice(base.first, base.last)
     t, x = signals.times[used], signals.values[used]

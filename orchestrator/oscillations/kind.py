@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.oscillations.detection import Oscillation, Signals, envelope, phasors
+from orchestrator.oscillations.detection import Signals, SpectralLine, envelope, phasors
 
 OscillationKind = Literal["forced", "mode", "not known"]
 
@@ -69,7 +69,7 @@ class Evidence:
     reasons: tuple[str, ...]
 
 
-def evidence_of(signals: Signals, found: Oscillation) -> Evidence:
+def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     """Judge the signals that show the oscillation best."""
     f, step = found.frequency, float(signals.times[1] - signals.times[0])
     settle = 0 if found.begin is None else round(2 / (f * step))
@@ -103,7 +103,7 @@ def evidence_of(signals: Signals, found: Oscillation) -> Evidence:
     return replace(figures, kind=kind, reasons=tuple(reasons))
 
 
-def _judged(seen: Evidence, change: float, found: Oscillation) -> tuple[OscillationKind, list[str]]:
+def _judged(seen: Evidence, change: float, found: SpectralLine) -> tuple[OscillationKind, list[str]]:
     harmonics = ", ".join(f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items())
     sharp = seen.envelope_spread <= _CLEAN or seen.skirt <= _SKIRT or bool(harmonics)
     steady = seen.envelope_spread < _STEADY and seen.kurtosis < _SINE and seen.coherence > _COHERENT
@@ -143,7 +143,7 @@ def _skirt(times: Numbers, values: Numbers, frequency: float) -> float:
     return float(power[near].mean() / (power[far].mean() or 1e-300)) if near.any() and far.any() else 1.0
 
 
-def _disturbed(signals: Signals, found: Oscillation) -> bool:
+def _disturbed(signals: Signals, found: SpectralLine) -> bool:
     """Whether a level changes, or something far larger than the oscillation happens, where it begins."""
     if found.begin is None:
         return False

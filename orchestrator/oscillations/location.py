@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.oscillations.detection import Oscillation, phasors
-from orchestrator.oscillations.measurements import Measurements, Place
+from orchestrator.oscillations.detection import SpectralLine, phasors
+from orchestrator.oscillations.measurements import Measurements, Site
 
 DEF, DYNAMIC_MODE, QV_PHASE = "dissipating energy flow", "dynamic-mode participation", "Q-V phase"
 
@@ -87,7 +87,7 @@ class _Work:
         return Opinion(method, name, True, f"{name} {verb} {100 * share:.0f} % of it", ranking)
 
 
-def opinions(measured: Measurements, found: Oscillation, others: Sequence[float]) -> list[Opinion]:
+def opinions(measured: Measurements, found: SpectralLine, others: Sequence[float]) -> list[Opinion]:
     """What the methods say, each with whether it applies."""
     plain = _opinions(measured.candidates, measured, found, others)
     doubtful = _doubtful(measured)
@@ -103,7 +103,7 @@ def opinions(measured: Measurements, found: Oscillation, others: Sequence[float]
 
 
 def _opinions(
-    places: Sequence[Place], measured: Measurements, found: Oscillation, others: Sequence[float]
+    places: Sequence[Site], measured: Measurements, found: SpectralLine, others: Sequence[float]
 ) -> list[Opinion]:
     energy, reactive = works(places, measured.times, found, others)
     ratio = float(np.abs(reactive.values).max() / (np.abs(energy.values).max() or 1e-300))
@@ -120,7 +120,7 @@ def _opinions(
     return [flow, dynamic_mode(places, measured.times, found), phase]
 
 
-def works(places: Sequence[Place], times: Numbers, found: Oscillation, others: Sequence[float]) -> tuple[_Work, _Work]:
+def works(places: Sequence[Site], times: Numbers, found: SpectralLine, others: Sequence[float]) -> tuple[_Work, _Work]:
     """Dissipating work Re(ΔP* jΔθ + ΔQ* jΔln V)/2 and reactive work Re(Δln V* ΔQ)/2 of each place.
 
     They are those of the mean phasors of several blocks, each turned by the phase that all signals share; errors are
@@ -149,7 +149,7 @@ def _energies(signals: Numbers) -> Numbers:
     return np.array([energy, 0.5 * np.real(np.conj(lnv) * q)])
 
 
-def dynamic_mode(places: Sequence[Place], times: Numbers, found: Oscillation) -> Opinion:
+def dynamic_mode(places: Sequence[Site], times: Numbers, found: SpectralLine) -> Opinion:
     """Participation of each place's powers in the fitted mode at the oscillation's frequency."""
     step = float(times[1] - times[0])
     thin = max(1, round(1 / (12 * found.frequency * step)))
@@ -186,7 +186,7 @@ def _doubtful(measured: Measurements) -> list[str] | str:
     return [name for name, mean in means.items() if mean < -least]
 
 
-def _turned(place: Place, signals: Sequence[str]) -> Place:
+def _turned(place: Site, signals: Sequence[str]) -> Site:
     return replace(place, p=-place.p, q=-place.q if "q" in signals else place.q)
 
 

@@ -22,7 +22,7 @@ _MOST_FILLED = 0.1
 
 
 @dataclass(frozen=True)
-class Place:
+class Site:
     """Voltage of a bus and the power that goes into it from a unit or out of a branch.
 
     Attributes
@@ -51,7 +51,7 @@ class Measurements:
 
     label: str
     times: Numbers
-    places: tuple[Place, ...]
+    places: tuple[Site, ...]
     remarks: tuple[str, ...] = field(default=())
 
     @property
@@ -59,13 +59,13 @@ class Measurements:
         return float(self.times[1] - self.times[0])
 
     @property
-    def candidates(self) -> tuple[Place, ...]:
+    def candidates(self) -> tuple[Site, ...]:
         """Units, and branches to buses that are not observed: what can feed an oscillation into the observed part."""
         observed = {place.bus for place in self.places}
         return tuple(p for p in self.places if p.kind == "unit" or p.beyond not in observed)
 
 
-def made_ready(label: str, times: Numbers, places: Sequence[Place], remarks: Sequence[str] = ()) -> Measurements:
+def made_ready(label: str, times: Numbers, places: Sequence[Site], remarks: Sequence[str] = ()) -> Measurements:
     """Bring a record into the form in which it is analysed; what was done to it is in the remarks.
 
     Raises
@@ -85,12 +85,12 @@ def made_ready(label: str, times: Numbers, places: Sequence[Place], remarks: Seq
     return _thinned(label, times, [_unwrapped(place) for place in places], said)
 
 
-def _each(place: Place, change: Callable[[Numbers], Numbers]) -> Place:
+def _each(place: Site, change: Callable[[Numbers], Numbers]) -> Site:
     """A place with its four signals changed alike."""
     return replace(place, v=change(place.v), angle=change(place.angle), p=change(place.p), q=change(place.q))
 
 
-def _without_doubles(times: Numbers, places: Sequence[Place], said: list[str]) -> tuple[Numbers, list[Place]]:
+def _without_doubles(times: Numbers, places: Sequence[Site], said: list[str]) -> tuple[Numbers, list[Site]]:
     """A time that is written twice, as simulators do at a discontinuity, counts with what comes after it."""
     if not np.isfinite(times).all() or (np.diff(times) < 0).any():
         raise InputError("the times of the record do not rise; sort its rows")
@@ -100,7 +100,7 @@ def _without_doubles(times: Numbers, places: Sequence[Place], said: list[str]) -
     return times[keep], [_each(place, lambda x: x[keep]) for place in places]
 
 
-def _longest_stretch(times: Numbers, places: list[Place], said: list[str]) -> tuple[Numbers, list[Place]]:
+def _longest_stretch(times: Numbers, places: list[Site], said: list[str]) -> tuple[Numbers, list[Site]]:
     """Even times, with missing rows as NaN; of a record with long gaps the longest part."""
     if len(times) < 2:
         return times, places
@@ -122,7 +122,7 @@ def _longest_stretch(times: Numbers, places: list[Place], said: list[str]) -> tu
     return even, [_each(_unwrapped(place), interpolated) for place in places]
 
 
-def _filled(place: Place, times: Numbers, said: list[str]) -> Place | None:
+def _filled(place: Site, times: Numbers, said: list[str]) -> Site | None:
     """Short gaps bridged by straight lines; None for a place with longer ones."""
     bad = ~(np.isfinite(place.v) & np.isfinite(place.angle) & np.isfinite(place.p) & np.isfinite(place.q))
     if not bad.any():
@@ -138,14 +138,14 @@ def _filled(place: Place, times: Numbers, said: list[str]) -> Place | None:
     return _each(replace(place, angle=turned), lambda x: np.interp(times, times[~bad], x[~bad]))
 
 
-def _unwrapped(place: Place) -> Place:
+def _unwrapped(place: Site) -> Site:
     good = np.isfinite(place.angle)
     angle = place.angle.copy()
     angle[good] = np.unwrap(angle[good])
     return replace(place, angle=angle)
 
 
-def _thinned(label: str, times: Numbers, places: list[Place], said: list[str]) -> Measurements:
+def _thinned(label: str, times: Numbers, places: list[Site], said: list[str]) -> Measurements:
     step = float(times[1] - times[0])
     factor = int(1 / (RATE * step) + 1e-6)
     if factor > 1:

@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.errors import InputError
-from orchestrator.oscillations.measurements import Measurements, Place, made_ready
+from orchestrator.oscillations.measurements import Measurements, Site, made_ready
 from orchestrator.units import to_unit
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def measurements_of(dataset: xr.Dataset, label: str) -> Measurements:
     return made_ready(label, times, places)
 
 
-def _of_run(dataset: xr.Dataset) -> list[Place]:
+def _of_run(dataset: xr.Dataset) -> list[Site]:
     def known(*names: str) -> bool:
         return all(name in dataset for name in names)
 
@@ -57,11 +57,11 @@ def _of_run(dataset: xr.Dataset) -> list[Place]:
         else:
             continue
         kind = "branch" if beyond else "unit"
-        found.append(Place(name, kind, bus, np.abs(voltage), np.angle(voltage), power.real, power.imag, beyond))
+        found.append(Site(name, kind, bus, np.abs(voltage), np.angle(voltage), power.real, power.imag, beyond))
     return found
 
 
-def _of_columns(dataset: xr.Dataset, label: str) -> list[Place]:
+def _of_columns(dataset: xr.Dataset, label: str) -> list[Site]:
     columns: dict[str, dict[str, Numbers]] = {}
     bases: dict[str, set[str]] = {}
     for name in map(str, dataset.data_vars):
@@ -71,7 +71,7 @@ def _of_columns(dataset: xr.Dataset, label: str) -> list[Place]:
             values, base = _in_base(dataset[name], what, f"{label}: {name!r}")
             columns.setdefault(parts["place"], {})[what] = values
             bases.setdefault("power" if what in "pq" else what, set()).add(base)
-    if len(bases.get("power", {"pu"}) - {"MW", "Mvar"}) and len(bases["power"]) > 1:
+    if len({base == "pu" for base in bases.get("power", ())}) > 1:
         raise InputError(f"{label}: some powers are in pu and some in MW or Mvar; give all in one of both")
     found = []
     for place, own in columns.items():
@@ -85,7 +85,7 @@ def _of_columns(dataset: xr.Dataset, label: str) -> list[Place]:
         if "p" in seen and "q" in seen and not (arrow and not own.keys() & {"p", "im"}):
             sign = -1.0 if arrow else 1.0
             kind = "branch" if arrow else "unit"
-            found.append(Place(place, kind, bus, seen["vm"], seen["va"], sign * seen["p"], sign * seen["q"], beyond))
+            found.append(Site(place, kind, bus, seen["vm"], seen["va"], sign * seen["p"], sign * seen["q"], beyond))
     return found
 
 
@@ -139,7 +139,7 @@ def read_contest(folder: Path) -> Measurements:
         power = vm[bus] * im[name] * np.exp(1j * (angle - np.deg2rad(ia[name])))
         alone = ends.count(parts[0]) == 1
         power = power if alone else -power
-        places.append(Place(" ".join((bus if alone else name).split()), "unit" if alone else "branch", parts[0],
+        places.append(Site(" ".join((bus if alone else name).split()), "unit" if alone else "branch", parts[0],
                             vm[bus], angle, power.real, power.imag, "" if alone else parts[2]))  # fmt: skip
     if not places:
         raise InputError(f"{folder}: no line of {CONTEST_FILES[2]} begins at a bus of {CONTEST_FILES[0]}")

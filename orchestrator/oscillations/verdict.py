@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.oscillations.detection import Oscillation, find_oscillations, signals_of
+from orchestrator.oscillations.detection import SpectralLine, find_oscillations, signals_of
 from orchestrator.oscillations.kind import Evidence, evidence_of
 from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, opinions
 from orchestrator.oscillations.measurements import Measurements
@@ -27,7 +27,7 @@ class Located:
         What would confirm the answer, or what helps.
     """
 
-    found: Oscillation
+    found: SpectralLine
     evidence: Evidence
     opinions: tuple[Opinion, ...]
     source: str | None

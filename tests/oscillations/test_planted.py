@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.oscillations.location import DEF, QV_PHASE
-from orchestrator.oscillations.measurements import Place, made_ready
+from orchestrator.oscillations.measurements import Site, made_ready
 from orchestrator.oscillations.verdict import locate
 from tests.support.forced_records import load_noise, model, record, sine, times_of
 
@@ -186,7 +186,10 @@ def test_a_load_of_constant_power_is_no_source():
 
     def change(places):
         x = places[0]
-        return [*places, Place("load", "unit", x.bus, x.v, x.angle, np.full(len(x.v), -5.0), np.full(len(x.v), -1.0))]
+        return [
+            *places,
+            Site("load", "unit", x.bus, x.v, x.angle, np.full(len(x.v), -5.0), np.full(len(x.v), -1.0)),
+        ]
 
     for reference in ("sg1.governor.delta_P_ref", "gfor.droop.delta_P_ref"):
         assert forced("two_area", reference, 0.8, change=change).source == reference.split(".")[0]
@@ -210,7 +213,7 @@ def driven_by_noise(damping, seed, frequency=0.58, length=120.0):
         own = 1e-3 * rng.standard_normal((4, len(t)))
         p, angle = part * scale * z.real, part * 0.1 * scale * z.imag
         places.append(
-            Place(
+            Site(
                 name,
                 "unit",
                 f"bus of {name}",
@@ -236,8 +239,8 @@ def test_a_mode_without_damping_after_a_step_is_not_called_forced():
     step = 0.08 * (t >= 10)
     noise = 1e-4 * np.random.default_rng(1).standard_normal((2, len(t)))
     places = [
-        Place("sg1", "unit", "a", 1 + 0.01 * ring, 0.1 * ring, 5 + ring + step + noise[0], 1 + 0.1 * ring),
-        Place("sg2", "unit", "b", 1 - 0.01 * ring, -0.1 * ring, 5 - ring + noise[1], 1 - 0.1 * ring),
+        Site("sg1", "unit", "a", 1 + 0.01 * ring, 0.1 * ring, 5 + ring + step + noise[0], 1 + 0.1 * ring),
+        Site("sg2", "unit", "b", 1 - 0.01 * ring, -0.1 * ring, 5 - ring + noise[1], 1 - 0.1 * ring),
     ]
     assert at(locate(made_ready("ring", t, places)), 0.6).evidence.kind == "not known"
 
@@ -246,7 +249,7 @@ def test_a_mode_without_damping_after_a_step_is_not_called_forced():
 def test_what_decays_or_grows_is_a_mode(rate):
     t = TIMES
     ring = 0.02 * np.exp(rate * (t - 25)) * np.sin(2 * np.pi * 0.6 * t)
-    places = [Place("sg1", "unit", "a", 1 + 0.01 * ring, 0.1 * ring, 5 + ring, 1 + 0.1 * ring)]
+    places = [Site("sg1", "unit", "a", 1 + 0.01 * ring, 0.1 * ring, 5 + ring, 1 + 0.1 * ring)]
     found = at(locate(made_ready("ring", t, places)), 0.6)
     assert found.evidence.kind == "mode"
     assert found.source is None

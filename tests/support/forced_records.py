@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import orchestrator as gfor
-from orchestrator.oscillations.measurements import Place, made_ready
+from orchestrator.oscillations.measurements import Site, made_ready
 
 MODELS = Path(__file__).parents[1] / "oscillations" / "models"
 FASTEST = 80.0
@@ -162,7 +162,7 @@ def record(name, forced, *, times=None, loads=0.0, measuring=0.0, seed=1, withou
     current = current * (1 + noise() + 1j * noise())
     power = v * np.exp(1j * angle) * np.conj(current)
     places = [
-        Place(unit, "unit", bus, v[:, k].copy(), angle[:, k].copy(), power[:, k].real.copy(), power[:, k].imag.copy())
+        Site(unit, "unit", bus, v[:, k].copy(), angle[:, k].copy(), power[:, k].real.copy(), power[:, k].imag.copy())
         for k, (unit, bus) in enumerate(zip(system.units, system.buses, strict=True))
         if bus not in without
     ]
