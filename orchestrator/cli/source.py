@@ -12,6 +12,7 @@ from orchestrator.cli.arguments import seconds, seconds_or_none
 from orchestrator.cli.terminal import make_console, saying_warnings
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
+from orchestrator.oscillations.verdict import Located
 from orchestrator.report.tables import PlainTable
 
 _SHOWN = 5
@@ -68,24 +69,20 @@ def _print(found: list[Sources], *, details: bool) -> None:
             head = f"{one.label}, {x.found.frequency:.4g} Hz"
             console.print(escape(f"{head}: {x.reason}. Next: {x.advice}."), soft_wrap=True, highlight=False)
             if details:
-                _print_details(head, x.as_json())
+                _print_details(head, x)
         for remark in one.remarks:
             console.print(escape(f"{one.label}: {remark}"), soft_wrap=True, highlight=False)
 
 
-def _print_details(head: str, found: dict[str, object]) -> None:
+def _print_details(head: str, one: Located) -> None:
     """What each method says of each place, and the amplitudes."""
     console = make_console()
     table = PlainTable(title=escape(head), title_justify="left", header_style="bold")
     for column in ("Method", "Applies", "Names", "Places, the largest part first"):
         table.add_column(column)
-    methods = found["methods"]
-    assert isinstance(methods, list)
-    for m in methods:
-        places = ", ".join(f"{r['place']} {100 * r['share']:.0f} %" for r in m["ranking"][:_SHOWN])
-        table.add_row(m["method"], "yes" if m["applies"] else "no", escape(m["place"] or "-"), escape(places))
+    for o in one.opinions:
+        places = ", ".join(f"{name} {100 * share:.0f} %" for name, share in o.ranking[:_SHOWN])
+        table.add_row(o.method, "yes" if o.applies else "no", escape(o.place or "-"), escape(places))
     console.print(table)
-    amplitudes = found["amplitudes"]
-    assert isinstance(amplitudes, dict)
-    text = ", ".join(f"{name} {value:.3g}" for name, value in amplitudes.items())
+    text = ", ".join(f"{name} {value:.3g}" for name, value in list(one.found.amplitudes.items())[:_SHOWN])
     console.print(escape(f"Amplitudes, the clearest first: {text}"), soft_wrap=True, highlight=False)

@@ -151,7 +151,7 @@ def _disturbed(signals: Signals, found: SpectralLine) -> bool:
     period = max(2, round(1 / (found.frequency * step)))
     at, end = found.first, found.last
     around = slice(max(0, at - 2 * period), at + 2 * period)
-    before, after = slice(max(0, at - 4 * period), max(1, at - period)), slice((at + end) // 2, end)
+    before, after = slice(max(0, at - 4 * period), max(1, at - period)), slice(at + period, min(end, at + 5 * period))
     for name, amplitude in found.amplitudes.items():
         alike = (a for other, a in found.amplitudes.items() if other.rpartition(".")[2] == name.rpartition(".")[2])
         if amplitude < _LEAST_PART * max(alike) or not name.endswith((".p", ".q")):

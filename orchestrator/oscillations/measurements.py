@@ -21,6 +21,9 @@ _MOST_FILLED = 0.1
 """Part of a place's samples that may be missing."""
 
 
+Kind = Literal["unit", "branch"]
+
+
 @dataclass(frozen=True)
 class Site:
     """Voltage of a bus and the power that goes into it from a unit or out of a branch.
@@ -36,7 +39,7 @@ class Site:
     """
 
     name: str
-    kind: Literal["unit", "branch"]
+    kind: Kind
     bus: str
     v: Numbers
     angle: Numbers

@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.errors import InputError
-from orchestrator.oscillations.measurements import Measurements, Site, made_ready
+from orchestrator.oscillations.measurements import Kind, Measurements, Site, made_ready
 from orchestrator.units import to_unit
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def _of_run(dataset: xr.Dataset) -> list[Site]:
             power = voltage * np.conj(values(f"{name}.i_re") + 1j * values(f"{name}.i_im"))
         else:
             continue
-        kind = "branch" if beyond else "unit"
+        kind: Kind = "branch" if beyond else "unit"
         found.append(Site(name, kind, bus, np.abs(voltage), np.angle(voltage), power.real, power.imag, beyond))
     return found
 
@@ -84,7 +84,7 @@ def _of_columns(dataset: xr.Dataset, label: str) -> list[Site]:
             seen |= {"p": power.real, "q": power.imag}
         if "p" in seen and "q" in seen and not (arrow and not own.keys() & {"p", "im"}):
             sign = -1.0 if arrow else 1.0
-            kind = "branch" if arrow else "unit"
+            kind: Kind = "branch" if arrow else "unit"
             found.append(Site(place, kind, bus, seen["vm"], seen["va"], sign * seen["p"], sign * seen["q"], beyond))
     return found
 

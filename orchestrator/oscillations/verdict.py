@@ -1,6 +1,6 @@
 """The oscillations of a record with what they are and where they come from."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from orchestrator.oscillations.detection import SpectralLine, find_oscillations, signals_of
@@ -35,35 +35,16 @@ class Located:
     advice: str
 
     def as_json(self) -> dict[str, Any]:
-        evidence = self.evidence
         return {
             "frequency_hz": self.found.frequency,
-            "kind": evidence.kind,
+            "kind": self.evidence.kind,
             "source": self.source,
             "reason": self.reason,
             "advice": self.advice,
             "begin": self.found.begin,
             "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
-            "evidence": {
-                "periods": evidence.periods,
-                "damping_percent": evidence.damping_percent,
-                "envelope_spread": evidence.envelope_spread,
-                "kurtosis": evidence.kurtosis,
-                "coherence": evidence.coherence,
-                "skirt": evidence.skirt,
-                "begins_with_a_disturbance": evidence.disturbed,
-                "reasons": list(evidence.reasons),
-            },
-            "methods": [
-                {
-                    "method": o.method,
-                    "applies": o.applies,
-                    "place": o.place,
-                    "reason": o.reason,
-                    "ranking": [{"place": name, "share": share} for name, share in o.ranking],
-                }
-                for o in self.opinions
-            ],
+            "evidence": asdict(self.evidence),
+            "methods": [asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions],
             "amplitudes": dict(list(self.found.amplitudes.items())[:_SHOWN]),
         }
 
