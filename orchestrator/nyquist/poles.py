@@ -1,0 +1,92 @@
+"""Unstable poles in what was measured over frequency: rational functions with common poles (AAA) through the values."""
+
+import numpy as np
+
+from orchestrator.arrays import Complex, Numbers
+
+_TOLERANCES = (3e-2, 1e-2, 3e-3)
+"""Relative errors at which the fit stops. A pole of the system is found at two of them in one place; one that stands
+for noise moves."""
+
+_MOST = 40
+_SAME = 0.2
+"""Distance of two findings of one pole, in its real part plus a thousandth of its size."""
+
+_STRONG = 0.05
+"""Least size of what a pole adds at its frequency, relative to the whole there."""
+
+
+def unstable_poles(frequencies: Numbers, values: Complex) -> tuple[complex, ...]:
+    """Poles of positive real part [rad/s] that the values show, one of each pair.
+
+    Parameters
+    ----------
+    frequencies
+        [Hz], shape (f,).
+    values
+        Shape (f, n, n).
+    """
+    size = np.linalg.norm(values, ord=2, axis=(1, 2))
+    found = [_growing(frequencies, values / size.max(), size / size.max(), tolerance) for tolerance in _TOLERANCES]
+    kept: list[complex] = []
+    for coarse, fine in zip(found[:-1], found[1:], strict=True):
+        for p in fine:
+            near = any(abs(p - q) < _SAME * p.real + 1e-3 * abs(p) for q in coarse)
+            if near and not any(abs(p - q) < p.real for q in kept):
+                kept.append(p)
+    return tuple(kept)
+
+
+def _growing(f: Numbers, values: Complex, size: Numbers, tolerance: float) -> list[complex]:
+    s, G = 2j * np.pi * f, values.reshape(len(f), -1)
+    poles, residues = _fit(s, G, tolerance)
+    lowest, highest = 2 * np.pi * f[0], 2 * np.pi * f[-1]
+    found = []
+    for p, residue in zip(poles.tolist(), residues, strict=True):
+        inside = p.imag >= -1e-6 * abs(p) and 0.3 * lowest <= abs(p) <= highest
+        mirrored = np.abs(poles - np.conj(p)).min() < _SAME * abs(p.real) + 1e-3 * abs(p)
+        if p.real > 0 and inside and mirrored:
+            there = np.interp(abs(p.imag) / (2 * np.pi), f, size)
+            if np.linalg.norm(residue) / p.real > _STRONG * there:
+                found.append(p)
+    return found
+
+
+def _fit(s: Complex, G: Complex, tolerance: float) -> tuple[Complex, Complex]:
+    """Poles and residues of a rational function of real coefficients through the values."""
+    points, data = np.concatenate([s, -s]), np.concatenate([G, G.conj()])
+    support: list[int] = []
+    half = len(s)
+    error = np.abs(data - data.mean(axis=0)).max(axis=1)
+    weights = np.zeros(0)
+    while len(support) < min(_MOST, half // 2):
+        k = int(np.argmax(error[:half]))
+        support += [k, k + half]
+        others = np.setdiff1d(np.arange(2 * half), support)
+        cauchy = 1 / (points[others, None] - points[support][None, :])
+        loewner = np.concatenate(
+            [(data[others, c][:, None] - data[support, c][None, :]) * cauchy for c in range(G.shape[1])]
+        )
+        # The smallest right singular vector, through the small square matrix of the QR factors.
+        weights = np.linalg.svd(np.linalg.qr(loewner, mode="r"))[2][-1].conj()
+        denominator = cauchy @ weights
+        fitted = (cauchy @ (weights[:, None] * data[support])) / denominator[:, None]
+        error = np.zeros(2 * half)
+        error[others] = np.abs(fitted - data[others]).max(axis=1)
+        if error.max() < tolerance:
+            break
+    return _poles(points[support], weights, data[support])
+
+
+def _poles(z: Complex, weights: Complex, values: Complex) -> tuple[Complex, Complex]:
+    """Zeros of Σ w/(s − z), and the residues there."""
+    # With Σw ≠ 0 they are the eigenvalues of diag(z) − w·1ᵀ·diag(z)…, found by deflating one infinite direction.
+    total = weights.sum()
+    if abs(total) < 1e-12 * np.abs(weights).max():
+        total = 1e-12 * np.abs(weights).max()
+    matrix = np.diag(z) - np.outer(weights * z, np.ones(len(z))) / total
+    found = np.linalg.eigvals(matrix)
+    found = found[np.abs(found) > 1e-9 * np.abs(z).max()]
+    cauchy = 1 / (found[:, None] - z[None, :])
+    slope = -(cauchy**2) @ weights
+    return found, (cauchy @ (weights[:, None] * values)) / slope[:, None]
