@@ -26,6 +26,7 @@ _HOMES = {
     "identify": "api.identification",
     "info": "api.fmu",
     "load": "api.case",
+    "nyquist": "api.nyquist",
     "open_fmu": "api.fmu",
     "read_linear_model": "api.linear",
 }

@@ -33,6 +33,7 @@ COMMANDS = {
     "report": "one self-contained HTML page from the folder of a run",
     "design": "design a POD controller by eigenvalue sensitivity",
     "admittance": "measure a device's admittance, and fit a model to it",
+    "nyquist": "whether a device is stable at a network, from scans, FMUs and cases",
     "black-box": "modes of a case with a component known by its port alone",
     "certify": "the grid code's damping test on a converter FMU",
     "verify": "whether a certificate still holds: hashes, verdict, points computed anew",
@@ -66,6 +67,7 @@ examples:
   gfor federate two_area --component gfor --broker tcp://host:23405
   gfor which-master --build probes               two FMUs that tell which schedule a tool runs
   gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
+  gfor nyquist plant.txt network.txt --compensation "32 %"    is a scanned plant stable there?
   gfor black-box two_area --scenario gfor --component gfor
   gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
   gfor certify one.fmu two.fmu --code all        several converters under all codes, as one matrix

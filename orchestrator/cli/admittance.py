@@ -4,7 +4,6 @@ import argparse
 import cmath
 import json
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +18,10 @@ from orchestrator.black_box.files import identification_json, save_identificatio
 from orchestrator.black_box.fitting import fit, require_fitting
 from orchestrator.black_box.frequency_response import measure
 from orchestrator.black_box.passivity import passivity
-from orchestrator.cases.values import check_system_base, convert
+from orchestrator.black_box.port import check_port, start_of, values_for
 from orchestrator.cli.arguments import seconds, setting
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, said_stages
-from orchestrator.errors import InputError
-from orchestrator.fmi.description import FmuDescription
-from orchestrator.fmi.devices import NO_BUS, is_controller_alone
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
@@ -47,14 +43,14 @@ def run(options: argparse.Namespace) -> int:
     require_fitting()
     console = make_console(stderr=options.json)
     description = bound_fmu(options.fmu, options.binding)
-    values = _values(description, dict(options.set))
-    magnitude, angle = (float(values.get(name, _start(description, name))) for name in ("v_0", "theta_0"))
+    values = values_for(description, dict(options.set))
+    magnitude, angle = (float(values.get(name, start_of(description, name))) for name in ("v_0", "theta_0"))
     rest = cmath.rect(magnitude, angle)
     bench = Bench(
         description, values, np.array([rest.real, rest.imag]), step_size=options.step,
         restore=False if options.no_state else None,
     )  # fmt: skip
-    _check_port(description, bench)
+    check_port(description, bench)
     with said_stages() as report:
         response = measure(bench, excitation_of(options), report)
         model, passive = fit(response), passivity(response)
@@ -70,36 +66,6 @@ def run(options: argparse.Namespace) -> int:
     console.print(f"Not passive: {active}; least relative index {passive.relative.min():.3f}", highlight=False)
     console.print(escape(f"Results in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True, highlight=False)
     return 0
-
-
-def _values(description: FmuDescription, given: Mapping[str, Any]) -> dict[str, float | bool]:
-    values = {}
-    for name, value in given.items():
-        info = description.variables.get(name)
-        if info is None:
-            raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor info` lists them")
-        try:
-            values[name] = convert(info, value)
-            check_system_base(description, name, values[name])
-        except ValueError as error:
-            raise InputError(f"--set {name}: {error}") from error
-    return values
-
-
-def _start(description: FmuDescription, name: str) -> float:
-    info = description.variables.get(name)
-    return info.start_number if info is not None and info.start is not None else float(name == "v_0")
-
-
-def _check_port(description: FmuDescription, bench: Bench) -> None:
-    missing = [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]
-    if missing and is_controller_alone(description):
-        raise InputError(f"{description.path.name}: it has no {', '.join(missing)}: {NO_BUS}")
-    if missing:
-        raise InputError(
-            f"{description.path.name}: it has no {', '.join(missing)}; an admittance is measured at our port, to which "
-            "a vendor.toml maps another FMU's variables; give it with --binding"
-        )
 
 
 def _summary(content: dict[str, Any]) -> Group:

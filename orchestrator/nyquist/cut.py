@@ -79,7 +79,9 @@ def _devices(master: Master, bus: str | None, names: tuple[str, ...]) -> tuple[s
         return names or tuple(homes)
     found = tuple(name for name, home in homes.items() if bus in (home, home.rpartition(".")[2]))
     if not found:
-        raise InputError(f"--bus {bus}: no device stands there; devices stand at {', '.join(sorted(set(homes.values())))}")
+        raise InputError(
+            f"--bus {bus}: no device stands there; devices stand at {', '.join(sorted(set(homes.values())))}"
+        )
     return tuple(name for name in found if not names or name in names)
 
 

@@ -63,7 +63,9 @@ class CutJudgement:
     small_gain: list[tuple[float, float]]
 
 
-def judge_loop(loop: CutLoop, *, frames_known: bool = True, range_hz: tuple[float, float] | None = None) -> CutJudgement:
+def judge_loop(
+    loop: CutLoop, *, frames_known: bool = True, range_hz: tuple[float, float] | None = None
+) -> CutJudgement:
     """Count the encirclements, and ask all that could make the count wrong."""
     low, high = range_hz or common_range(loop.device, loop.network, EXACT_RANGE)
     nodes = nodes_of(loop.device, loop.network, low, high)

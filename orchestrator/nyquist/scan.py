@@ -126,7 +126,9 @@ def checked(source: str, frequencies: Numbers, values: Complex) -> tuple[str, ..
             "rows, and keep one of each frequency"
         )
     beside = [np.r_[steps[max(0, k - _BESIDE) : k], steps[k + 1 : k + 1 + _BESIDE]].max() for k in range(len(steps))]
-    holes = [f"{frequencies[k]:g} to {frequencies[k + 1]:g} Hz" for k in np.flatnonzero(steps > _HOLE * np.array(beside))]
+    holes = [
+        f"{frequencies[k]:g} to {frequencies[k + 1]:g} Hz" for k in np.flatnonzero(steps > _HOLE * np.array(beside))
+    ]
     return (f"{source}: are rows missing from {', '.join(holes[:5])}? the steps beside are shorter",) if holes else ()
 
 

@@ -81,7 +81,9 @@ def _points(path: Path, ports: tuple[str, ...]) -> dict[str, PortPoint]:
             try:
                 figures = {columns[n]: float(c) for n, c in zip(names, cells, strict=True) if n in columns}
             except ValueError as error:
-                raise InputError(f"{beside.name}, line {number}: {error}; its columns are {', '.join(names)}") from error
+                raise InputError(
+                    f"{beside.name}, line {number}: {error}; its columns are {', '.join(names)}"
+                ) from error
             found.setdefault(cells[0].strip(), {}).update(figures)
     points = {}
     for port in ports:

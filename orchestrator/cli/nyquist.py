@@ -1,0 +1,160 @@
+"""``gfor nyquist``: whether a device is stable at a network, from scans, FMUs and cases."""
+
+import argparse
+import json
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from orchestrator.api.nyquist import network_of
+from orchestrator.black_box.frequency_response import Excitation
+from orchestrator.cli.arguments import assignment, seconds, setting
+from orchestrator.cli.terminal import make_console, make_errors, said_stages
+from orchestrator.cli.verdict import NOT_MET
+from orchestrator.errors import InputError
+from orchestrator.nyquist.margins import Margin
+from orchestrator.nyquist.scan_files import ENDINGS
+from orchestrator.nyquist.study import CutRequest, CutResult, study_cut
+from orchestrator.report.tables import make_table
+from orchestrator.results.staging import new_run_id, staged
+from orchestrator.safe_files import made_folder, write_text
+from orchestrator.units import to_unit
+
+_SIDES = ("device", "network")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("device", metavar="DEVICE", help="a scan (.txt, .csv), an FMU or DLL; or a case alone")
+    parser.add_argument("network", nargs="?", metavar="NETWORK", help="a scan of the network, or a case")
+    parser.add_argument("--frequency", type=_in("Hz"), default=50.0, metavar="F", help="rated frequency (50 Hz)")
+    parser.add_argument("--compensation", type=_share, default=0.0, metavar="PERCENT",
+                        help="series capacitors, as share of the network's reactance, such as '32 %%'")  # fmt: skip
+    parser.add_argument("--angle", type=_in("rad"), metavar="A", help="of the device's frame before the network's, "
+                        "such as '20 deg'")  # fmt: skip
+    parser.add_argument("--voltage", type=_in("kV"), metavar="V", help="rated voltage at the cut, between pu and S")
+    parser.add_argument(
+        "--per-unit", action="append", default=[], choices=_SIDES, help="the side's file is in pu, 100 MVA"
+    )
+    parser.add_argument("--generator", action="append", default=[], choices=_SIDES,
+                        help="the side's file counts currents out of it")  # fmt: skip
+    parser.add_argument("--units-checked", action="store_true", help="two scans of very different size are meant so")
+    parser.add_argument("--bus", metavar="B", help="cut a case between the devices of this bus and all else")
+    parser.add_argument("--component", action="append", default=[], metavar="NAME",
+                        help="cut a case at this component (repeatable)")  # fmt: skip
+    parser.add_argument("--scenario", metavar="NAME", help="of a case (default: its first)")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE",
+                        help="a value of the FMU, or COMPONENT.PARAMETER=VALUE of the case (repeatable)")  # fmt: skip
+    parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
+    parser.add_argument("--step", type=seconds, default=1e-4, metavar="H", help="communication step of a scan (100 us)")
+    parser.add_argument(
+        "--from-hz", type=_in("Hz"), default=0.05, metavar="F", help="lowest frequency of a scan (0.05)"
+    )
+    parser.add_argument(
+        "--to-hz", type=_in("Hz"), default=1000.0, metavar="F", help="highest frequency of a scan (1000)"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/nyquist_<device>)")
+    parser.add_argument("--trust-fmus", action="store_true", help="as for `gfor run`")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--fail-unstable", action="store_true", help="end with exit code 3 unless it is stable")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Judge, draw, and say what was found."""
+    request = _request(options)
+    folder = made_folder(options.out or Path("results") / f"nyquist_{Path(options.device).stem}", "--out")
+    with said_stages() as report:
+        result = study_cut(request, report)
+    for question in result.questions:
+        make_errors().print(f"[bold yellow]question:[/bold yellow] {escape(question)}")
+    with staged(folder, new_run_id()) as staging:
+        _save(result, staging)
+    if options.json:
+        print(json.dumps(result.as_json(), indent=1))
+    else:
+        _say(make_console(), result, folder)
+    return NOT_MET if options.fail_unstable and result.verdict != "stable" else 0
+
+
+def _request(options: argparse.Namespace) -> CutRequest:
+    device, network = options.device, options.network
+    if network is None and Path(device).suffix.lower() in (*ENDINGS, ".fmu", ".so", ".dll"):
+        raise InputError(f"{device}: give its network as well: a scan, or a case with --bus or --component")
+    case = device if network is None else network
+    of_fmu, of_case = [], []
+    for text in options.set:
+        (of_case if network is None or "." in text.partition("=")[0] else of_fmu).append(text)
+    if Path(case).suffix.lower() in ENDINGS:
+        (of_fmu, of_case), other = ([*of_fmu, *of_case], []), Path(case)
+    else:
+        other = network_of(
+            case, options.scenario, dict(map(_typed(assignment), of_case)), trust_fmus=options.trust_fmus
+        )
+    return CutRequest(
+        Path(device) if network is not None else None, other, options.frequency, options.compensation, options.angle,
+        options.bus, tuple(options.component), options.voltage, frozenset(options.generator),
+        frozenset(options.per_unit), options.units_checked, dict(map(_typed(setting), of_fmu)), options.binding,
+        options.step, Excitation(lowest_hz=options.from_hz, highest_hz=options.to_hz, lines=160),
+    )  # fmt: skip
+
+
+def _typed(kind):
+    def read(text):
+        try:
+            return kind(text)
+        except argparse.ArgumentTypeError as error:
+            raise InputError(f"--set {error}") from error
+
+    return read
+
+
+def _in(unit: str):
+    def read(text: str) -> float:
+        try:
+            return to_unit(text, unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return read
+
+
+def _share(text: str) -> float:
+    try:
+        value = float(text.strip().removesuffix("%"))
+    except ValueError:
+        value = -1.0
+    if not 0 <= value < 100 or (0 < value < 1 and "%" not in text):
+        raise argparse.ArgumentTypeError(f"{text!r} is no share in percent from 0 to below 100, such as '32 %'")
+    return value / 100
+
+
+def _save(result: CutResult, folder: Path) -> None:
+    from orchestrator.nyquist.pictures import draw  # noqa: PLC0415 - a second to import
+    from orchestrator.nyquist.ztool import write_ztool  # noqa: PLC0415
+
+    write_text(folder / "nyquist.json", json.dumps(result.as_json(), indent=1) + "\n")
+    draw(result, folder)
+    for side, scan in result.scans.items():
+        if scan.unit == "S":
+            write_ztool(scan, folder / f"gfor#Y_AC#{side}-1#.txt")
+
+
+def _say(console: Console, result: CutResult, folder: Path) -> None:
+    colour = {"stable": "green", "unstable": "red"}.get(str(result.verdict), "yellow")
+    console.print(f"[bold {colour}]{result.verdict}[/]: {escape(result.because)}", soft_wrap=True, highlight=False)
+    table = make_table("Margins", "Margin", "Value", "at [Hz]")
+    m = result.judgement.margins
+    for name, margin, text in (
+        ("gain up", m.gain_up, "× {:.3f}"), ("gain down", m.gain_down, "× {:.3f}"), ("phase", m.phase_deg, "{:.1f}°"),
+        ("delay", m.delay_s, "{:.2e} s"), ("distance from −1", m.distance, "{:.3f}"), ("disk", m.disk, "{:.3f}"),
+    ):  # fmt: skip
+        table.add_row(name, *_cells(margin, text))
+    console.print(table)
+    for side, bands in result.judgement.active.items():
+        said = ", ".join(f"{a:.4g}–{b:.4g} Hz" for a, b in bands) or "nowhere"
+        console.print(f"{side} ({getattr(result.loop, side).name}) not passive: {said}", highlight=False, markup=False)
+    console.print(f"Results in {folder}", soft_wrap=True, highlight=False, markup=False)
+
+
+def _cells(margin: Margin | None, text: str) -> tuple[str, str]:
+    return ("none", "") if margin is None else (text.format(margin.value), f"{margin.frequency_hz:.3f}")
