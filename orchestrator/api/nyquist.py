@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-
 from orchestrator.api.values import plain
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
@@ -9,6 +10,7 @@ from rich.markup import escape
 
 from orchestrator.api.nyquist import network_of
 from orchestrator.black_box.frequency_response import Excitation
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import assignment, seconds, setting
 from orchestrator.cli.terminal import make_console, make_errors, said_stages
 from orchestrator.cli.verdict import NOT_MET
@@ -22,6 +24,7 @@ from orchestrator.safe_files import made_folder, write_text
 from orchestrator.units import to_unit
 
 _SIDES = ("device", "network")
+_Named = tuple[str, bool | float | str]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -81,7 +84,9 @@ def _request(options: argparse.Namespace) -> CutRequest:
     if network is None and Path(device).suffix.lower() in (*ENDINGS, ".fmu", ".so", ".dll"):
         raise InputError(f"{device}: give its network as well: a scan, or a case with --bus or --component")
     case = device if network is None else network
-    of_fmu, of_case = [], []
+    of_fmu: list[str] = []
+    of_case: list[str] = []
+    other: Path | PreparedScenario
     for text in options.set:
         (of_case if network is None or "." in text.partition("=")[0] else of_fmu).append(text)
     if Path(case).suffix.lower() in ENDINGS:
@@ -98,8 +103,8 @@ def _request(options: argparse.Namespace) -> CutRequest:
     )  # fmt: skip
 
 
-def _typed(kind):
-    def read(text):
+def _typed(kind: Callable[[str], _Named]) -> Callable[[str], _Named]:
+    def read(text: str) -> _Named:
         try:
             return kind(text)
         except argparse.ArgumentTypeError as error:
@@ -108,7 +113,7 @@ def _typed(kind):
     return read
 
 
-def _in(unit: str):
+def _in(unit: str) -> Callable[[str], float]:
     def read(text: str) -> float:
         try:
             return to_unit(text, unit)

@@ -89,7 +89,7 @@ def _sides(blocks: Blocks, model: LinearModel, devices: tuple[str, ...]) -> tupl
     """The devices side by side, and the rest as seen from them: the closed model with their currents given."""
     names = {full: k for k, full in enumerate(blocks.output_names)}
     given = np.array([names[f"{d}.{i}"] for d in devices for i in _PORT[1]])
-    read = []
+    read: list[int] = []
     parts = []
     for d in devices:
         c = blocks.components[d]
@@ -106,7 +106,7 @@ def _sides(blocks: Blocks, model: LinearModel, devices: tuple[str, ...]) -> tupl
     whole = np.linalg.inv(np.eye(len(K)) - K)
     kept = np.setdiff1d(np.arange(len(F)), np.concatenate([np.arange(len(F))[windows[d]] for d in devices]))
     A, B = F + G @ whole @ H, G @ whole[:, given]
-    C, D = (whole @ H)[read], whole[np.ix_(read, given)]
+    C, D = (whole @ H)[read], whole[read][:, given]
     moved = np.abs(A.diagonal()[kept]) + np.abs(A[kept][:, kept]).sum(axis=1) + np.abs(B[kept]).sum(axis=1) > 0
     kept = kept[moved | (np.abs(A[:, kept]).sum(axis=0) > 0)]  # clocks say nothing
     rest = Exact("the network", A[np.ix_(kept, kept)], B[kept], C[:, kept], D)

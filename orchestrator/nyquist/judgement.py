@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from orchestrator.arrays import Complex, Numbers
+from orchestrator.arrays import Numbers, Vector
 from orchestrator.nyquist.loop import CutLoop, LoopPath, common_range, nodes_of
 from orchestrator.nyquist.margins import Crossing, NyquistMargins, crossings_of, margins_of
 from orchestrator.nyquist.scan import block_rotation
@@ -104,12 +104,12 @@ def _by_determinant(path: LoopPath, loop: CutLoop) -> int:
     first, last = _principal(path, 0), _principal(path, -1)
     begin = np.pi * round(first / np.pi)
     end = np.pi * round(last / np.pi) if loop.is_exact else 0.0
-    return -round(((first - begin) + path.turns.sum() - (last - end)) / np.pi)
+    return -int(round(((first - begin) + path.turns.sum() - (last - end)) / np.pi))
 
 
 def _by_crossings(path: LoopPath, loop: CutLoop) -> int:
     """The same, by crossings of the ray from −1 to −∞."""
-    found = 0
+    found: int = 0
     for locus in path.loci.T:
         i = np.flatnonzero((locus.imag[:-1] < 0) != (locus.imag[1:] < 0))
         t = locus.imag[i] / (locus.imag[i] - locus.imag[i + 1])
@@ -122,7 +122,9 @@ def _by_crossings(path: LoopPath, loop: CutLoop) -> int:
 
 def _on_the_ray(value: complex) -> int:
     """Where a locus begins or ends on the ray, its mirror image goes on from there: one crossing for both."""
-    return 0 if abs(np.angle(1 + value)) < np.pi / 2 else (1 if value.imag > 0 else -1)
+    if abs(float(np.angle(1 + value))) < np.pi / 2:
+        return 0
+    return 1 if value.imag > 0 else -1
 
 
 def _open_loop(loop: CutLoop) -> list[str]:
@@ -148,9 +150,9 @@ def _resolution(loop: CutLoop, path: LoopPath) -> list[str]:
     at = path.hertz[int(np.argmax(share))]
     touched = path.hertz[share >= 1]
     return [
-        f"from {touched.min():.4g} to {touched.max():.4g} Hz, most at {at:.4g} Hz, the scans do not tell on which side of "
-        f"−1 the loop passes: the values between their frequencies are uncertain by {share.max():.2g} times the distance; "
-        "scan more frequencies there"
+        f"from {touched.min():.4g} to {touched.max():.4g} Hz, most at {at:.4g} Hz, the scans do not tell on which side "
+        f"of −1 the loop passes: the values between their frequencies are uncertain by {share.max():.2g} times the "
+        "distance; scan more frequencies there"
     ]
 
 
@@ -169,8 +171,8 @@ def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
                       for side in (loop.device, loop.network))  # fmt: skip
     if not (small or passive):
         reasons.append(
-            f"beyond {path.hertz[-1]:g} Hz an encirclement may follow: up to there neither are both sides passive nor the "
-            f"loci small ({size[-1]:.2g}); scan higher frequencies"
+            f"beyond {path.hertz[-1]:g} Hz an encirclement may follow: up to there neither are both sides passive nor "
+            f"the loci small ({size[-1]:.2g}); scan higher frequencies"
         )
     return reasons
 
@@ -199,18 +201,18 @@ def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:
         turned = replace(loop, device=replace(device, values=T @ device.values @ T.T))
         if _by_determinant(turned.path(nodes), loop) != count:
             return [
-                "the verdict depends on the angle between the frames of the two scans, which neither states: give it by "
-                f"--angle, or the files _angles.txt (turned by {np.rad2deg(angle):.0f}° it would be another)"
+                "the verdict depends on the angle between the frames of the two scans, which neither states: give it "
+                f"by --angle, or the files _angles.txt (turned by {np.rad2deg(angle):.0f}° it would be another)"
             ]
     return []
 
 
-def _turns_alike(values: Complex) -> bool:
+def _turns_alike(values: Vector) -> bool:
     """Whether a matrix is the same in every frame."""
     J = block_rotation([np.pi / 2] * (values.shape[-1] // 2))
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
     return bool((np.linalg.norm(J @ values @ J.T - values, ord=2, axis=(1, 2)) < _INVARIANT * size).all())
 
 
-def sampled(name: str, frequencies: Numbers, values: Complex, bounds: Sequence[float] | Numbers) -> Sampled:
+def sampled(name: str, frequencies: Numbers, values: Vector, bounds: Sequence[float] | Numbers) -> Sampled:
     return Sampled(name, frequencies, values, np.asarray(bounds, dtype=float))

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from orchestrator.arrays import Complex, Numbers
+from orchestrator.arrays import Complex, Numbers, Vector
 from orchestrator.nyquist.sides import Exact, Side
 
 _STEP = np.deg2rad(25.0)
@@ -33,7 +34,7 @@ class SeriesCapacitors:
     reactance: float
     omega: float
 
-    def at(self, s: Complex) -> Complex:
+    def at(self, s: Vector) -> Complex:
         """Impedance, shape (f, 2, 2)."""
         x, w = self.reactance, self.omega
         down = s**2 + w**2
@@ -53,7 +54,7 @@ class LoopPath:
         Shapes (f, n, n) and (f, n); each column of ``loci`` is one eigenvalue followed along the way.
     """
 
-    s: Complex
+    s: Vector
     L: Complex
     loci: Complex
 
@@ -99,18 +100,18 @@ class CutLoop:
     def is_exact(self) -> bool:
         return self.device.is_exact and self.network.is_exact
 
-    def values(self, s: Complex) -> Complex:
+    def values(self, s: Vector) -> Complex:
         """L at points on the axis, or close beside it."""
         return np.asarray(self.impedance(s) @ self.device.at(s))
 
-    def impedance(self, s: Complex) -> Complex:
+    def impedance(self, s: Vector) -> Complex:
         Z = self.network.at(s)
         return Z if self.capacitors is None else Z + self.capacitors.at(s)
 
     def path(self, nodes: Numbers) -> LoopPath:
         """The loop along the axis between the first and the last of some frequencies [Hz], as finely as it turns."""
-        w = 2 * np.pi * np.unique(np.concatenate([np.linspace(a, b, _WITHIN, endpoint=False) for a, b in
-                                                  zip(nodes[:-1], nodes[1:], strict=True)] + [nodes[-1:]]))  # fmt: skip
+        between = [np.linspace(a, b, _WITHIN, endpoint=False) for a, b in pairwise(nodes.tolist())]
+        w = 2 * np.pi * np.unique(np.concatenate([*between, nodes[-1:]]))
         s = self._round_the_pole(1j * w)
         if self.is_exact:
             s = np.concatenate([w[0] * np.exp(1j * np.linspace(0, np.pi / 2, 17))[:-1], s])
@@ -120,12 +121,12 @@ class CutLoop:
             wide = np.flatnonzero(np.abs(np.angle(det[1:] / det[:-1])) > _STEP)
             if not len(wide) or len(s) > 200_000:
                 break
-            between = (s[wide] + s[wide + 1]) / 2
-            L = np.insert(L, wide + 1, self.values(between), axis=0)
-            s = np.insert(s, wide + 1, between)
+            middle = (s[wide] + s[wide + 1]) / 2
+            L = np.insert(L, wide + 1, self.values(middle), axis=0)
+            s = np.insert(s, wide + 1, middle)
         return LoopPath(s, L, followed(np.linalg.eigvals(L)))
 
-    def _round_the_pole(self, s: Complex) -> Complex:
+    def _round_the_pole(self, s: Vector) -> Complex:
         """The path with an arc to the right of the capacitors' pole, and points ever closer to it on both sides."""
         if self.capacitors is None or not s[0].imag < self.capacitors.omega < s[-1].imag:
             return s
@@ -141,7 +142,7 @@ class CutLoop:
         return np.concatenate([low, arc, high])
 
 
-def followed(eigenvalues: Complex) -> Complex:
+def followed(eigenvalues: Vector) -> Complex:
     """Eigenvalues with each column one of them, followed from point to point by the least sum of distances."""
     found = eigenvalues.copy()
     n = found.shape[1]

@@ -1,4 +1,4 @@
-"""Margins of a loop: changes of gain, phase and delay in all its entries that bring an eigenvalue to −1, and the disk's."""
+"""Margins of a loop: changes of gain, phase and delay in all its entries that bring an eigenvalue to −1; the disk's."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.nyquist.loop import LoopPath
-
 
 _LEAST = 1e-4
 """Loci that cross the axis nearer to 0 tell nothing."""

@@ -37,11 +37,15 @@ def _eigenloci(judgement: CutJudgement, title: str) -> Figure:
         axes.plot(close.real, close.imag, color="#a11d1d", linewidth=0.8, linestyle="--",
                   label=f"distance {m.distance.value:.3g} at {m.distance.frequency_hz:.3g} Hz")  # fmt: skip
         axes.plot([-1], [0], "+", color="#a11d1d", ms=10, mew=2)
-        for c in judgement.crossings:
-            if abs(c.real) < reach:
-                axes.plot([c.real], [0], "o", color="black", ms=3.5)
-                axes.annotate(f"{c.real:.3f}, {c.frequency_hz:.2f} Hz", (c.real, 0), (4, 6), fontsize=8, rotation=35,
-                              textcoords="offset points")  # fmt: skip
+        for k, c in enumerate(judgement.crossings):
+            axes.plot([c.real], [0], "o", color="black", ms=3.5)
+            if abs(c.real) < reach and reach == near:
+                axes.annotate(f"{c.real:.3f} at {c.frequency_hz:.2f} Hz", (c.real, 0), (-12, 18 + 13 * (k % 4)),
+                              fontsize=8, textcoords="offset points",
+                              arrowprops={"arrowstyle": "-", "linewidth": 0.5})  # fmt: skip
+        for margin, text in ((m.gain, "gain × {:.3g}"), (m.phase_deg, "phase {:.3g}°")):
+            if margin is not None:
+                axes.plot([], [], " ", label=f"{text.format(margin.value)} at {margin.frequency_hz:.4g} Hz")
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="Re λ(Z·Y)", ylabel="Im λ(Z·Y)", aspect="equal")
         axes.set_title(name, loc="left")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4)
@@ -60,8 +64,8 @@ def _matrices(result: CutResult) -> Figure:
         for k, (i, j) in enumerate(np.ndindex(2, 2)):
             axes[0, column].loglog(f, np.abs(M[:, i, j]) + 1e-300, color=colour(k), label="dq"[i] + "dq"[j])
             axes[1, column].semilogx(f, np.rad2deg(np.angle(M[:, i, j])), color=colour(k))
-        size = np.abs(M[:, :2, :2]).max()
-        axes[0, column].set_ylim(1e-5 * size, 2 * size)
+        size = np.median(np.abs(M[:, :2, :2]).max(axis=(1, 2)))
+        axes[0, column].set_ylim(1e-3 * size, max(30 * size, 1.5 * np.abs(M[[0, -1]]).max()))
         axes[0, column].set_title(label, loc="left")
         axes[1, column].set(xlabel="Frequency in dq [Hz]", ylabel="Phase [°]", yticks=range(-180, 181, 90))
         for band in result.judgement.active[("device", "network")[column]]:

@@ -1,8 +1,10 @@
 """Unstable poles in what was measured over frequency: rational functions with common poles (AAA) through the values."""
 
+from itertools import pairwise
+
 import numpy as np
 
-from orchestrator.arrays import Complex, Numbers
+from orchestrator.arrays import Complex, Numbers, Vector
 
 _TOLERANCES = (3e-2, 1e-2, 3e-3)
 """Relative errors at which the fit stops. A pole of the system is found at two of them in one place; one that stands
@@ -16,7 +18,7 @@ _STRONG = 0.05
 """Least size of what a pole adds at its frequency, relative to the whole there."""
 
 
-def unstable_poles(frequencies: Numbers, values: Complex) -> tuple[complex, ...]:
+def unstable_poles(frequencies: Numbers, values: Vector) -> tuple[complex, ...]:
     """Poles of positive real part [rad/s] that the values show, one of each pair.
 
     Parameters
@@ -29,7 +31,7 @@ def unstable_poles(frequencies: Numbers, values: Complex) -> tuple[complex, ...]
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
     found = [_growing(frequencies, values / size.max(), size / size.max(), tolerance) for tolerance in _TOLERANCES]
     kept: list[complex] = []
-    for coarse, fine in zip(found[:-1], found[1:], strict=True):
+    for coarse, fine in pairwise(found):
         for p in fine:
             near = any(abs(p - q) < _SAME * p.real + 1e-3 * abs(p) for q in coarse)
             if near and not any(abs(p - q) < p.real for q in kept):
@@ -37,7 +39,7 @@ def unstable_poles(frequencies: Numbers, values: Complex) -> tuple[complex, ...]
     return tuple(kept)
 
 
-def _growing(f: Numbers, values: Complex, size: Numbers, tolerance: float) -> list[complex]:
+def _growing(f: Numbers, values: Vector, size: Numbers, tolerance: float) -> list[complex]:
     s, G = 2j * np.pi * f, values.reshape(len(f), -1)
     poles, residues = _fit(s, G, tolerance)
     lowest, highest = 2 * np.pi * f[0], 2 * np.pi * f[-1]
@@ -52,7 +54,7 @@ def _growing(f: Numbers, values: Complex, size: Numbers, tolerance: float) -> li
     return found
 
 
-def _fit(s: Complex, G: Complex, tolerance: float) -> tuple[Complex, Complex]:
+def _fit(s: Vector, G: Vector, tolerance: float) -> tuple[Complex, Complex]:
     """Poles and residues of a rational function of real coefficients through the values."""
     points, data = np.concatenate([s, -s]), np.concatenate([G, G.conj()])
     support: list[int] = []
@@ -78,7 +80,7 @@ def _fit(s: Complex, G: Complex, tolerance: float) -> tuple[Complex, Complex]:
     return _poles(points[support], weights, data[support])
 
 
-def _poles(z: Complex, weights: Complex, values: Complex) -> tuple[Complex, Complex]:
+def _poles(z: Vector, weights: Vector, values: Vector) -> tuple[Complex, Complex]:
     """Zeros of Σ w/(s − z), and the residues there."""
     # With Σw ≠ 0 they are the eigenvalues of diag(z) − w·1ᵀ·diag(z)…, found by deflating one infinite direction.
     total = weights.sum()

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from orchestrator.arrays import Complex, Numbers
+from orchestrator.arrays import Complex, Numbers, Vector
 from orchestrator.errors import InputError
 
 SIEMENS, PER_UNIT = "S", "pu"
@@ -61,7 +61,7 @@ class Scan:
 
     source: str
     frequencies: Numbers
-    values: Complex
+    values: Vector
     ports: tuple[str, ...]
     unit: str = SIEMENS
     bounds: Numbers = field(default_factory=lambda: np.zeros(0))
@@ -100,13 +100,13 @@ def block_rotation(angles: Sequence[float]) -> Numbers:
     return T
 
 
-def other_q_axis(values: Complex) -> Complex:
+def other_q_axis(values: Vector) -> Complex:
     """The same with each q axis turned round."""
     signs = np.tile([1.0, -1.0], values.shape[-1] // 2)
     return np.asarray(values * signs[:, None] * signs[None, :])
 
 
-def checked(source: str, frequencies: Numbers, values: Complex) -> tuple[str, ...]:
+def checked(source: str, frequencies: Numbers, values: Vector) -> tuple[str, ...]:
     """Questions about a scan as read.
 
     Raises
@@ -132,7 +132,7 @@ def checked(source: str, frequencies: Numbers, values: Complex) -> tuple[str, ..
     return (f"{source}: are rows missing from {', '.join(holes[:5])}? the steps beside are shorter",) if holes else ()
 
 
-def in_own_form(source: str, frequencies: Numbers, values: Complex, rated_hz: float, *, q_leads: bool) -> Complex:
+def in_own_form(source: str, frequencies: Numbers, values: Vector, rated_hz: float, *, q_leads: bool) -> Complex:
     """Values with the q axis leading; the inductance that every filter and line has at high frequencies must agree.
 
     Raises
@@ -150,7 +150,7 @@ def in_own_form(source: str, frequencies: Numbers, values: Complex, rated_hz: fl
     return own
 
 
-def _reactance_sign(frequencies: Numbers, values: Complex, rated_hz: float) -> float:
+def _reactance_sign(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
     """1 if ωL in the dq and qd elements of the impedance is that of a leading q axis, −1 of a lagging; 0 if unclear."""
     top = slice(int(_TOP * len(frequencies)), None)
     size = np.linalg.norm(values[top], ord=2, axis=(1, 2))

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from orchestrator.arrays import Complex, Matrix, Numbers
+from orchestrator.arrays import Complex, Matrix, Numbers, Vector
 from orchestrator.nyquist.poles import unstable_poles
 
 NEAR_ZERO = 1e-3
@@ -31,7 +31,8 @@ class Side(Protocol):
         Whether it is known at every frequency.
     """
 
-    name: str
+    @property
+    def name(self) -> str: ...
 
     @property
     def frequencies(self) -> Numbers: ...
@@ -42,10 +43,10 @@ class Side(Protocol):
     @property
     def unstable(self) -> tuple[complex, ...]: ...
 
-    def at(self, s: Complex) -> Complex:
+    def at(self, s: Vector) -> Complex:
         """Its values at s, on the imaginary axis or close beside it, shape (f, n, n)."""
 
-    def error(self, s: Complex) -> Numbers:
+    def error(self, s: Vector) -> Numbers:
         """Bound of their error in the 2-norm, shape (f,)."""
 
 
@@ -55,7 +56,7 @@ class Sampled:
 
     name: str
     frequencies: Numbers
-    values: Complex
+    values: Vector
     bounds: Numbers
     is_exact: bool = False
 
@@ -63,12 +64,12 @@ class Sampled:
     def unstable(self) -> tuple[complex, ...]:
         return unstable_poles(self.frequencies, self.values)
 
-    def at(self, s: Complex) -> Complex:
+    def at(self, s: Vector) -> Complex:
         f = s.imag / (2 * np.pi)
         first = np.clip(np.searchsorted(self.frequencies, f) - 2, 0, len(self.frequencies) - 4)
         return _lagrange(self.frequencies, self.values, f, first[:, None] + np.arange(4))
 
-    def error(self, s: Complex) -> Numbers:
+    def error(self, s: Vector) -> Numbers:
         f = s.imag / (2 * np.pi)
         right = np.clip(np.searchsorted(self.frequencies, f), 1, len(self.frequencies) - 1)
         found = np.maximum(self._left_out[right - 1], self._left_out[right])
@@ -88,7 +89,7 @@ class Sampled:
         return np.pad(np.minimum(factor * small, large + 10 * small) + rounding, 2, mode="edge")
 
 
-def _lagrange(f: Numbers, values: Complex, at: Numbers, places: Numbers) -> Complex:
+def _lagrange(f: Numbers, values: Vector, at: Numbers, places: Vector) -> Complex:
     """Polynomials through values at some places (n, m), evaluated at n frequencies."""
     nodes = f[places]
     total = np.zeros((len(at), *values.shape[1:]), dtype=complex)
@@ -135,18 +136,18 @@ class Exact:
     def unstable(self) -> tuple[complex, ...]:
         return tuple(p for p in self.poles.tolist() if p.real > 0 and abs(p) > NEAR_ZERO)
 
-    def at(self, s: Complex) -> Complex:
+    def at(self, s: Vector) -> Complex:
         return self._direct(s) if self._modes is None else self._modal(s, self._modes)
 
-    def _direct(self, s: Complex) -> Complex:
+    def _direct(self, s: Vector) -> Complex:
         found = [self.C @ np.linalg.solve(x * np.eye(len(self.A)) - self.A, self.B) for x in s.tolist()]
         return np.asarray(np.array(found, dtype=complex).reshape(len(s), *self.D.shape) + self.D)
 
-    def _modal(self, s: Complex, modes: tuple[Complex, Complex, Complex]) -> Complex:
+    def _modal(self, s: Vector, modes: tuple[Complex, Complex, Complex]) -> Complex:
         values, C, B = modes
         return np.asarray((C / (s[:, None, None] - values)) @ B + self.D)
 
-    def error(self, s: Complex) -> Numbers:
+    def error(self, s: Vector) -> Numbers:
         return np.zeros(len(s))
 
     def negated(self) -> "Exact":

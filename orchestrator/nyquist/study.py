@@ -17,7 +17,7 @@ from orchestrator.nyquist.margins import Margin
 from orchestrator.nyquist.measured import scan_fmu
 from orchestrator.nyquist.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.nyquist.scan_files import ENDINGS, read_scan
-from orchestrator.nyquist.sides import Sampled
+from orchestrator.nyquist.sides import Sampled, Side
 
 _SYSTEM_MVA = 100.0
 _UNLIKE = (0.003, 30.0)
@@ -145,9 +145,12 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     scans = {side: _in_unit(scan, unit, request.kilovolt) for side, scan in scans.items()}
     known = _in_one_frame(request, scans, cut)
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
-    device = _sampled(scans["device"]) if "device" in scans else cut.device if cut else None
-    network = _sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
-    assert device is not None and network is not None
+    device: Side | None = _sampled(scans["device"]) if "device" in scans else cut.device if cut else None
+    network: Side | None = (
+        _sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
+    )
+    assert device is not None
+    assert network is not None
     if len(scans) == 2:
         _check_pair(request, scans["device"], scans["network"])
     loop = CutLoop(device, network)
@@ -228,20 +231,25 @@ def _check_pair(request: CutRequest, device: Scan, network: Scan) -> None:
     ratio = float(np.median(sizes[0] * sizes[1]))
     if not _UNLIKE[0] < ratio < _UNLIKE[1] and not request.units_checked:
         raise InputError(
-            f"{device.source} times the impedance of {network.source} is {ratio:.2g} at most frequencies: is one of them "
-            "in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; if the "
-            "units are right, give --units-checked"
+            f"{device.source} times the impedance of {network.source} is {ratio:.2g} at most frequencies: is one of "
+            "them in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; "
+            "if the units are right, give --units-checked"
         )
-    for one, other, port in zip(device.ports, network.ports, device.ports, strict=True):
+    for one, other in zip(device.ports, network.ports, strict=True):
         a, b = device.points.get(one), network.points.get(other)
         if a is None or b is None:
             continue
         power = max(abs(complex(p.megawatt or 0, p.megavar or 0)) for p in (a, b))
-        for name, x, y, size in (("voltage", a.kilovolt, b.kilovolt, a.kilovolt), ("active power", a.megawatt, b.megawatt, power),
-                                 ("reactive power", a.megavar, b.megavar, power)):  # fmt: skip
-            if None not in (x, y) and abs(abs(x or 0) - abs(y or 0)) > _OTHER_POINT * (size or 1):
-                raise InputError(f"port {port}: {device.source} was scanned at a {name} of {x:g} and {network.source} at "
-                                 f"{y:g}; scan both at one operating point")  # fmt: skip
+        for name, x, y, size in (
+            ("voltage [kV]", a.kilovolt, b.kilovolt, a.kilovolt),
+            ("active power [MW]", a.megawatt, b.megawatt, power),
+            ("reactive power [Mvar]", a.megavar, b.megavar, power),
+        ):
+            if x is not None and y is not None and abs(abs(x) - abs(y)) > _OTHER_POINT * (size or 1):
+                raise InputError(
+                    f"port {one}: {device.source} was scanned at another operating point than {network.source}: "
+                    f"{name} {x:g} and {y:g}; scan both at one"
+                )
 
 
 def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:

@@ -55,8 +55,8 @@ def _rows(path: Path, text: str, size: int) -> tuple[Numbers, Complex]:
         cells = line.split("\t") if "\t" in line else line.split()
         if len(cells) != 1 + size**2:
             raise InputError(
-                f"{path.name}, line {number}: there are {len(cells)} numbers, and {size} names ask for {1 + size**2}: a "
-                "frequency and the matrix row by row; was the file cut off?"
+                f"{path.name}, line {number}: there are {len(cells)} numbers, and {size} names ask for {1 + size**2}: "
+                "a frequency and the matrix row by row; was the file cut off?"
             )
         try:
             rows.append([complex(re.sub(r"[()\s]", "", cell).replace("+-", "-")) for cell in cells])
