@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.api.values import plain
-from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.nyquist.scan_files import ENDINGS
 from orchestrator.nyquist.study import CutRequest, CutResult, study_cut
@@ -112,5 +111,6 @@ def network_of(
 ) -> PreparedScenario:
     """A case's scenario, its first where None."""
     from orchestrator.api.scenario import choose  # noqa: PLC0415 - scans need no cases
+    from orchestrator.cases.case import load_case  # noqa: PLC0415
 
     return choose(load_case(case, trust_fmus=trust_fmus), [scenario] if scenario else [], values)[0].prepared

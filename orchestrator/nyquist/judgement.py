@@ -104,7 +104,7 @@ def _by_determinant(path: LoopPath, loop: CutLoop) -> int:
     first, last = _principal(path, 0), _principal(path, -1)
     begin = np.pi * round(first / np.pi)
     end = np.pi * round(last / np.pi) if loop.is_exact else 0.0
-    return -int(round(((first - begin) + path.turns.sum() - (last - end)) / np.pi))
+    return -round(((first - begin) + path.turns.sum() - (last - end)) / np.pi)
 
 
 def _by_crossings(path: LoopPath, loop: CutLoop) -> int:

@@ -10,6 +10,9 @@ from orchestrator.nyquist.loop import LoopPath
 _LEAST = 1e-4
 """Loci that cross the axis nearer to 0 tell nothing."""
 
+_SLOWEST = 0.05
+"""Least frequency of a distance [Hz]: below, a free angle moves as far as one likes."""
+
 
 @dataclass(frozen=True)
 class Crossing:
@@ -105,5 +108,6 @@ def _least(margins: list[Margin]) -> Margin | None:
 
 
 def _where_least(path: LoopPath, values: Numbers) -> Margin:
-    k = int(np.argmin(np.where(path.on_axis, values, np.inf)))
+    told = path.on_axis & (path.hertz >= min(_SLOWEST, path.hertz[-1]))
+    k = int(np.argmin(np.where(told, values, np.inf)))
     return Margin(float(values[k]), float(path.hertz[k]))

@@ -91,7 +91,9 @@ class CutResult:
         low, high = j.range_hz
         around = f"−1 is encircled {j.encirclements} times by the determinant and by the eigenloci"
         poles = f", with {len(j.open_loop)} unstable poles of the open loop" if j.open_loop else ""
-        return f"{around}{poles}, from {low:.3g} to {high:.4g} Hz"
+        return f"{around}{poles}, " + (
+            "at all frequencies" if self.loop.is_exact else f"from {low:.3g} to {high:.4g} Hz"
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Verdict and figures as JSON's types."""
