@@ -10,7 +10,7 @@ _TOLERANCES = (3e-2, 1e-2, 3e-3)
 """Relative errors at which the fit stops. A pole of the system is found at two of them in one place; one that stands
 for noise moves."""
 
-_MOST = 40
+_MOST = 20
 _SAME = 0.2
 """Distance of two findings of one pole, in its real part plus a thousandth of its size."""
 
@@ -29,7 +29,9 @@ def unstable_poles(frequencies: Numbers, values: Vector) -> tuple[complex, ...]:
         Shape (f, n, n).
     """
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
-    found = [_growing(frequencies, values / size.max(), size / size.max(), tolerance) for tolerance in _TOLERANCES]
+    size = size / size.max()
+    fits = _fits(2j * np.pi * frequencies, (values / np.abs(values).max()).reshape(len(size), -1))
+    found = [_growing(frequencies, size, *fit) for fit in fits]
     kept: list[complex] = []
     for coarse, fine in pairwise(found):
         for p in fine:
@@ -39,9 +41,7 @@ def unstable_poles(frequencies: Numbers, values: Vector) -> tuple[complex, ...]:
     return tuple(kept)
 
 
-def _growing(f: Numbers, values: Vector, size: Numbers, tolerance: float) -> list[complex]:
-    s, G = 2j * np.pi * f, values.reshape(len(f), -1)
-    poles, residues = _fit(s, G, tolerance)
+def _growing(f: Numbers, size: Numbers, poles: Vector, residues: Vector) -> list[complex]:
     lowest, highest = 2 * np.pi * f[0], 2 * np.pi * f[-1]
     found = []
     for p, residue in zip(poles.tolist(), residues, strict=True):
@@ -54,30 +54,28 @@ def _growing(f: Numbers, values: Vector, size: Numbers, tolerance: float) -> lis
     return found
 
 
-def _fit(s: Vector, G: Vector, tolerance: float) -> tuple[Complex, Complex]:
-    """Poles and residues of a rational function of real coefficients through the values."""
-    points, data = np.concatenate([s, -s]), np.concatenate([G, G.conj()])
+def _fits(s: Vector, G: Vector) -> list[tuple[Complex, Complex]]:
+    """Poles and residues of rational functions through the values, at each of the tolerances."""
     support: list[int] = []
-    half = len(s)
-    error = np.abs(data - data.mean(axis=0)).max(axis=1)
-    weights = np.zeros(0)
-    while len(support) < min(_MOST, half // 2):
-        k = int(np.argmax(error[:half]))
-        support += [k, k + half]
-        others = np.setdiff1d(np.arange(2 * half), support)
-        cauchy = 1 / (points[others, None] - points[support][None, :])
-        loewner = np.concatenate(
-            [(data[others, c][:, None] - data[support, c][None, :]) * cauchy for c in range(G.shape[1])]
-        )
+    error = np.abs(G - G.mean(axis=0)).max(axis=1)
+    found: list[tuple[Complex, Complex]] = []
+    while len(support) < min(_MOST, len(s) // 2) and len(found) < len(_TOLERANCES):
+        support.append(int(np.argmax(error)))
+        points = np.concatenate([s[support], -s[support]])
+        data = np.concatenate([G[support], G[support].conj()])
+        others = np.setdiff1d(np.arange(len(s)), support)
+        cauchy = 1 / (s[others, None] - points[None, :])
+        loewner = np.concatenate([(G[others, c][:, None] - data[None, :, c]) * cauchy for c in range(G.shape[1])])
+        mirror = np.roll(loewner.conj(), len(support), axis=1)  # the rows of −s, whose support is the other half
+        loewner = np.concatenate([loewner, mirror])
         # The smallest right singular vector, through the small square matrix of the QR factors.
         weights = np.linalg.svd(np.linalg.qr(loewner, mode="r"))[2][-1].conj()
-        denominator = cauchy @ weights
-        fitted = (cauchy @ (weights[:, None] * data[support])) / denominator[:, None]
-        error = np.zeros(2 * half)
-        error[others] = np.abs(fitted - data[others]).max(axis=1)
-        if error.max() < tolerance:
-            break
-    return _poles(points[support], weights, data[support])
+        fitted = (cauchy @ (weights[:, None] * data)) / (cauchy @ weights)[:, None]
+        error = np.zeros(len(s))
+        error[others] = np.abs(fitted - G[others]).max(axis=1)
+        while len(found) < len(_TOLERANCES) and error.max() < _TOLERANCES[len(found)]:
+            found.append(_poles(points, weights, data))
+    return found + [_poles(points, weights, data)] * (len(found) < len(_TOLERANCES))
 
 
 def _poles(z: Vector, weights: Vector, values: Vector) -> tuple[Complex, Complex]:
