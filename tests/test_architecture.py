@@ -25,7 +25,7 @@ FLOORS = (
     ("orchestrator.report",),
     ("orchestrator.study",),
     ("orchestrator.black_box", "orchestrator.pod_design", "orchestrator.sweep"),
-    ("orchestrator.screening", "orchestrator.sensitivities", "orchestrator.interactions", "orchestrator.nyquist"),
+    ("orchestrator.screening", "orchestrator.sensitivities", "orchestrator.interactions", "orchestrator.immittance"),
     ("orchestrator.certification", "orchestrator.coordinated_design"),
     ("orchestrator.api",),
     ("orchestrator.cli",),

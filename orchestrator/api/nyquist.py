@@ -6,8 +6,8 @@ from typing import Any
 
 from orchestrator.api.values import plain
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.nyquist.scan_files import ENDINGS
-from orchestrator.nyquist.study import CutRequest, CutResult, study_cut
+from orchestrator.immittance.scan_files import ENDINGS
+from orchestrator.immittance.study import CutRequest, CutResult, study_cut
 from orchestrator.units import to_unit
 
 
@@ -39,7 +39,7 @@ class Nyquist:
 
     def save_pictures(self, folder: str | Path) -> list[Path]:
         """Write the eigenloci and the matrices as PNG into a folder that exists; returns the paths."""
-        from orchestrator.nyquist.pictures import draw  # noqa: PLC0415 - a second to import
+        from orchestrator.immittance.pictures import draw  # noqa: PLC0415 - a second to import
 
         return draw(self.result, Path(folder))
 

@@ -15,9 +15,9 @@ from orchestrator.cli.arguments import assignment, seconds, setting
 from orchestrator.cli.terminal import make_console, make_errors, said_stages
 from orchestrator.cli.verdict import NOT_MET
 from orchestrator.errors import InputError
-from orchestrator.nyquist.margins import Margin
-from orchestrator.nyquist.scan_files import ENDINGS
-from orchestrator.nyquist.study import CutRequest, CutResult, study_cut
+from orchestrator.immittance.margins import Margin
+from orchestrator.immittance.scan_files import ENDINGS
+from orchestrator.immittance.study import CutRequest, CutResult, study_cut
 from orchestrator.report.tables import make_table
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder, write_text
@@ -134,8 +134,8 @@ def _share(text: str) -> float:
 
 
 def _save(result: CutResult, folder: Path) -> None:
-    from orchestrator.nyquist.pictures import draw  # noqa: PLC0415 - a second to import
-    from orchestrator.nyquist.ztool import write_ztool  # noqa: PLC0415
+    from orchestrator.immittance.pictures import draw  # noqa: PLC0415 - a second to import
+    from orchestrator.immittance.ztool import write_ztool  # noqa: PLC0415
 
     write_text(folder / "nyquist.json", json.dumps(result.as_json(), indent=1) + "\n")
     draw(result, folder)

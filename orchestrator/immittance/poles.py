@@ -10,7 +10,7 @@ _TOLERANCES = (3e-2, 1e-2, 3e-3)
 """Relative errors at which the fit stops. A pole of the system is found at two of them in one place; one that stands
 for noise moves."""
 
-_MOST = 20
+_MOST, _ENOUGH = 20, 500
 _SAME = 0.2
 """Distance of two findings of one pole, in its real part plus a thousandth of its size."""
 
@@ -28,6 +28,8 @@ def unstable_poles(frequencies: Numbers, values: Vector) -> tuple[complex, ...]:
     values
         Shape (f, n, n).
     """
+    every = -(-len(frequencies) // _ENOUGH)
+    frequencies, values = frequencies[::every], values[::every]
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
     size = size / size.max()
     fits = _fits(2j * np.pi * frequencies, (values / np.abs(values).max()).reshape(len(size), -1))

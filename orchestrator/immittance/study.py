@@ -10,14 +10,14 @@ import numpy as np
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
-from orchestrator.nyquist.cut import Cut, cut_of
-from orchestrator.nyquist.judgement import CutJudgement, NyquistVerdict, judge_loop
-from orchestrator.nyquist.loop import CutLoop, SeriesCapacitors
-from orchestrator.nyquist.margins import Margin
-from orchestrator.nyquist.measured import scan_fmu
-from orchestrator.nyquist.scan import PER_UNIT, SIEMENS, Scan, check_sign
-from orchestrator.nyquist.scan_files import ENDINGS, read_scan
-from orchestrator.nyquist.sides import Sampled, Side
+from orchestrator.immittance.cut import Cut, cut_of
+from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judge_loop
+from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
+from orchestrator.immittance.margins import Margin
+from orchestrator.immittance.measured import scan_fmu
+from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
+from orchestrator.immittance.scan_files import ENDINGS, read_scan
+from orchestrator.immittance.sides import Sampled, Side
 
 _SYSTEM_MVA = 100.0
 _UNLIKE = (0.003, 30.0)

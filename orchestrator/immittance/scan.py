@@ -14,8 +14,8 @@ from orchestrator.errors import InputError
 
 SIEMENS, PER_UNIT = "S", "pu"
 
-_TOP = 0.5
-"""The upper half of the frequencies, in their number, tells signs: there a device's filter answers, not its control."""
+_TOP = 5.0
+"""Frequencies down to this part of the highest tell signs: there a device's filter answers, not its control."""
 
 _ACTIVE = 0.5
 """Part of those frequencies at which both resistances must be negative for the sign to be called the generator's."""
@@ -152,7 +152,7 @@ def in_own_form(source: str, frequencies: Numbers, values: Vector, rated_hz: flo
 
 def _reactance_sign(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
     """1 if ωL in the dq and qd elements of the impedance is that of a leading q axis, −1 of a lagging; 0 if unclear."""
-    top = slice(int(_TOP * len(frequencies)), None)
+    top = frequencies >= frequencies[-1] / _TOP
     size = np.linalg.norm(values[top], ord=2, axis=(1, 2))
     if (size == 0).any():
         return 0.0
@@ -169,7 +169,7 @@ def _reactance_sign(frequencies: Numbers, values: Vector, rated_hz: float) -> fl
 
 def is_active(scan: Scan) -> bool:
     """Whether it would deliver power in both axes at most of the high frequencies: the sign of a generator."""
-    top = scan.values[int(_TOP * len(scan.frequencies)) :]
+    top = scan.values[scan.frequencies >= scan.frequencies[-1] / _TOP]
     largest = np.linalg.eigvalsh((top + top.conj().transpose(0, 2, 1)) / 2)[:, -1]
     size = np.linalg.norm(top, ord=2, axis=(1, 2))
     return bool((largest < -1e-4 * size).mean() > _ACTIVE)

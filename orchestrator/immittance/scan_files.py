@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from orchestrator.errors import InputError
-from orchestrator.nyquist.imtb import is_imtb, read_imtb
-from orchestrator.nyquist.scan import Scan
-from orchestrator.nyquist.ztool import is_ztool, read_ztool
+from orchestrator.immittance.imtb import is_imtb, read_imtb
+from orchestrator.immittance.scan import Scan
+from orchestrator.immittance.ztool import is_ztool, read_ztool
 
 ENDINGS = (".txt", ".csv")
 _LARGEST = 200e6

@@ -13,7 +13,7 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import InputError
-from orchestrator.nyquist.scan import SIEMENS, Scan, checked, in_own_form
+from orchestrator.immittance.scan import SIEMENS, Scan, checked, in_own_form
 from orchestrator.safe_files import write_text
 
 _ELEMENTS = ("11", "12", "21", "22")

@@ -12,7 +12,7 @@ from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit, require_fitting
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
 from orchestrator.black_box.port import check_port, start_of, values_for
-from orchestrator.nyquist.scan import PER_UNIT, PortPoint, Scan
+from orchestrator.immittance.scan import PER_UNIT, PortPoint, Scan
 
 
 def scan_fmu(
@@ -38,7 +38,7 @@ def as_scan(name: str, response: FrequencyResponse) -> Scan:
     model, measured = fit(response), response.frequencies
     at, wide = np.abs(model.poles.imag) / (2 * np.pi), np.abs(model.poles.real) / (2 * np.pi)
     around = [at + k * wide for k in (-4, -2, -1, -0.5, -0.25, 0, 0.25, 0.5, 1, 2, 4)]
-    wanted = np.unique(np.concatenate([measured, np.geomspace(measured[0], measured[-1], 400), *around]))
+    wanted = np.unique(np.concatenate([measured, np.geomspace(measured[0], measured[-1], 1500), *around]))
     inside = wanted[(wanted >= measured[0]) & (wanted <= measured[-1])]
     apart = np.diff(inside, prepend=-1.0) > 1e-6 * inside
     frequencies = inside[apart]

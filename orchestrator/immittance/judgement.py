@@ -7,10 +7,10 @@ from enum import StrEnum
 import numpy as np
 
 from orchestrator.arrays import Numbers, Vector
-from orchestrator.nyquist.loop import CutLoop, LoopPath, common_range, nodes_of
-from orchestrator.nyquist.margins import Crossing, NyquistMargins, crossings_of, margins_of
-from orchestrator.nyquist.scan import block_rotation
-from orchestrator.nyquist.sides import NEAR_ZERO, Sampled, Side
+from orchestrator.immittance.loop import CutLoop, LoopPath, common_range, nodes_of
+from orchestrator.immittance.margins import Crossing, NyquistMargins, crossings_of, margins_of
+from orchestrator.immittance.scan import block_rotation
+from orchestrator.immittance.sides import NEAR_ZERO, Sampled, Side
 
 EXACT_RANGE = (NEAR_ZERO / (2 * np.pi), 20e3)
 """In which two linear models are followed [Hz]."""

@@ -13,7 +13,7 @@ from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
-from orchestrator.nyquist.sides import Exact
+from orchestrator.immittance.sides import Exact
 from orchestrator.study.modes import running
 
 _PORT = ("v_re", "v_im"), ("i_re", "i_im")

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from orchestrator.arrays import Complex, Numbers, Vector
-from orchestrator.nyquist.sides import Exact, Side
+from orchestrator.immittance.sides import Exact, Side
 
 _STEP = np.deg2rad(25.0)
 """Largest turn of det(1 + L) from one point of the path to the next."""

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.nyquist.imtb import write_imtb
-from orchestrator.nyquist.scan import PortPoint, Scan, check_sign, other_q_axis
-from orchestrator.nyquist.scan_files import read_scan
-from orchestrator.nyquist.ztool import write_ztool
-from tests.nyquist.plants import Line, constant_power
+from orchestrator.immittance.imtb import write_imtb
+from orchestrator.immittance.scan import PortPoint, Scan, check_sign, other_q_axis
+from orchestrator.immittance.scan_files import read_scan
+from orchestrator.immittance.ztool import write_ztool
+from tests.immittance.plants import Line, constant_power
 
 F = np.geomspace(1, 500, 120)
 

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from orchestrator.arrays import Complex, Matrix, Numbers, Vector
-from orchestrator.nyquist.poles import unstable_poles
+from orchestrator.immittance.poles import unstable_poles
 
 NEAR_ZERO = 1e-3
 """Poles of models this near to 0 [rad/s] are the free angle's and clocks'; the path goes round them to the right."""

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.nyquist import judgement as judging
-from orchestrator.nyquist import loop as looping
-from orchestrator.nyquist.judgement import judge_loop
-from orchestrator.nyquist.loop import CutLoop, SeriesCapacitors
-from orchestrator.nyquist.poles import unstable_poles
-from orchestrator.nyquist.sides import Sampled
-from tests.nyquist import plants
-from tests.nyquist.plants import OMEGA, Line, Noise, constant_power, eigenvalues, is_stable
+from orchestrator.immittance import judgement as judging
+from orchestrator.immittance import loop as looping
+from orchestrator.immittance.judgement import judge_loop
+from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
+from orchestrator.immittance.poles import unstable_poles
+from orchestrator.immittance.sides import Sampled
+from tests.immittance import plants
+from tests.immittance.plants import OMEGA, Line, Noise, constant_power, eigenvalues, is_stable
 
 F = np.geomspace(0.1, 1000, 300)
 STRONG, WEAK = Line(0.05, 0.8 / OMEGA), Line(0.05, 1.2 / OMEGA)
@@ -58,7 +58,10 @@ def test_compensation_destabilises_where_the_eigenvalues_say():
     verdicts = {}
     for percent in range(0, 80, 10):
         line = Line(0.0222, 0.5 / OMEGA, percent / 100)
-        verdicts[percent] = judged(plant, line, np.unique(np.concatenate([F, np.linspace(40, 60, 81)]))).verdict, is_stable(plant, line)
+        verdicts[percent] = (
+            judged(plant, line, np.unique(np.concatenate([F, np.linspace(40, 60, 81)]))).verdict,
+            is_stable(plant, line),
+        )
     known = {k: v for k, v in verdicts.items() if v[0] != "not known"}
     assert all((found == "stable") == stable for found, stable in known.values())
     assert {stable for _, stable in known.values()} == {True, False}
@@ -122,7 +125,7 @@ def test_a_device_that_is_unstable_by_itself_is_seen():
 
 def test_without_the_test_of_poles_a_negative_count_is_no_verdict(monkeypatch):
     """A stable system with an unstable device: the loci go round against the clock."""
-    monkeypatch.setattr("orchestrator.nyquist.sides.unstable_poles", lambda f, values: ())
+    monkeypatch.setattr("orchestrator.immittance.sides.unstable_poles", lambda f, values: ())
     w = 2 * np.pi * 5
     plant = plants.Plant(w * (plants.J + 0.05 * np.eye(2)), np.eye(2) * w, np.eye(2) * 0.6, 0.5)
     line = Line(0.3, 0.6 / OMEGA)
@@ -168,7 +171,10 @@ def salient(f, angle=0.0):
     """A network that is not the same in every frame: stiff in one direction, weak across."""
     c, s = np.cos(angle), np.sin(angle)
     T = np.array([[c, -s], [s, c]])
-    Z = Line(0.05, 0.4 / OMEGA).impedance(f) + np.diag([1.6, 0.0])[None] * (1 / (1 + 2j * np.pi * f * 0.05))[:, None, None]
+    Z = (
+        Line(0.05, 0.4 / OMEGA).impedance(f)
+        + np.diag([1.6, 0.0])[None] * (1 / (1 + 2j * np.pi * f * 0.05))[:, None, None]
+    )
     return T @ Z @ T.T
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import InputError
-from orchestrator.nyquist.scan import SIEMENS, PortPoint, Scan, checked, in_own_form, other_q_axis
+from orchestrator.immittance.scan import SIEMENS, PortPoint, Scan, checked, in_own_form, other_q_axis
 from orchestrator.safe_files import write_text
 
 _COLUMNS = ("[kV]", "[MW]", "[MVAr]", "[rad]")

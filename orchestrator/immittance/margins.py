@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.nyquist.loop import LoopPath
+from orchestrator.immittance.loop import LoopPath
 
 _LEAST = 1e-4
 """Loci that cross the axis nearer to 0 tell nothing."""

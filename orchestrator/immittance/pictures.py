@@ -6,8 +6,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from orchestrator.nyquist.judgement import CutJudgement
-from orchestrator.nyquist.study import CutResult
+from orchestrator.immittance.judgement import CutJudgement
+from orchestrator.immittance.study import CutResult
 from orchestrator.report.plot_style import STYLE, colour, save_figure
 
 
