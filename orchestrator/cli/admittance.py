@@ -19,9 +19,12 @@ from orchestrator.black_box.fitting import fit, require_fitting
 from orchestrator.black_box.frequency_response import measure
 from orchestrator.black_box.passivity import passivity
 from orchestrator.black_box.port import check_port, start_of, values_for
-from orchestrator.cli.arguments import seconds, setting
+from orchestrator.cli.arguments import quantity, seconds, setting
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, said_stages
+from orchestrator.errors import InputError
+from orchestrator.immittance.measured import as_scan
+from orchestrator.immittance.ztool import write_ztool
 from orchestrator.report.tables import PlainTable
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
@@ -34,6 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="a value of the FMU, such as P_0=0.9 or pod_p.enabled=true (repeatable)")  # fmt: skip
     parser.add_argument("--step", type=seconds, default=1e-4, metavar="H", help="communication step [s] (100 us)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/admittance_<file>)")
+    parser.add_argument("--scan", type=Path, metavar="FILE.txt", help="write Z-tool's form too, for `gfor nyquist`")
+    parser.add_argument("--voltage", type=quantity("kV"), metavar="V", help="rated voltage for --scan")
     add_excitation_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -41,6 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Measure, fit, write, and say what was found."""
     require_fitting()
+    if options.scan and not options.voltage:
+        raise InputError("--scan: a scan is in siemens; give the rated voltage as well, as in --voltage '230 kV'")
     console = make_console(stderr=options.json)
     description = bound_fmu(options.fmu, options.binding)
     values = values_for(description, dict(options.set))
@@ -57,6 +64,9 @@ def run(options: argparse.Namespace) -> int:
     folder = made_folder(options.out or Path("results") / f"admittance_{options.fmu.stem}", "--out")
     with staged(folder, new_run_id()) as staging:
         files = save_identification(response, model, passive, staging)
+    if options.scan:
+        scan = as_scan(options.scan.stem, response, rest, options.voltage)
+        write_ztool(scan.in_siemens(options.voltage), options.scan)
     content = identification_json(response, model, passive)
     if options.json:
         print(json.dumps(content, indent=1))

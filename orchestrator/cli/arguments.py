@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from collections.abc import Callable
 from typing import Any
 
 from orchestrator.cores import MOST_THREADS
@@ -59,6 +60,18 @@ def _time(text: str) -> float:
         return to_unit(value, "s")
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def quantity(unit: str) -> Callable[[str], float]:
+    """Reads a number with or without a unit, in a declared one."""
+
+    def read(text: str) -> float:
+        try:
+            return to_unit(text, unit)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return read
 
 
 def positive(text: str) -> float:

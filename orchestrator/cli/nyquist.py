@@ -11,7 +11,7 @@ from rich.markup import escape
 from orchestrator.api.nyquist import network_of
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cli.arguments import assignment, seconds, setting
+from orchestrator.cli.arguments import assignment, quantity, seconds, setting
 from orchestrator.cli.terminal import make_console, make_errors, said_stages
 from orchestrator.cli.verdict import NOT_MET
 from orchestrator.errors import InputError
@@ -21,7 +21,6 @@ from orchestrator.immittance.study import CutRequest, CutResult, study_cut
 from orchestrator.report.tables import make_table
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder, write_text
-from orchestrator.units import to_unit
 
 _SIDES = ("device", "network")
 _Named = tuple[str, bool | float | str]
@@ -30,12 +29,15 @@ _Named = tuple[str, bool | float | str]
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("device", metavar="DEVICE", help="a scan (.txt, .csv), an FMU or DLL; or a case alone")
     parser.add_argument("network", nargs="?", metavar="NETWORK", help="a scan of the network, or a case")
-    parser.add_argument("--frequency", type=_in("Hz"), default=50.0, metavar="F", help="rated frequency (50 Hz)")
+    parser.add_argument("--frequency", type=quantity("Hz"), default=50.0, metavar="F", help="rated frequency (50 Hz)")
     parser.add_argument("--compensation", type=_share, default=0.0, metavar="PERCENT",
                         help="series capacitors, as share of the network's reactance, such as '32 %%'")  # fmt: skip
-    parser.add_argument("--angle", type=_in("rad"), metavar="A", help="of the device's frame before the network's, "
-                        "such as '20 deg'")  # fmt: skip
-    parser.add_argument("--voltage", type=_in("kV"), metavar="V", help="rated voltage at the cut, between pu and S")
+    parser.add_argument(
+        "--angle", type=quantity("rad"), metavar="A", help="of the device's frame before the network's, such as 20deg"
+    )
+    parser.add_argument(
+        "--voltage", type=quantity("kV"), metavar="V", help="rated voltage at the cut, between pu and S"
+    )
     parser.add_argument(
         "--per-unit", action="append", default=[], choices=_SIDES, help="the side's file is in pu, 100 MVA"
     )
@@ -51,10 +53,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--binding", type=Path, metavar="vendor.toml", help="maps the FMU's variables to our port")
     parser.add_argument("--step", type=seconds, default=1e-4, metavar="H", help="communication step of a scan (100 us)")
     parser.add_argument(
-        "--from-hz", type=_in("Hz"), default=0.05, metavar="F", help="lowest frequency of a scan (0.05)"
+        "--from-hz", type=quantity("Hz"), default=0.05, metavar="F", help="lowest frequency of a scan (0.05)"
     )
     parser.add_argument(
-        "--to-hz", type=_in("Hz"), default=1000.0, metavar="F", help="highest frequency of a scan (1000)"
+        "--to-hz", type=quantity("Hz"), default=1000.0, metavar="F", help="highest frequency of a scan (1000)"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/nyquist_<device>)")
     parser.add_argument("--trust-fmus", action="store_true", help="as for `gfor run`")
@@ -113,16 +115,6 @@ def _typed(kind: Callable[[str], _Named]) -> Callable[[str], _Named]:
     return read
 
 
-def _in(unit: str) -> Callable[[str], float]:
-    def read(text: str) -> float:
-        try:
-            return to_unit(text, unit)
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
-
-    return read
-
-
 def _share(text: str) -> float:
     try:
         value = float(text.strip().removesuffix("%"))
@@ -158,6 +150,10 @@ def _say(console: Console, result: CutResult, folder: Path) -> None:
     for side, bands in result.judgement.active.items():
         said = ", ".join(f"{a:.4g}–{b:.4g} Hz" for a, b in bands) or "nowhere"
         console.print(f"{side} ({getattr(result.loop, side).name}) not passive: {said}", highlight=False, markup=False)
+    if result.difference is not None:
+        far = result.difference
+        console.print(f"The device differs from the case's own by {100 * far['largest_relative']:.2g} % at most, at "
+                      f"{far['frequency_hz']:.4g} Hz", highlight=False, markup=False)  # fmt: skip
     console.print(f"Results in {folder}", soft_wrap=True, highlight=False, markup=False)
 
 

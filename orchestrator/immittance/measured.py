@@ -12,7 +12,7 @@ from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit, require_fitting
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
 from orchestrator.black_box.port import check_port, start_of, values_for
-from orchestrator.immittance.scan import PER_UNIT, PortPoint, Scan
+from orchestrator.immittance.scan import PER_UNIT, SYSTEM_MVA, PortPoint, Scan
 
 
 def scan_fmu(
@@ -27,10 +27,10 @@ def scan_fmu(
     rest = cmath.rect(magnitude, angle)
     bench = Bench(description, values, np.array([rest.real, rest.imag]), step_size=step_size)
     check_port(description, bench)
-    return as_scan(path.name, measure(bench, excitation, report))
+    return as_scan(path.name, measure(bench, excitation, report), rest)
 
 
-def as_scan(name: str, response: FrequencyResponse) -> Scan:
+def as_scan(name: str, response: FrequencyResponse, voltage: complex, kilovolt: float = 1.0) -> Scan:
     """The admittance of a measured response in the network's frame, dense where the model fitted to it turns quickly.
 
     Its bounds hold what two amplitudes differ by and what the model misses of the measured values.
@@ -45,8 +45,10 @@ def as_scan(name: str, response: FrequencyResponse) -> Scan:
     values = -_without_hold(model, 2j * np.pi * frequencies)
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
     bounds = np.linalg.norm(response.bounds, axis=(1, 2)) / np.linalg.norm(response.values, ord=2, axis=(1, 2))
+    power = voltage * complex(*response.operating_point).conjugate() * SYSTEM_MVA
+    point = PortPoint(abs(voltage) * kilovolt, power.real, power.imag, angle=0.0)  # in the network's frame already
     share = np.interp(frequencies, measured, bounds) + model.error
-    return Scan(name, frequencies, values, (name,), PER_UNIT, share * size, {name: PortPoint(angle=0.0)})
+    return Scan(name, frequencies, values, (name,), PER_UNIT, share * size, {name: point})
 
 
 def _without_hold(model: IdentifiedModel, s: Vector) -> Complex:

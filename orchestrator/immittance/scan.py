@@ -13,6 +13,7 @@ from orchestrator.arrays import Complex, Numbers, Vector
 from orchestrator.errors import InputError
 
 SIEMENS, PER_UNIT = "S", "pu"
+SYSTEM_MVA = 100.0
 
 _TOP = 5.0
 """Frequencies down to this part of the highest tell signs: there a device's filter answers, not its control."""
@@ -86,6 +87,10 @@ class Scan:
 
     def scaled(self, factor: float, unit: str) -> "Scan":
         return replace(self, values=factor * self.values, bounds=factor * self.bounds, unit=unit)
+
+    def in_siemens(self, kilovolt: float) -> "Scan":
+        """A scan in per unit of the system base at a rated voltage."""
+        return self.scaled(SYSTEM_MVA / kilovolt**2, SIEMENS)
 
     def turned_sign(self) -> "Scan":
         """The same with currents counted the other way."""

@@ -15,11 +15,10 @@ from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judg
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.margins import Margin
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
+from orchestrator.immittance.scan import PER_UNIT, SIEMENS, SYSTEM_MVA, PortPoint, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
 
-_SYSTEM_MVA = 100.0
 _UNLIKE = (0.003, 30.0)
 """Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
 
@@ -95,6 +94,16 @@ class CutResult:
             "at all frequencies" if self.loop.is_exact else f"from {low:.3g} to {high:.4g} Hz"
         )
 
+    @property
+    def difference(self) -> dict[str, float] | None:
+        """Largest difference of a scan from the case's own device in its place, relative, where there is one."""
+        device = self.loop.device
+        if self.cut is None or not isinstance(device, Sampled) or device.values.shape[1:] != self.cut.device.D.shape:
+            return None
+        own = self.cut.device.at(2j * np.pi * device.frequencies)
+        apart = np.linalg.norm(device.values - own, ord=2, axis=(1, 2)) / np.linalg.norm(own, ord=2, axis=(1, 2))
+        return {"largest_relative": float(apart.max()), "frequency_hz": float(device.frequencies[np.argmax(apart)])}
+
     def as_json(self) -> dict[str, Any]:
         """Verdict and figures as JSON's types."""
         j, m = self.judgement, self.judgement.margins
@@ -122,6 +131,7 @@ class CutResult:
                 "phase_deg": margin(m.phase_deg), "delay_s": margin(m.delay_s),
                 "distance": margin(m.distance), "disk": margin(m.disk),
             },
+            "difference_from_case": self.difference,
             "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
             "small_gain_hz": [list(band) for band in j.small_gain],
             "operating_points": points,
@@ -153,6 +163,8 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     )
     assert device is not None
     assert network is not None
+    if cut is not None and "device" in scans:
+        _check_place(scans["device"], cut, request.kilovolt)
     if len(scans) == 2:
         _check_pair(request, scans["device"], scans["network"])
     loop = CutLoop(device, network)
@@ -194,8 +206,7 @@ def _in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:
             f"{scan.source} is in {scan.unit} and the other side in {unit}: give the rated voltage at the cut, as in "
             "--voltage '230 kV' (the base is 100 MVA)"
         )
-    base = _SYSTEM_MVA / kilovolt**2
-    return scan.scaled(base if unit == SIEMENS else 1 / base, unit)
+    return scan.in_siemens(kilovolt) if unit == SIEMENS else scan.scaled(kilovolt**2 / SYSTEM_MVA, unit)
 
 
 def _in_one_frame(request: CutRequest, scans: dict[str, Scan], cut: Cut | None) -> bool:
@@ -238,20 +249,31 @@ def _check_pair(request: CutRequest, device: Scan, network: Scan) -> None:
             "if the units are right, give --units-checked"
         )
     for one, other in zip(device.ports, network.ports, strict=True):
-        a, b = device.points.get(one), network.points.get(other)
-        if a is None or b is None:
-            continue
-        power = max(abs(complex(p.megawatt or 0, p.megavar or 0)) for p in (a, b))
-        for name, x, y, size in (
-            ("voltage [kV]", a.kilovolt, b.kilovolt, a.kilovolt),
-            ("active power [MW]", a.megawatt, b.megawatt, power),
-            ("reactive power [Mvar]", a.megavar, b.megavar, power),
-        ):
-            if x is not None and y is not None and abs(abs(x) - abs(y)) > _OTHER_POINT * (size or 1):
-                raise InputError(
-                    f"port {one}: {device.source} was scanned at another operating point than {network.source}: "
-                    f"{name} {x:g} and {y:g}; scan both at one"
-                )
+        if one in device.points and other in network.points:
+            _check_point(f"port {one}: {device.source}", device.points[one], network.source, network.points[other])
+
+
+def _check_point(what: str, a: PortPoint, other: str, b: PortPoint) -> None:
+    """Refuse two operating points that differ; signs of powers are anybody's."""
+    power = max(abs(complex(p.megawatt or 0, p.megavar or 0)) for p in (a, b))
+    for name, x, y, size in (
+        ("voltage [kV]", a.kilovolt, b.kilovolt, a.kilovolt),
+        ("active power [MW]", a.megawatt, b.megawatt, power),
+        ("reactive power [Mvar]", a.megavar, b.megavar, power),
+    ):
+        if x is not None and y is not None and abs(abs(x) - abs(y)) > _OTHER_POINT * (size or 1):
+            raise InputError(
+                f"{what} was scanned at another operating point than {other}: {name} {x:g} and {y:g}; scan both at one"
+            )
+
+
+def _check_place(scan: Scan, cut: Cut, kilovolt: float | None) -> None:
+    """Refuse a scan at another operating point than the case's."""
+    (name,) = cut.devices
+    power = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_MVA
+    here = PortPoint(abs(cut.voltages[name]) * kilovolt if kilovolt else None, power.real, power.imag)
+    for point in scan.points.values():
+        _check_point(scan.source, point, f"{name} in the case", here)
 
 
 def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:

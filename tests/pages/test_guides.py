@@ -17,6 +17,7 @@ ANYWHERE = (
     "first-steps",
     "how-to/use-your-own-fmu",
     "how-to/black-box",
+    "how-to/scan-and-fmu",
     "how-to/write-a-controller-dll",
     "how-to/grid-forming-among-grid-following",
     "how-to/faults-and-outages",
