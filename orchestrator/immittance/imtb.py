@@ -25,13 +25,7 @@ def is_imtb(first_line: str) -> bool:
 
 
 def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
-    """The device of a file, or its network; rows of negative dq frequencies are left out, they mirror the others.
-
-    Raises
-    ------
-    InputError
-        If it cannot be used; the line is named.
-    """
+    """The device of a file, or its network; rows of negative dq frequencies are left out, they mirror the others."""
     rows = list(csv.DictReader(StringIO(text)))
     frame = "dq" if "_dq_11_re" in text.partition("\n")[0] else "ab"
     quantities = list(dict.fromkeys(n.partition(f"_{frame}_")[0] for n in rows[0] if f"_{frame}_" in n)) if rows else []
@@ -61,13 +55,7 @@ def _numbers(path: Path, rows: list[dict[str, str]], name: str) -> tuple[Numbers
 
 
 def write_imtb(scan: Scan, path: Path, name: str = "Zdut") -> None:
-    """Write the impedances of a scan of one port in siemens, in dq.
-
-    Raises
-    ------
-    InputError
-        If the scan has several ports, or is in per unit.
-    """
+    """Write the impedances of a scan of one port in siemens, in dq."""
     if scan.unit != SIEMENS or len(scan.ports) != 1:
         raise InputError(f"{scan.source}: IMTB's form has one port in ohms; give the base of a scan in per unit")
     columns = [f"{name}_dq_{e}_{part}" for e in _ELEMENTS for part in ("re", "im", "abs", "dB", "pha_rad", "pha_deg")]

@@ -1,6 +1,5 @@
 """The verdict at a cut by the generalised Nyquist criterion, and every reason for which it is not known."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -104,7 +103,8 @@ def _by_determinant(path: LoopPath, loop: CutLoop) -> int:
     first, last = _principal(path, 0), _principal(path, -1)
     begin = np.pi * round(first / np.pi)
     end = np.pi * round(last / np.pi) if loop.is_exact else 0.0
-    return -round(((first - begin) + path.turns.sum() - (last - end)) / np.pi)
+    around = float(first - begin + path.turns.sum() - (last - end))
+    return -round(around / np.pi)
 
 
 def _by_crossings(path: LoopPath, loop: CutLoop) -> int:
@@ -122,9 +122,8 @@ def _by_crossings(path: LoopPath, loop: CutLoop) -> int:
 
 def _on_the_ray(value: complex) -> int:
     """Where a locus begins or ends on the ray, its mirror image goes on from there: one crossing for both."""
-    if abs(float(np.angle(1 + value))) < np.pi / 2:
-        return 0
-    return 1 if value.imag > 0 else -1
+    beyond = abs(np.angle(1 + value)) >= np.pi / 2
+    return int(np.sign(value.imag)) if beyond else 0
 
 
 def _open_loop(loop: CutLoop) -> list[str]:
@@ -212,7 +211,3 @@ def _turns_alike(values: Vector) -> bool:
     J = block_rotation([np.pi / 2] * (values.shape[-1] // 2))
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
     return bool((np.linalg.norm(J @ values @ J.T - values, ord=2, axis=(1, 2)) < _INVARIANT * size).all())
-
-
-def sampled(name: str, frequencies: Numbers, values: Vector, bounds: Sequence[float] | Numbers) -> Sampled:
-    return Sampled(name, frequencies, values, np.asarray(bounds, dtype=float))

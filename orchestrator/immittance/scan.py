@@ -112,13 +112,7 @@ def other_q_axis(values: Vector) -> Complex:
 
 
 def checked(source: str, frequencies: Numbers, values: Vector) -> tuple[str, ...]:
-    """Questions about a scan as read.
-
-    Raises
-    ------
-    InputError
-        If its frequencies do not rise, or a value is not finite.
-    """
+    """Questions about a scan as read."""
     if not (np.isfinite(values).all() and np.isfinite(frequencies).all()):
         raise InputError(f"{source}: a value is not a finite number; scan that frequency again or leave its row out")
     if len(frequencies) < 8:
@@ -138,13 +132,7 @@ def checked(source: str, frequencies: Numbers, values: Vector) -> tuple[str, ...
 
 
 def in_own_form(source: str, frequencies: Numbers, values: Vector, rated_hz: float, *, q_leads: bool) -> Complex:
-    """Values with the q axis leading; the inductance that every filter and line has at high frequencies must agree.
-
-    Raises
-    ------
-    InputError
-        If that inductance says that the q axis is the other way than the file's form has it.
-    """
+    """Values with the q axis leading; the inductance that every filter and line has at high frequencies must agree."""
     own = values if q_leads else other_q_axis(values)
     seen = _reactance_sign(frequencies, own, rated_hz)
     if seen < 0:
@@ -181,13 +169,7 @@ def is_active(scan: Scan) -> bool:
 
 
 def check_sign(scan: Scan, option: str) -> None:
-    """Refuse an admittance whose currents are counted out of it.
-
-    Raises
-    ------
-    InputError
-        If both its resistances are negative at most of the high frequencies.
-    """
+    """Refuse an admittance whose currents are counted out of it."""
     if is_active(scan):
         raise InputError(
             f"{scan.source}: its resistance is negative in both axes at most high frequencies, as if it fed power into "

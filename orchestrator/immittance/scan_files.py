@@ -18,11 +18,6 @@ def read_scan(path: Path, rated_hz: float, *, network: bool = False) -> Scan:
     ----------
     network
         Which part of a file is meant that holds a device and a network.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or used.
     """
     try:
         if path.stat().st_size > _LARGEST:

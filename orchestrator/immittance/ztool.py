@@ -23,13 +23,7 @@ def is_ztool(first_line: str) -> bool:
 
 
 def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
-    """A scan, with what stands beside it.
-
-    Raises
-    ------
-    InputError
-        If it cannot be used; the line is named.
-    """
+    """A scan, with what stands beside it."""
     first, _, rest = text.partition("\n")
     ports = _ports(path, first.split()[1:])
     frequencies, values = _rows(path, rest, 2 * len(ports))
@@ -94,13 +88,7 @@ def _points(path: Path, ports: tuple[str, ...]) -> dict[str, PortPoint]:
 
 
 def write_ztool(scan: Scan, path: Path) -> None:
-    """Write a scan in siemens, and beside it the angles and power flow that are known.
-
-    Raises
-    ------
-    InputError
-        If the scan is in per unit.
-    """
+    """Write a scan in siemens, and beside it the angles and power flow that are known."""
     if scan.unit != SIEMENS:
         raise InputError(f"{scan.source}: Z-tool's form is in siemens; give the base of this scan in per unit")
     values = other_q_axis(scan.values)
