@@ -109,7 +109,19 @@ def nyquist(
 def network_of(
     case: str, scenario: str | None, values: Mapping[str, Any], *, trust_fmus: bool = False
 ) -> PreparedScenario:
-    """A case's scenario, its first where None."""
+    """The scenario that is cut.
+
+    Parameters
+    ----------
+    case
+        A built-in case, or a path.
+    scenario
+        Its name; the case's first where None.
+    values
+        ``component.parameter`` of the case.
+    trust_fmus
+        As for `load`.
+    """
     from orchestrator.api.scenario import choose  # noqa: PLC0415 - scans need no cases
     from orchestrator.cases.case import load_case  # noqa: PLC0415
 
