@@ -16,13 +16,7 @@ KEPT = "check.json"
 
 @dataclass(frozen=True)
 class Acceptance:
-    """The result of the acceptance tests.
-
-    Attributes
-    ----------
-    report
-        The whole report, as `gfor check --json` prints it.
-    """
+    """The result of the acceptance tests."""
 
     trusted: bool
     faults: tuple[str, ...]

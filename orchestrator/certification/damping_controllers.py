@@ -25,10 +25,6 @@ class DampingControllers:
 
     Attributes
     ----------
-    pod
-        One of `PODS`.
-    source
-        The source of ``pod``, in words.
     settings
         Values to be set for these controllers, by the FMU's variable.
     declared

@@ -21,8 +21,6 @@ class Device:
     ----------
     name
         By which reports and folders call it; no two devices of a command share one, whatever the case of its letters.
-    file
-        An FMU, a vendor's DLL or a device's file.
     """
 
     name: str

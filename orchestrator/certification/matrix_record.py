@@ -81,13 +81,6 @@ def in_words(cell: MatrixCell) -> list[str]:
 
 
 def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: datetime) -> str:
-    """The page.
-
-    Parameters
-    ----------
-    made
-        When [UTC].
-    """
     whole = [[escape(code.upper()), *(_cell_html(matrix.cells[name, code]) for name in matrix.devices)]
              for code in matrix.codes]  # fmt: skip
     tried = [[escape(text) for text in _given(device)] for device in devices]

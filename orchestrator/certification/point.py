@@ -36,17 +36,7 @@ POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
 
 @dataclass(frozen=True)
 class CertificatePointTask:
-    """A scenario of the study's case file at one reactance.
-
-    Attributes
-    ----------
-    case, fingerprint
-        Path of the case file, and its fingerprint as in `SweepPointTask`.
-    key
-        Name of the point's file: a hash of everything that the result depends on.
-    black_box
-        Identify the converter even if it shows its states.
-    """
+    """A scenario of the study's case file at one reactance."""
 
     case: str
     fingerprint: str
@@ -62,8 +52,6 @@ class PointResult:
 
     Attributes
     ----------
-    modes
-        From 0.05 to 3 Hz, least damped first.
     growth
         Largest real part of any eigenvalue [1/s], zeros left out.
     stability
@@ -77,8 +65,6 @@ class PointResult:
         Largest relative difference between the fitted model and the measured response, for each identified component.
     power
         Active power of the converter at the start, from its current [MW]; None without the converter.
-    signals
-        Signals by name, each of the shape of ``times``.
     findings
         Findings of the watch on the run, in the form of `Finding.as_json`.
     failure

@@ -9,9 +9,9 @@ from orchestrator.binding.binding import read_table
 from orchestrator.certification import texts
 from orchestrator.certification.case_file import BINDING, FMU, WITH
 from orchestrator.certification.environment import environment
+from orchestrator.certification.figures import commands
 from orchestrator.certification.parameters import parameter_rows
 from orchestrator.certification.point import FREQUENCY
-from orchestrator.certification.recompute import commands
 from orchestrator.certification.request import shown
 from orchestrator.certification.study import Certification
 from orchestrator.fmi.origin import read_origin

@@ -26,10 +26,6 @@ class CertificationRequest:
 
     Attributes
     ----------
-    fmu, binding
-        The converter, and how its variables are mapped to our port.
-    values
-        Values of the converter's own variables, by name.
     pod
         The active damping controllers, as one of `PODS`; None to read them from ``pod_p.enabled`` and
         ``pod_q.enabled``.

@@ -64,8 +64,6 @@ class SwingTest:
 
     Attributes
     ----------
-    dropped
-        The first extremum, towards which the oscillation starts; None if no extremum was dropped.
     ratio
         ΔP5M5/ΔP1M1. It is 0 if the oscillation has died out before, and None if the record is too short.
     """
@@ -96,10 +94,6 @@ def extrema(times: Numbers, signal: Numbers, start: float, resolution: float = R
 
     Parameters
     ----------
-    times, signal
-        Shape (n,); [s] and any unit.
-    start
-        Time of the event [s].
     resolution
         Smallest movement that counts, as a part of the range of the signal after the event.
     """
@@ -133,17 +127,7 @@ def swings_of(points: list[Extremum]) -> tuple[RecordedSwing, ...]:
 
 
 def swing_test(times: Numbers, signal: Numbers, start: float, *, drop_first: bool = True) -> SwingTest:
-    """Apply the criterion.
-
-    Parameters
-    ----------
-    times, signal
-        Shape (n,); a record that ends well after the oscillation or its fifth swing.
-    start
-        Time of the event [s].
-    drop_first
-        Leave out the extremum towards which the oscillation starts.
-    """
+    """Apply the criterion after an event [s], without the extremum to which the oscillation starts or with it."""
     if not np.isfinite(signal).all():
         return SwingTest(None, (), None, False, "the signal is not finite")
     points = extrema(times, signal, start)

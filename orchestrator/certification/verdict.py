@@ -15,6 +15,13 @@ DOES_NOT_HOLD = 5
 """Exit code for a certificate with a contradiction, whose verdict is worthless."""
 
 
+def verdict_of(accepted: Sequence[bool], missing: int) -> str:
+    """The verdict from the judged rows and the number of parts that are missing."""
+    if not all(accepted):
+        return FAILS
+    return INCOMPLETE if missing or not accepted else PASSES
+
+
 def exit_code(verdict: str, *, refused: bool) -> int:
     """The exit code of a verdict; ``refused`` says that an acceptance test failed."""
     return NOT_TRUSTED if verdict == PASSES and refused else EXIT_CODES[verdict]

@@ -40,6 +40,11 @@ def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
     return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")
 
 
+def short(text: str, longest: int) -> str:
+    """A remark, cut where it has more characters."""
+    return text if len(text) <= longest else f"{text[: longest - 2].rstrip()} …"
+
+
 def share_text(entry: tuple[str, float]) -> str:
     """``sg1 28%``."""
     return f"{entry[0]} {entry[1]:.0%}"

@@ -10,7 +10,7 @@ from rich.text import Text
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Cause
 from orchestrator.errors import RunInterruptedError
-from orchestrator.report.tables import first_few, make_table
+from orchestrator.report.tables import first_few, make_table, short
 from orchestrator.report.verdict import COLOURS
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
@@ -89,32 +89,34 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     by_modes = of_modes(result.modes)
     title, mode = by_modes.subject, by_modes.mode
     if isinstance(result.failure, RunInterruptedError):
-        return ScenarioAnswer(title, None, "interrupted", mode, _short(str(result.failure)))
+        return ScenarioAnswer(title, None, "interrupted", mode, short(str(result.failure), _LONGEST))
     if result.went_unstable:
         worst = result.went_unstable[0]
         what = f"{worst.component}: {KINDS[worst.kind]} from {worst.time:.4g} s"
         return ScenarioAnswer(title, False, "UNSTABLE", mode, _with_misfits(result.modes, what))
     if result.failure is not None:
-        return ScenarioAnswer(title, False, "failed", mode, _short(str(result.failure)))
+        return ScenarioAnswer(title, False, "failed", mode, short(str(result.failure), _LONGEST))
     if by_modes.good is False:
         return by_modes
     if missing := result.missing_limits:
         names = ", ".join(dict.fromkeys(finding.component for finding in missing))
         remark = f"the current limit of {names} would act, which the model lacks: repeat with EMT models"
-        return ScenarioAnswer(title, None, "not known", mode, _short(remark))
+        return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     if result.stable_in_simulation is None:
         return ScenarioAnswer(title, None, "not known", mode, "not judged throughout; the findings say where and why")
     if by_modes.good is None or not result.modes.prepared.events:
         return by_modes
     rest = f"; {by_modes.remark}" if by_modes.remark else ""
     end = result.modes.prepared.stop_time
-    return ScenarioAnswer(title, True, "stable", mode, _short(f"keeps synchronism and settles until {end:g} s{rest}"))
+    return ScenarioAnswer(
+        title, True, "stable", mode, short(f"keeps synchronism and settles until {end:g} s{rest}", _LONGEST)
+    )
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:
     """A remark behind what does not fit between devices and their bindings."""
     faults = [f"{name}: {', '.join(m.fault for m in found)}" for name, found in result.misfits.items()]
-    return _short("; ".join([*faults, remark] if remark else faults))
+    return short("; ".join([*faults, remark] if remark else faults), _LONGEST)
 
 
 def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[float, float]) -> Table:
@@ -147,7 +149,3 @@ def _swing(result: ModesResult, mode: Mode) -> str:
     if all(sides):
         return f"{sides[0]} against {sides[1]}"
     return sides[0] or sides[1] or ", ".join(state for state, _ in mode.participation[:2])
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 2].rstrip()} …"

@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
+from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.margins import margin_text
-from orchestrator.cli.certify_codes import show_code
+from orchestrator.cli.certificate_screen import show
 
 
 def row(name):
@@ -32,13 +33,13 @@ VERDICTS = [
 @pytest.fixture
 def screen():
     slip = {"kind": "misfit", "message": "converter: wrong rated frequency: omega is 0.8333"}
-    found = SimpleNamespace(
-        code=SimpleNamespace(title="ERCOT"), description=SimpleNamespace(model_name="vendor"), verdicts=VERDICTS,
-        verdict="fails", acceptance=None, missing=("row weak",),
-        results={name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")},
+    code = SimpleNamespace(title="ERCOT", f_n=50.0, rows=[v.row for v in VERDICTS], left_out=())
+    found = CodeCertificate(
+        SimpleNamespace(values={}), SimpleNamespace(model_name="vendor"), VERDICTS, code, 50.0,
+        {name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")},
     )  # fmt: skip
     console = Console(width=150, record=True, file=StringIO())
-    show_code(found, [Path("certificate.html")], Path("out"), console)
+    show(found, [Path("certificate.html")], Path("out"), console)
     return console.export_text()
 
 

@@ -27,8 +27,6 @@ class BenchTask:
 
     Attributes
     ----------
-    key
-        Name of the result's file: a hash of everything that the result depends on.
     changes
         Values by ``component.variable`` that are others than the case file's.
     """
@@ -52,8 +50,6 @@ class BenchResult:
         Of the watch, in the form of `Finding.as_json`.
     seconds
         Processor time of the run, that of FMUs in processes of their own included [s].
-    failure
-        Why there is no whole response.
     """
 
     row: str

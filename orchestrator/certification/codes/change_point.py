@@ -24,17 +24,7 @@ _TIMED = ("stable", ENDED)
 
 @dataclass(frozen=True)
 class ChangeTask:
-    """A row of a code with changed values.
-
-    Attributes
-    ----------
-    f_n
-        Rated frequency of the bench [Hz].
-    bench
-        The row's case file and the changes.
-    declared
-        Values by which the code judges, as ``--declare`` gave them.
-    """
+    """A row of a code with changed values."""
 
     code: str
     f_n: float
@@ -73,12 +63,8 @@ class ChangeResult:
 
     Attributes
     ----------
-    criteria
-        In their order; empty where the row could not be run.
     mark
         Hash of the response: two responses with one mark agree to the last bit.
-    failure
-        Why there are no criteria, as where the FMU refuses the value.
     """
 
     criteria: tuple[ChangedCriterion, ...] = ()
@@ -120,15 +106,7 @@ def compute_change(task: ChangeTask) -> ChangeResult:
 def margins_with_time(
     verdict: RowVerdict, findings: Sequence[Mapping[str, Any]], f_n: float
 ) -> tuple[ChangedCriterion, ...]:
-    """The criteria of a row; one that has no figure, as a loss of synchronism, takes the time until the first fault.
-
-    Parameters
-    ----------
-    findings
-        Of the watch over the run, in the form of `Finding.as_json`.
-    f_n
-        Rated frequency of the bench [Hz].
-    """
+    """The criteria of a row; one that has no figure, as a loss of synchronism, takes the time until the first fault."""
     stop = verdict.row.programme(f_n).stop
     faults = [float(f["time"]) for f in findings if f["kind"] in UNSTABLE]
     found = []

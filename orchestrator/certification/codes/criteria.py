@@ -103,8 +103,6 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
         Time after the event in which it has to be back for good [s]; None for the end of its hold.
     tolerance
         Largest distance [pu of the rating].
-    of_code
-        Whether the numbers are the code's.
     events
         Numbers of the events; all of them where empty.
     """
@@ -139,8 +137,6 @@ def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -
     ----------
     sign
         +1 where the power has to rise: the source's angle falls.
-    least
-        [pu]
     """
 
     def judge(row: MeasuredRow) -> RowFinding:
@@ -172,8 +168,6 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
     ----------
     sign
         +1 where the power has to rise.
-    longest
-        [s]
     share
         Of the largest change in the first swing.
     """

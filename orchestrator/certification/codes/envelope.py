@@ -147,13 +147,7 @@ class Swinging:
 
 
 def jump_bounds(plant: Swinging, angle: float) -> Callable[[Numbers], Bounds]:
-    """Bounds of the active power after a jump of the grid's angle (IGFM1).
-
-    Parameters
-    ----------
-    angle
-        Size of the jump [rad].
-    """
+    """Bounds of the active power after a jump of the grid's angle (IGFM1)."""
     peak = angle / plant.X
     spread, margin = (0.85, 1.15), 0.4
 
@@ -174,13 +168,7 @@ def jump_bounds(plant: Swinging, angle: float) -> Callable[[Numbers], Bounds]:
 
 
 def amplitude_bounds(current: float) -> Callable[[Numbers], Bounds]:
-    """Bounds of the reactive current after a step of the grid's voltage (IGFM2).
-
-    Parameters
-    ----------
-    current
-        Size of the step over X [pu].
-    """
+    """Bounds of the reactive current after a step of the grid's voltage (IGFM2)."""
     tunnel, lasts, margin = _tunnel(current), 0.08, 0.3
     rise = -0.01 / np.log(0.1)  # 90 % in 10 ms
 

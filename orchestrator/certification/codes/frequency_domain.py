@@ -84,11 +84,6 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
     power by Δθ/(1/K + 1/K_g), which is to be `OPPOSED` or more. The power is a mean over a period T, so that K has to
     last as long: an angle that follows the bus with the time constant T has its corner at 1/(2π·T). And 90 % of the
     change within `LONGEST` is what a lag of `LONGEST`/ln 10 reaches, whose corner is the upper end of the band.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency [Hz].
     """
     Z = jumps(SCR, POWER, ()).impedance
     asked = 1 / (JUMP / OPPOSED - abs(Z) ** 2 / Z.imag)
@@ -97,15 +92,7 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
 
 
 def measure_stiffness(request: CertificationRequest, f_n: float, report: Callable[[str], None]) -> Stiffness:
-    """Measure a converter at an ideal bus, at half of its rating and 1 pu.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency [Hz].
-    report
-        Called with a sentence before each run.
-    """
+    """Measure a converter at an ideal bus, at half of its rating and 1 pu."""
     description = bound_fmu(request.fmu, request.binding)
     values = _values(description, request, f_n)
     rest = cmath.rect(float(values.get("v_0", 1.0)), float(values.get("theta_0", 0.0)))
@@ -153,13 +140,7 @@ def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
 
 
 def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> list[Path]:
-    """Write ``frequency.csv``, ``frequency.json`` and ``frequency.png``.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency [Hz].
-    """
+    """Write ``frequency.csv``, ``frequency.json`` and ``frequency.png``."""
     table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
     rows = []
     for k, f in enumerate(found.frequencies.tolist()):

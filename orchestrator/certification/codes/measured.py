@@ -47,8 +47,6 @@ class MeasuredRow:
         [s], shape (n,), evenly spaced.
     signals
         By the bench's names, each of shape (n,).
-    f_n
-        Rated frequency [Hz].
     events
         When something changed [s].
     findings

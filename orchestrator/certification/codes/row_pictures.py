@@ -22,13 +22,7 @@ BEFORE = 0.25
 
 
 def row_pictures(verdict: RowVerdict, result: BenchResult, f_n: float, figures: Figures) -> str:
-    """The pictures of a row; without limits where there is no whole response.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency of the bench [Hz].
-    """
+    """The pictures of a row; without limits where there is no whole response."""
     if len(result.times) < 2:
         return ""
     programme = verdict.row.programme(f_n)

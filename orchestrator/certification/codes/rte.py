@@ -156,13 +156,7 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
 
 
 def rte_code(declared: Mapping[str, float]) -> GridCode:
-    """RTE's rows for what an applicant declares.
-
-    Parameters
-    ----------
-    declared
-        ``X_eff`` [pu of the rating], ``D`` [pu of power per pu of frequency], ``H`` [s].
-    """
+    """RTE's rows for what an applicant declares."""
     rows = [
         made
         for scr in (STRONG, WEAK)

@@ -35,10 +35,6 @@ class MarginSensitivity:
         Whether the criterion is met below and above; None where it was not run.
     doubts
         Why the slope may not be followed; empty if it is trusted.
-    reason
-        Why there is no slope.
-    idle
-        Whether the response is the same to the last bit on both sides.
     """
 
     parameter: Parameter
