@@ -44,21 +44,11 @@ def pod(m: ModelBuilder, name: str, delta_omega: ca.SX, *, sign: int, T_S1: floa
         T_1 = m.parameter("T_S1", T_S1, "s", "Lead time constant of each stage", minimum=0, tunable=True, source=SOURCE)
         T_2 = m.parameter("T_S2", T_S2, "s", "Lag time constant of each stage", minimum=0, tunable=True, source=SOURCE)
         N_S = m.parameter(
-            "N_S",
-            2,
-            "1",
-            "Number of lead/lag stages",
-            minimum=0,
-            maximum=N_S_MAX,
-            type="Integer",
-            source=SOURCE,
+            "N_S", 2, "1", "Number of lead/lag stages", minimum=0, maximum=N_S_MAX, type="Integer", source=SOURCE
         )
         K = m.parameter("K", 200.0, "pu", "Gain", base="S_n", minimum=0, maximum=1e5, tunable=True, source=SOURCE)
         bound = m.parameter("limit", 0.2, "pu", "Output limit", base="S_n", minimum=0, tunable=True, source=SOURCE)
-        m.require(
-            ca.if_else(ca.logic_and(T_2 <= 0, T_1 > 0), -1, 1),
-            f"{name}.T_S2 = 0 needs {name}.T_S1 = 0 as well",
-        )
+        m.require(ca.if_else(ca.logic_and(T_2 <= 0, T_1 > 0), -1, 1), f"{name}.T_S2 = 0 needs {name}.T_S1 = 0 as well")
         m.require(
             ca.if_else(T_2 <= 0, 1, T_2 - m.internal_step / 2),
             f"{name}.T_S2 must be 0 or longer than half of internal_step",

@@ -26,8 +26,10 @@ _HOMES = {
     "identify": "api.identification",
     "info": "api.fmu",
     "load": "api.case",
+    "nyquist": "api.nyquist",
     "open_fmu": "api.fmu",
     "read_linear_model": "api.linear",
+    "source": "api.source",
 }
 """Name → module of this package that defines it."""
 

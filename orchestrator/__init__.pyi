@@ -9,7 +9,9 @@ from orchestrator.api.fmu import open_fmu as open_fmu
 from orchestrator.api.identification import identify as identify
 from orchestrator.api.linear import read_linear_model as read_linear_model
 from orchestrator.api.models import build as build
+from orchestrator.api.nyquist import nyquist as nyquist
 from orchestrator.api.results import Modes as Modes
 from orchestrator.api.results import Run as Run
 from orchestrator.api.scenario import Scenario as Scenario
+from orchestrator.api.source import source as source
 from orchestrator.errors import CosimError as CosimError

@@ -5,14 +5,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
-"""Real numbers, of any shape."""
+Numbers = NDArray[np.float64]  # real numbers, of any shape
 
-Matrix = NDArray[np.float64]
-"""Real numbers in rows and columns."""
+Matrix = NDArray[np.float64]  # real numbers in rows and columns
 
-Complex = NDArray[np.complex128]
-"""Complex numbers, of any shape."""
+Complex = NDArray[np.complex128]  # complex numbers, of any shape
 
-Vector = NDArray[Any]
-"""Real or complex numbers."""
+Vector = NDArray[Any]  # real or complex numbers

@@ -145,13 +145,7 @@ class ComponentError(CosimError):
     kind = ErrorKind.FMU
 
     def __init__(
-        self,
-        component: str,
-        call: str,
-        status: str,
-        log: str,
-        time: float | None = None,
-        kind: ErrorKind | None = None,
+        self, component: str, call: str, status: str, log: str, time: float | None = None, kind: ErrorKind | None = None
     ) -> None:
         self.component, self.call, self.status, self.log, self.time = component, call, status, log, time
         when = "" if time is None else f" at t = {time:.6g} s"

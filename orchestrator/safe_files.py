@@ -9,8 +9,7 @@ from pathlib import Path
 
 from orchestrator.errors import InputError, ResultsError
 
-PARTIAL = ".part-"
-"""Begins the names of files that are not finished, and stands in those of folders that are not."""
+PARTIAL = ".part-"  # begins the names of files that are not finished, and stands in those of folders that are not
 
 
 def file_hash(path: Path | None) -> str | None:

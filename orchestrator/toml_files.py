@@ -9,8 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from orchestrator.errors import InputError
 
-MOST_BYTES = 16 * 1024**2
-"""Of one file: a case with 100,000 events has about 12 MB."""
+MOST_BYTES = 16 * 1024**2  # of one file: a case with 100,000 events has about 12 MB
 
 
 class Table(BaseModel):
@@ -22,10 +21,8 @@ class Table(BaseModel):
 def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[str, dict[str, Any]]:
     """Read a TOML file; its text, and what the text says.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not TOML.
+    Raises an `InputError` if there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not
+    TOML.
     """
     source = f"{option} {path}".lstrip()
     try:

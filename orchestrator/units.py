@@ -65,12 +65,8 @@ def read_value(text: str) -> bool | float | str:
 def to_unit(value: float | int | str, unit: str) -> float:
     """Convert a value to the unit that is declared for it.
 
-    Parameters
-    ----------
-    value
-        A number, which is taken to be in ``unit`` already, or a text such as ``"1350 MW"``.
-    unit
-        The declared unit; ``"1"`` or ``""`` for a plain number.
+    ``value``: A number, which is taken to be in ``unit`` already, or a text such as ``"1350 MW"``.
+    ``unit``: the declared unit; ``"1"`` or ``""`` for a plain number.
     """
     if isinstance(value, int | float):
         return float(value)

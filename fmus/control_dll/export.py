@@ -21,9 +21,7 @@ DLL_TARGETS = {
 }
 """Platforms that a DLL is written for. EMT programs run on Windows; some load DLLs of 32 bits alone."""
 
-SAMPLE_TIME = 2e-5
-"""Default of ``FixedStepBaseSampleTime`` [s]."""
-
+SAMPLE_TIME = 2e-5  # default of ``FixedStepBaseSampleTime`` [s]
 _SHORTEST, _LONGEST = 1e-6, 2e-4
 
 
@@ -54,17 +52,10 @@ def control_part_of(name: str) -> ControlPart:
 def with_values(part: ControlPart, values: Mapping[str, float], sample_time: float) -> ControlPart:
     """The same part with other defaults; the lead is half a sample time where it is not given.
 
-    Parameters
-    ----------
-    values
-        By parameter; Booleans as 0 or 1.
-    sample_time
-        Between two calls of the control [s].
+    ``values``: By parameter; Booleans as 0 or 1.
+    ``sample_time``: Between two calls of the control [s].
 
-    Raises
-    ------
-    ControlDllError
-        If there is no such parameter, a value is out of its bounds, or breaks a rule of the model.
+    Raises `ControlDllError` if there is no such parameter, a value is out of its bounds, or breaks a rule of the model.
     """
     model = part.model
     known = {p.name: p for p in model.parameters}
@@ -104,20 +95,12 @@ def write_dll(
 ) -> WrittenDll:
     """Write the libraries, each into the folder of its platform, and the data sheet beside these folders.
 
-    Parameters
-    ----------
-    part
-        As `control_part_of` gives it.
-    folder
-        It is created where missing.
-    platforms
-        Of `DLL_TARGETS`.
-    sample_time
-        Between two calls of the control [s].
-    values
-        Other defaults of the DLL's parameters, by name.
-    report
-        Called with a sentence before each part of the work.
+    ``part``: As `control_part_of` gives it.
+    ``folder``: It is created where missing.
+    ``platforms``: Of `DLL_TARGETS`.
+    ``sample_time``: Between two calls of the control [s].
+    ``values``: Other defaults of the DLL's parameters, by name.
+    ``report``: Called with a sentence before each part of the work.
     """
     if unknown := [name for name in platforms if name not in DLL_TARGETS]:
         raise ControlDllError(f"there is no platform {unknown[0]!r}; choose from: {', '.join(DLL_TARGETS)}")

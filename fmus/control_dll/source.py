@@ -9,19 +9,14 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.variables import Input, Output, Parameter
 
 _C = Path(__file__).with_name("c")
-_UNBOUNDED = 1e30
-"""Bound of a parameter without one: the interface has no word for "none", and a host may print it."""
+_UNBOUNDED = 1e30  # bound of a parameter without one: the interface has no word for "none", and a host may print it
 
 
 def dll_source(model: Model, sample_time: float) -> str:
     """Source of the DLL, which needs nothing but the C library.
 
-    Parameters
-    ----------
-    model
-        Integrated by explicit steps, as the kernel does in an FMU.
-    sample_time
-        ``FixedStepBaseSampleTime`` [s].
+    ``model``: Integrated by explicit steps, as the kernel does in an FMU.
+    ``sample_time``: ``FixedStepBaseSampleTime`` [s].
     """
     if model.integrator != "runge_kutta":
         raise ValueError(f"model {model.name}: only models with explicit steps become DLLs")

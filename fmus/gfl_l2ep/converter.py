@@ -7,13 +7,7 @@ from fmus.gfl_l2ep.control import Following, following_converter
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.phasor_port import (
-    SourceEmf,
-    declare_master_step,
-    declare_phasor_outputs,
-    motion,
-    phasor_builder,
-)
+from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, motion, phasor_builder
 from fmus.toolchain.port import declare_port_outputs, device_port
 
 S_N, P_0 = 2400.0, 0.83

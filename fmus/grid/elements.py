@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from fmus.grid.names import injection_names
 from fmus.grid.network import OPEN_CHARGING, SMALLEST_REACTANCE, Line, Load, Network, Port, Shunt
 from fmus.toolchain.frames import ZERO, Phasor, polar, power
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
@@ -99,6 +100,15 @@ def declare_port(m: ModelBuilder, port: Port, buses: dict[str, Bus]) -> Phasor:
     fed = current * connected
     buses[port.bus].injected += fed
     return fed
+
+
+def declare_injection(m: ModelBuilder, name: str, buses: dict[str, Bus]) -> None:
+    """Declare a current into a bus beside those of its devices, as `injection_names` calls its parts."""
+    parts = [
+        m.parameter(part, 0.0, "pu", "Current injected besides, network frame", base=SYSTEM_BASE, tunable=True)
+        for part in injection_names(name)
+    ]
+    buses[name].injected += Phasor(parts[0], parts[1])
 
 
 def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> LineValues:

@@ -12,6 +12,7 @@ from fmus.grid.elements import (
     add_stray,
     branch_equation,
     declare_bus,
+    declare_injection,
     declare_line,
     declare_load,
     declare_network_outputs,
@@ -46,6 +47,8 @@ def grid(network: Network) -> Model:
     for shunt in network.shunts:
         others += declare_shunt(m, shunt, buses)
     add_stray(m, network, buses)
+    for name in network.injections:
+        declare_injection(m, name, buses)
     faults = [declare_fault(m, bus, buses) for bus in network.faults]
     others += faults
     for name, bus in buses.items():

@@ -1,4 +1,4 @@
-"""Names of the variables of a grid's lines, for the models and for programs that set and read the variables."""
+"""Names of the variables of a grid's lines and buses, for the models and for programs that set and read them."""
 
 from collections.abc import Iterable
 
@@ -16,3 +16,8 @@ def lines_among(variables: Iterable[str]) -> list[str]:
     """Names of the lines that a grid with these variables has: each has a reactance."""
     begin = line_variable("", "X")
     return [name.removeprefix(begin) for name in variables if name.startswith(begin)]
+
+
+def injection_names(bus: str) -> tuple[str, str]:
+    """Names of the parts of a current besides that is injected at a bus."""
+    return f"{bus}.i_re", f"{bus}.i_im"

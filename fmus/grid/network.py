@@ -39,6 +39,9 @@ class Network:
         Whether it is for a model without transients, where a bus needs neither a load nor capacitance, and a line may
         have a negative resistance or reactance, as equivalents of reduced networks have them.
 
+    injections
+        Buses at which the FMU has a current of its own besides, as tunable parameters that start at 0.
+
     Raises
     ------
     ValueError
@@ -57,6 +60,7 @@ class Network:
     faults: tuple[str, ...] = ()
     transformers: tuple[ThreeWinding, ...] = ()
     phasors: bool = False
+    injections: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         problems = [*self._unknown_buses(), *self._repeated_names(), *self._bad_elements(), *self._floating_buses()]
@@ -132,6 +136,7 @@ class Network:
         attached += [("port", x.name, x.bus) for x in self.ports]
         attached += [("transformer", x.name, bus) for x in self.transformers for bus in x.buses]
         attached += [("fault", bus, bus) for bus in self.faults]
+        attached += [("injection", bus, bus) for bus in self.injections]
         for kind, name, bus in attached:
             if bus not in known:
                 yield f"{kind} {name!r} is at bus {bus!r}, which does not exist{self._near(bus)}"

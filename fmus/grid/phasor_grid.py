@@ -20,6 +20,7 @@ from fmus.grid.elements import (
     LineValues,
     add_stray,
     declare_bus,
+    declare_injection,
     declare_line_values,
     declare_load,
     declare_network_outputs,
@@ -71,6 +72,8 @@ def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) ->
     for shunt in network.shunts:
         declare_shunt(m, shunt, buses, inductor=_susceptance)
     add_stray(m, network, buses)
+    for name in network.injections:
+        declare_injection(m, name, buses)
     for name, bus in buses.items():
         least = LEAST_CONDUCTANCE if network.floats(name) else 0.0
         add_admittance(Y, name, name, Phasor(bus.G + least, bus.B) if least else Phasor(bus.G, bus.B))

@@ -13,13 +13,7 @@ from fmus.grid_following.outer_control import Measured, outer_control
 from fmus.grid_following.pll import phase_locked_loop
 from fmus.toolchain.frames import Phasor, power, qd_state
 from fmus.toolchain.model import Model
-from fmus.toolchain.phasor_port import (
-    SourceEmf,
-    declare_master_step,
-    declare_phasor_outputs,
-    motion,
-    phasor_builder,
-)
+from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, motion, phasor_builder
 from fmus.toolchain.port import device_port
 
 

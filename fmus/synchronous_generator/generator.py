@@ -1,12 +1,7 @@
 """Machine, exciter and governor put together; one model for each excitation system."""
 
 from fmus.synchronous_generator.governors import ieeeg1
-from fmus.synchronous_generator.machine import (
-    declare_machine,
-    machine_equations,
-    terminal_power,
-    terminal_voltage,
-)
+from fmus.synchronous_generator.machine import declare_machine, machine_equations, terminal_power, terminal_voltage
 from fmus.synchronous_generator.stabilizers import pss2a
 from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Variant, declare_generator_outputs
 from fmus.toolchain.model import Model

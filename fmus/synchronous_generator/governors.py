@@ -29,12 +29,7 @@ def ieeeg1(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX, data: GovernorData) -> ca.SX
         gain = m.parameter("inverse_R", data.inverse_droop, "pu", "1/R", base="S_n", minimum=0, source=data.source)
         T = [
             m.parameter(
-                f"T_{k}",
-                value,
-                "s",
-                f"Time constant T_{k}; 0 leaves its block out",
-                minimum=0,
-                source=data.source,
+                f"T_{k}", value, "s", f"Time constant T_{k}; 0 leaves its block out", minimum=0, source=data.source
             )
             for k, value in enumerate(data.T, start=1)
         ]
@@ -44,8 +39,7 @@ def ieeeg1(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX, data: GovernorData) -> ca.SX
         ]
         delta = m.parameter("delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True)
         m.require(
-            ca.if_else(ca.logic_and(T[0] <= 0, T[1] > 0), -1, 1),
-            "governor.T_1 = 0 needs governor.T_2 = 0 as well",
+            ca.if_else(ca.logic_and(T[0] <= 0, T[1] > 0), -1, 1), "governor.T_1 = 0 needs governor.T_2 = 0 as well"
         )
         fractions = ca.sum1(ca.vertcat(*K))
         m.require(fractions - 1e-3, "governor: at least one turbine fraction K_1 to K_8 must exceed 0")
@@ -58,8 +52,7 @@ def ieeeg1(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX, data: GovernorData) -> ca.SX
             signal = low_pass_or_nothing(m, name, signal, T[3 + stage], P_ref)
             power += (K[2 * stage] + K[2 * stage + 1]) * signal
         m.require(
-            _positive_or_zero(T, m.internal_step),
-            "governor: a time constant must be 0 or longer than internal_step",
+            _positive_or_zero(T, m.internal_step), "governor: a time constant must be 0 or longer than internal_step"
         )
         return ca.if_else(enabled, power, P_m_0)
 

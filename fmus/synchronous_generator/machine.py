@@ -239,20 +239,10 @@ def _saturation_factor(
     """1 + s(ψ) at the air-gap flux of the operating point, s(ψ) = s(1.0)·ψⁿ through s(1.2); 1 where switched off."""
     on = m.switch("saturation", False, "Divide the magnetising reactances by 1 + s at the operating point")
     s_10 = m.parameter(
-        "s_10",
-        data.s_10,
-        "1",
-        "Saturation s(1.0) of the open-circuit curve",
-        minimum=1e-6,
-        source=data.source,
+        "s_10", data.s_10, "1", "Saturation s(1.0) of the open-circuit curve", minimum=1e-6, source=data.source
     )
     s_12 = m.parameter(
-        "s_12",
-        data.s_12,
-        "1",
-        "Saturation s(1.2) of the open-circuit curve",
-        minimum=1e-6,
-        source=data.source,
+        "s_12", data.s_12, "1", "Saturation s(1.2) of the open-circuit curve", minimum=1e-6, source=data.source
     )
     psi = (port.v_0 + Phasor(R_s + R_t, X_t + X_l) * port.i_0).magnitude()
     s = s_10 * ca.exp(ca.log(s_12 / s_10) / ca.log(1.2) * ca.log(psi))

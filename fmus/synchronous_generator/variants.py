@@ -4,15 +4,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.synchronous_generator.data import (
-    IEEE118,
-    IEEEG1_NTS631,
-    IEEEG1_STAMP,
-    SG1,
-    SG2,
-    GovernorData,
-    MachineData,
-)
+from fmus.synchronous_generator.data import IEEE118, IEEEG1_NTS631, IEEEG1_STAMP, SG1, SG2, GovernorData, MachineData
 from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
 from fmus.synchronous_generator.machine import Machine
 from fmus.toolchain.model_builder import ModelBuilder

@@ -176,14 +176,7 @@ def close_limited_low_pass(m: ModelBuilder, x: ca.SX, u: ca.SX, T: Scalar, low: 
 
 
 def limited_proportional_integral(
-    m: ModelBuilder,
-    name: str,
-    error: ca.SX,
-    K_P: Scalar,
-    K_I: Scalar,
-    low: Scalar,
-    high: Scalar,
-    initial: Scalar,
+    m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar, K_I: Scalar, low: Scalar, high: Scalar, initial: Scalar
 ) -> ca.SX:
     """K_P + K_I/s, the output limited; the integrator stops while the output is at a limit (IEEE 421.5, annex E).
 

@@ -68,10 +68,7 @@ def intact(path: Path) -> bool:
 def keep(path: Path, content: bytes) -> Path:
     """Write a file and its SHA-256 into the cache; others may be writing the same at the same time.
 
-    Parameters
-    ----------
-    path
-        Below a `cache_directory`; its folder is created where missing.
+    ``path``: Below a `cache_directory`; its folder is created where missing.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -25,8 +25,7 @@ TARGETS = {
     "darwin64": ("x86_64-macos", "aarch64-macos"),
 }
 
-ENDINGS = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}
-"""Of a shared library."""
+ENDINGS = {"linux64": ".so", "win64": ".dll", "darwin64": ".dylib"}  # of a shared library
 
 FLAGS = (
     *("-O2", "-shared", "-fPIC", "-fvisibility=hidden", "-fno-sanitize=undefined", "-g0", "-s"),
@@ -64,12 +63,8 @@ def compile_library(source: str, platform: str) -> Path:
 
     Where a platform stands for several machines, the library holds code for each (a universal binary).
 
-    Parameters
-    ----------
-    source
-        One translation unit.
-    platform
-        A key of `TARGETS`.
+    ``source``: One translation unit.
+    ``platform``: A key of `TARGETS`.
     """
     if platform not in TARGETS:
         raise ValueError(f"the compiler has no target for platform {platform!r}; choose from {', '.join(TARGETS)}")
@@ -126,16 +121,10 @@ def joined_source(*files: Path) -> str:
 def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] = ()) -> Path:
     """Compile C source for one zig target; otherwise as `compile_library`.
 
-    Parameters
-    ----------
-    source
-        One translation unit.
-    target
-        One of those of a platform in `TARGETS`.
-    ending
-        Of the library's file, such as ``.so``; ``.exe`` makes a program.
-    libraries
-        Of the system, that the source needs beside the C library and its mathematics, such as ``dl``.
+    ``source``: One translation unit.
+    ``target``: One of those of a platform in `TARGETS`.
+    ``ending``: Of the library's file, such as ``.so``; ``.exe`` makes a program.
+    ``libraries``: Of the system, that the source needs beside the C library and its mathematics, such as ``dl``.
     """
     require("compiling C", "ziglang")
     flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else [*FLAGS]

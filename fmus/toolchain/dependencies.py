@@ -15,8 +15,7 @@ MOST = 1_000_000
 """Dependencies of outputs, or of derivatives, that are listed. In a meshed network without states all outputs depend on
 nearly everything, and lists of that would be a hundred times as long as all the rest."""
 
-_SAMPLE = 8
-"""Rows of a pattern from which it is known how long the whole would be."""
+_SAMPLE = 8  # rows of a pattern from which it is known how long the whole would be
 
 
 @dataclass(frozen=True, slots=True)

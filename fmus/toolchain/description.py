@@ -32,18 +32,11 @@ def model_description(
 ) -> bytes:
     """Return the file's text.
 
-    Parameters
-    ----------
-    guid, identifier
-        As in the standard; the identifier also names the binaries.
-    tool
-        Name and version for ``generationTool``.
-    native
-        Whether the FMU runs without Python; a native one gives directional derivatives too.
-    listed
-        Whether dependencies are listed; without them the text is there at once.
-    source_file
-        Name of the C file in the folder ``sources``; empty without one.
+    ``guid``, ``identifier``: As in the standard; the identifier also names the binaries.
+    ``tool``: Name and version for ``generationTool``.
+    ``native``: Whether the FMU runs without Python; a native one gives directional derivatives too.
+    ``listed``: Whether dependencies are listed; without them the text is there at once.
+    ``source_file``: Name of the C file in the folder ``sources``; empty without one.
     """
     root = root_element(model, "2.0", {"guid": guid}, tool)
     root.set("numberOfEventIndicators", "0")

@@ -12,19 +12,14 @@ from fmus.toolchain.description_common import (
 )
 from fmus.toolchain.model import Model
 
-_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
-"""FMI 2.0's name of a type → FMI 3.0's."""
+_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}  # FMI 2.0's name of a type → FMI 3.0's
 
 
 def model_description_3(model: Model, token: str, identifier: str, tool: str) -> bytes:
     """Return the file's text.
 
-    Parameters
-    ----------
-    token, identifier
-        As in the standard; the identifier also names the binaries.
-    tool
-        Name and version for ``generationTool``.
+    ``token``, ``identifier``: As in the standard; the identifier also names the binaries.
+    ``tool``: Name and version for ``generationTool``.
     """
     root = root_element(model, "3.0", {"instantiationToken": token}, tool)
     SubElement(

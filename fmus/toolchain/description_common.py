@@ -18,38 +18,20 @@ _CALCULATED = {"causality": "local", "variability": "continuous", "initial": "ca
 
 @dataclass(frozen=True)
 class DescribedVariable:
-    """A variable as both versions declare it.
+    """A variable as both versions declare it."""
 
-    Attributes
-    ----------
-    reference
-        Value reference; FMI 2.0's index is greater by one, as the file lists variables in this order.
-    attributes
-        Name, value reference, text, causality, variability and initial.
-    kind
-        Name of the type in FMI 2.0.
-    own
-        Attributes of the type: start, bounds and unit.
-    derivative_of
-        Value reference of the state whose time derivative it is; None for all others.
-    """
-
-    reference: int
-    attributes: Mapping[str, str]
-    kind: str
-    own: Mapping[str, str]
-    derivative_of: int | None = None
+    reference: int  # value reference; FMI 2.0's index is greater by one, as the file lists variables in this order
+    attributes: Mapping[str, str]  # name, value reference, text, causality, variability and initial
+    kind: str  # name of the type in FMI 2.0
+    own: Mapping[str, str]  # attributes of the type: start, bounds and unit
+    derivative_of: int | None = None  # value reference of the state whose time derivative it is; None for all others
 
 
 def root_element(model: Model, version: str, identity: Mapping[str, str], tool: str) -> Element:
     """The file's outermost element.
 
-    Parameters
-    ----------
-    identity
-        The attribute that tells one FMU from another.
-    tool
-        Name and version for ``generationTool``. No date is written: equal contents give equal files.
+    ``identity``: The attribute that tells one FMU from another.
+    ``tool``: Name and version for ``generationTool``. No date is written: equal contents give equal files.
     """
     attributes = {
         "fmiVersion": version,

@@ -11,19 +11,9 @@ from fmus.toolchain.model import Model
 
 
 class Recipe(Protocol):
-    """The recipe for one kind of FMU of one model.
-
-    Attributes
-    ----------
-    digest
-        Hash over everything that the FMU is made from [hex].
-    cache_prefix
-        First part of the name of the folder that holds this machine's FMU.
-    """
-
     model: Model
-    digest: str
-    cache_prefix: str
+    digest: str  # hash over everything that the FMU is made from [hex]
+    cache_prefix: str  # first part of the name of the folder that holds this machine's FMU
 
     def default_platforms(self) -> tuple[str, ...]:
         """Default platforms to compile for [FMI 2.0 names]."""

@@ -29,12 +29,8 @@ class MissingLibraryError(SetupError, RuntimeError):
 def require(purpose: str, *libraries: str) -> None:
     """Refuse a task whose libraries are not installed, before it imports them.
 
-    Parameters
-    ----------
-    purpose
-        The task, as the subject of the error's sentence, such as "building an FMU".
-    libraries
-        Keys of `EXTRAS`.
+    ``purpose``: The task, as the subject of the error's sentence, such as "building an FMU".
+    ``libraries``: Keys of `EXTRAS`.
     """
     missing = [library for library in libraries if find_spec(library) is None]
     if missing:

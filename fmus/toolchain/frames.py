@@ -64,8 +64,7 @@ class Phasor:
         return Phasor(ca.fmin(ca.fmax(self.re, -limit_re), limit_re), ca.fmin(ca.fmax(self.im, -limit_im), limit_im))
 
 
-Phases = tuple[Scalar, Scalar, Scalar]
-"""Instantaneous values of phases a, b and c."""
+Phases = tuple[Scalar, Scalar, Scalar]  # instantaneous values of phases a, b and c
 
 ZERO = Phasor(0.0, 0.0)
 
@@ -121,14 +120,9 @@ class QdState:
 def qd_state(m: ModelBuilder, name: str, initial: Phasor, description: str) -> QdState:
     """Declare ``name_q`` and ``name_d`` [pu, S_n].
 
-    Parameters
-    ----------
-    name
-        Of both states, before ``_q`` and ``_d``.
-    initial
-        An expression of parameters [pu, S_n].
-    description
-        Of both states; each adds which component it is.
+    ``name``: Of both states, before ``_q`` and ``_d``.
+    ``initial``: An expression of parameters [pu, S_n].
+    ``description``: Of both states; each adds which component it is.
     """
     q = m.state(f"{name}_q", initial.re, "pu", f"{description}, q component", base="S_n")
     d = m.state(f"{name}_d", -initial.im, "pu", f"{description}, d component", base="S_n")

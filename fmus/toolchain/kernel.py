@@ -30,10 +30,8 @@ _C = Path(__file__).with_name("c")
 def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> str:
     """The whole C kernel of a model as one translation unit.
 
-    Parameters
-    ----------
-    further
-        Functions by name whose code is wanted beside the kernel's own; the enumerator ``NWD`` is the room they need.
+    ``further``: Functions by name whose code is wanted beside the kernel's own; the enumerator ``NWD`` is the room they
+    need.
     """
     functions = kernel_functions(model)
     further = dict(further or {})

@@ -6,12 +6,8 @@ of these lines on an array in place of the local variables, without the branches
 
 import re
 
-LONGEST = 20_000
-"""Operations of a function that stays as it is."""
-
-LONGEST_OF_DATA = 1_000
-"""The same where a network is solved as data: no such model was built before this was so short."""
-
+LONGEST = 20_000  # operations of a function that stays as it is
+LONGEST_OF_DATA = 1_000  # the same where a network is solved as data: no such model was built before this was so short
 _PART = 300
 """Operations of each part: a tenth as many make calls of them, ten times as many cost twice the time to compile."""
 
@@ -30,13 +26,9 @@ _LOCAL = re.compile(r"\ba(\d+)\b")
 def cut(source: str, longest: int = LONGEST, part: int = _PART) -> str:
     """The same C code, its long functions in parts.
 
-    Parameters
-    ----------
-    source
-        As CasADi's code generator writes it. All pointers to arguments and results of a long function must be given,
-        and its work array must have room for all its local variables, as its ``sz_w`` says.
-    longest, part
-        Lines of a function that stays as it is, and of each part of others.
+    ``source``: As CasADi's code generator writes it. All pointers to arguments and results of a long function must be
+    given, and its work array must have room for all its local variables, as its ``sz_w`` says.
+    ``longest``, ``part``: Lines of a function that stays as it is, and of each part of others.
     """
 
     def in_parts(match: re.Match[str]) -> str:

@@ -11,16 +11,7 @@ import casadi as ca
 
 from fmus.toolchain.model import Integrator, Model
 from fmus.toolchain.nodes import Complex, Nodes
-from fmus.toolchain.variables import (
-    UNITS,
-    CalculatedParameter,
-    Input,
-    Output,
-    Parameter,
-    State,
-    Variable,
-    VariableType,
-)
+from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable, VariableType
 
 Scalar = ca.SX | float
 """What equations are made of."""
@@ -129,18 +120,7 @@ class ModelBuilder:
             Source of the default value; empty if it is not given.
         """
         return self._declare(
-            Parameter(
-                self._full(name),
-                unit,
-                description,
-                base,
-                float(start),
-                minimum,
-                maximum,
-                tunable,
-                type,
-                source,
-            )
+            Parameter(self._full(name), unit, description, base, float(start), minimum, maximum, tunable, type, source)
         )
 
     def switch(self, name: str, start: bool, description: str, *, tunable: bool = False) -> ca.SX:
@@ -259,10 +239,7 @@ class ModelBuilder:
         self._algebraic.append((symbol, value))
 
     def nodes(
-        self,
-        elements: Mapping[tuple[int, int], Complex],
-        currents: Sequence[Complex],
-        written_out: Callable[[], Model],
+        self, elements: Mapping[tuple[int, int], Complex], currents: Sequence[Complex], written_out: Callable[[], Model]
     ) -> list[tuple[ca.SX, ca.SX]]:
         """Let the kernel solve complex nodal equations Y·v = i as data; returns real and imaginary part of each v.
 

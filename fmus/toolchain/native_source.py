@@ -12,8 +12,7 @@ from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import FmiVersion, Model
 
 _C = Path(__file__).with_name("c")
-_SHORTEST_TEXT = 640
-"""Room for a message [bytes] beside the longest rule or name it may quote."""
+_SHORTEST_TEXT = 640  # room for a message [bytes] beside the longest rule or name it may quote
 
 
 def native_source(model: Model, version: FmiVersion) -> str:

@@ -9,29 +9,19 @@ import casadi as ca
 from fmus.toolchain.elimination_plan import plan_pattern
 from fmus.toolchain.model import Model, NodalEquations
 
-Complex = tuple[ca.SX | float, ca.SX | float]
-"""Real and imaginary part."""
+Complex = tuple[ca.SX | float, ca.SX | float]  # real and imaginary part
 
-LARGEST_REST = 1e-6
-"""Part of its terms that a row of Y·v = i may leave over; with more, no voltage is finite."""
+LARGEST_REST = 1e-6  # part of its terms that a row of Y·v = i may leave over; with more, no voltage is finite
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """Equations that a kernel solves as data.
+    """Equations that a kernel solves as data."""
 
-    Attributes
-    ----------
-    elements
-        Of Y by row and column, those of the diagonal included; functions of parameters and inputs.
-    currents
-        One for each row; functions of states, inputs and parameters.
-    written_out
-        Makes the same model without such equations, for those who need it as one function.
-    """
-
+    # of Y by row and column, those of the diagonal included; functions of parameters and inputs.
     elements: Mapping[tuple[int, int], Complex]
-    currents: Sequence[Complex]
+    currents: Sequence[Complex]  # one for each row; functions of states, inputs and parameters
+    # makes the same model without such equations, for those who need it as one function.
     written_out: Callable[[], Model]
 
     @cached_property

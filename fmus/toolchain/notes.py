@@ -28,13 +28,9 @@ _LIBRARIES = ("gfor-cosim", "casadi", "numpy", "pythonfmu", "scipy", "ziglang")
 def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:
     """What is noted, or else what is found, which is noted for the next time.
 
-    Parameters
-    ----------
-    entry
-        The catalogue's entry of the model. Of a model from another distribution nothing is noted, since nobody knows
-        what its code imports.
-    find
-        Finds it [JSON's types].
+    ``entry``: The catalogue's entry of the model. Of a model from another distribution nothing is noted, since nobody
+    knows what its code imports.
+    ``find``: Finds it [JSON's types].
     """
     path = note_of(entry, asked)
     if path is None:

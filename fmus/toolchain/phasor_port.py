@@ -18,8 +18,7 @@ INTERNAL_STEP, LONGEST_STEP = 1e-3, 2e-3
 """Internal step [s], default and maximum: parameters allow time constants of 1 ms, and Runge-Kutta of order 4 needs
 steps below 2.78 of them."""
 
-DERIVATIVE_LAG = 5e-3
-"""Lag [s] of the derivative that carries an emf half a communication step ahead."""
+DERIVATIVE_LAG = 5e-3  # lag [s] of the derivative that carries an emf half a communication step ahead
 
 
 def phasor_builder(name: str, title: str) -> ModelBuilder:
@@ -75,12 +74,8 @@ def declare_master_step(m: ModelBuilder) -> MasterStep:
 def motion(m: ModelBuilder, name: str, value: Phasor, start: Phasor, text: str) -> Phasor:
     """Declare ``name_q`` and ``name_d``, the value through a lag; return its rate of change [pu/s] from states alone.
 
-    Parameters
-    ----------
-    name
-        Of both states, before ``_q`` and ``_d``.
-    value, start
-        In the device's frame [pu], a function of states; and its value at the operating point.
+    ``name``: Of both states, before ``_q`` and ``_d``.
+    ``value``, ``start``: In the device's frame [pu], a function of states; and its value at the operating point.
     """
     moving = []
     for part, now, initial in (("q", value.re, start.re), ("d", -value.im, -start.im)):
@@ -98,12 +93,8 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
     middle of the coming step the network's voltages are those of the middle. The emf turns with its frame. A derivative
     with a short lag gives the motion of its components in that frame. Both emfs therefore follow from states alone.
 
-    Parameters
-    ----------
-    emf, start
-        In the device's frame [pu], a function of states; and its value at the operating point.
-    angle, rate
-        Of the device's frame in the network frame [rad], and the rate of that [rad/s].
+    ``emf``, ``start``: In the device's frame [pu], a function of states; and its value at the operating point.
+    ``angle``, ``rate``: Of the device's frame in the network frame [rad], and the rate of that [rad/s].
     """
     master = declare_master_step(m)
     with m.scope("source"):
@@ -121,12 +112,8 @@ def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, im
     Current and powers are read after a step, with the voltage that was held in the step, and therefore hold for its
     middle.
 
-    Parameters
-    ----------
-    emf
-        In the network frame [pu], as `source_emf` returns it.
-    impedance
-        Between emf and bus [pu, S_n], an expression of fixed parameters.
+    ``emf``: In the network frame [pu], as `source_emf` returns it.
+    ``impedance``: Between emf and bus [pu, S_n], an expression of fixed parameters.
     """
     with m.scope("source"):
         R = m.calculated("R", impedance.re, "pu", "Resistance between emf and bus", base="S_n")

@@ -5,22 +5,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Plan:
-    """Pattern of a square matrix and of its factors, rows in order of elimination.
+    """Pattern of a square matrix and of its factors, rows in order of elimination."""
 
-    Attributes
-    ----------
-    order
-        ``order[i]`` is the unknown that is eliminated at position i.
-    row, column, diagonal
-        Factors, compressed by rows: columns ascending, ``diagonal`` the position of each pivot.
-    matrix_row, matrix_column
-        The matrix itself, in the same order.
-    """
-
-    order: list[int]
+    order: list[int]  # ``order[i]`` is the unknown that is eliminated at position i
+    # row, column, diagonal: factors, compressed by rows: columns ascending, ``diagonal`` the position of each pivot.
     row: list[int]
     column: list[int]
     diagonal: list[int]
+    # matrix_row, matrix_column: the matrix itself, in the same order.
     matrix_row: list[int]
     matrix_column: list[int]
 

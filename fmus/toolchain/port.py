@@ -15,44 +15,27 @@ from fmus.toolchain import port_variables
 from fmus.toolchain.frames import Phasor, current_of_power, polar, power
 from fmus.toolchain.model_builder import ModelBuilder
 
-BREAKER_TIME = 1e-3
-"""Time constant τ [s] with which the current of an open breaker fades."""
+BREAKER_TIME = 1e-3  # time constant τ [s] with which the current of an open breaker fades
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """What the power flow says about a device, and the frame that it is said in.
+    """What the power flow says about a device, and the frame that it is said in."""
 
-    Attributes
-    ----------
-    v_0, i_0
-        Bus voltage and injected current of the power flow, network frame [pu, S_n].
-    omega_b
-        Base angular frequency [rad/s].
-    """
-
+    # v_0, i_0: bus voltage and injected current of the power flow, network frame [pu, S_n].
     v_0: Phasor
     i_0: Phasor
-    omega_b: ca.SX
+    omega_b: ca.SX  # base angular frequency [rad/s]
 
 
 @dataclass(frozen=True)
 class DevicePort(OperatingPoint):
-    """Voltage at the bus, and the same at the operating point.
+    """Voltage at the bus, and the same at the operating point."""
 
-    Attributes
-    ----------
-    v
-        Bus voltage, network frame [pu].
-    current_scale
-        Device current [pu, S_n] times this is the current in the port's unit: mostly pu on the system base.
-    connected
-        1 where the breaker is closed, 0 where it is open.
-    """
-
-    v: Phasor
+    v: Phasor  # bus voltage, network frame [pu]
+    # device current [pu, S_n] times this is the current in the port's unit: mostly pu on the system base.
     current_scale: ca.SX
-    connected: ca.SX
+    connected: ca.SX  # 1 where the breaker is closed, 0 where it is open
 
     def through_breaker(self, closed: Phasor, opened: Phasor) -> Phasor:
         """The first value behind a closed breaker, the second behind an open one."""
@@ -79,14 +62,9 @@ def declare_rating(m: ModelBuilder, S_n: float) -> ca.SX:
 def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> DevicePort:
     """Declare the power-flow start values of a device at a bus voltage.
 
-    Parameters
-    ----------
-    v
-        Bus voltage, network frame [pu].
-    P_0
-        Default of the active power into the bus [pu, S_n].
-    current_scale
-        Device current [pu, S_n] times this is the current in the port's unit.
+    ``v``: Bus voltage, network frame [pu].
+    ``P_0``: Default of the active power into the bus [pu, S_n].
+    ``current_scale``: Device current [pu, S_n] times this is the current in the port's unit.
     """
     start = declare_operating_point(m, P_0)
     connected = m.switch("connected", True, "The breaker at the port is closed", tunable=True)

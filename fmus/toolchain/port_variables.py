@@ -6,8 +6,7 @@ imports no CasADi.
 
 from fmus.toolchain.variables import Input, Output, Parameter
 
-SYSTEM_BASE_MVA = 100.0
-"""Base power of every network: of its powers, currents and admittances in pu."""
+SYSTEM_BASE_MVA = 100.0  # base power of every network: of its powers, currents and admittances in pu
 
 SYSTEM_BASE = f"{SYSTEM_BASE_MVA:g} MVA"
 

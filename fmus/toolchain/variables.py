@@ -34,16 +34,10 @@ UNITS: dict[str, dict[str, float]] = {
 class Variable:
     """A named quantity with its unit.
 
-    Parameters
-    ----------
-    name
-        Dotted name, as the FMU shows it.
-    unit
-        One of `UNITS`.
-    description
-        One sentence; for per-unit quantities it is followed by the base.
-    base
-        What 1 pu is, for the unit ``pu``: ``"S_n"`` (the device's rating) or ``"100 MVA"``.
+    ``name``: Dotted name, as the FMU shows it.
+    ``unit``: One of `UNITS`.
+    ``description``: One sentence; for per-unit quantities it is followed by the base.
+    ``base``: What 1 pu is, for the unit ``pu``: ``"S_n"`` (the device's rating) or ``"100 MVA"``.
     """
 
     name: str

@@ -39,11 +39,8 @@ _RESOURCES_PATH = base64.b85decode(
 def wrapper_binaries() -> dict[Path, bytes]:
     """FMI platform and file name → contents.
 
-    Raises
-    ------
-    SetupError
-        If pythonfmu is not there as a whole, as while it is being installed: an FMU without them would be kept and
-        could run nowhere.
+    Raises `SetupError` if pythonfmu is not there as a whole, as while it is being installed: an FMU without them would
+    be kept and could run nowhere.
     """
     root = Path(pythonfmu.__file__).parent / "resources" / "binaries"
     found = {file.relative_to(root): _mended(file.read_bytes()) for file in sorted(root.rglob("*.*"))}

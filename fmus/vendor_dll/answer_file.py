@@ -14,12 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-MOST_TEXT = 100_000
-"""Characters of one text."""
-
-_MOST_BYTES = 32 * 1024**2
-"""Of the file: 100,000 parameters have about 20 MB."""
-
+MOST_TEXT = 100_000  # characters of one text
+_MOST_BYTES = 32 * 1024**2  # of the file: 100,000 parameters have about 20 MB
 _NO_TEXT = re.compile("[^\t\n\r\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Controls, escapes and what is no character."""
 
@@ -33,10 +29,7 @@ class ForeignAnswerError(ValueError):
 def read_plain_file(path: Path, most: int = _MOST_BYTES) -> bytes:
     """The content of a file that foreign code may have put there.
 
-    Raises
-    ------
-    ForeignAnswerError
-        If it is a link, a pipe or a device, or larger than ``most`` bytes.
+    Raises `ForeignAnswerError` if it is a link, a pipe or a device, or larger than ``most`` bytes.
     """
     try:
         number = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))

@@ -13,12 +13,8 @@ from typing import Any
 from fmus.toolchain.temporary import own_folder, remove
 from fmus.vendor_dll.answer_file import ForeignAnswerError, read_answer, read_plain_file
 
-BEFORE_IT_STARTS = 300.0
-"""For Python, and Wine, to start, until the DLL's own code runs [s]."""
-
-_OWN_DOING = 0.5
-"""Processor time, as a part of the time it had, from which a DLL counts as one that never comes back."""
-
+BEFORE_IT_STARTS = 300.0  # for Python, and Wine, to start, until the DLL's own code runs [s]
+_OWN_DOING = 0.5  # processor time, as a part of the time it had, from which a DLL counts as one that never comes back
 _START = tuple(f"Model_{call} runs" for call in ("FirstCall", "CheckParameters", "Initialize"))
 _FROM_OUTSIDE = (*("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT"), *("SIGXCPU", "SIGSTOP"))
 """Signals by which others end a process: the system that lacks memory, a person."""
@@ -26,25 +22,11 @@ _FROM_OUTSIDE = (*("SIGKILL", "SIGTERM", "SIGINT", "SIGHUP", "SIGQUIT"), *("SIGX
 
 @dataclass(frozen=True)
 class Answer:
-    """What the process found, or how it ended.
-
-    Attributes
-    ----------
-    found
-        Its answer; empty where it gave none.
-    end
-        How it ended where it gave none, in words that follow "the process that reads it".
-    passing
-        The reason lies in this machine, so that another call may find more.
-    in_its_start
-        The DLL's own code ended it before the first sample.
-    """
-
-    found: dict[str, Any] = field(default_factory=dict)
-    end: str = ""
+    found: dict[str, Any] = field(default_factory=dict)  # its answer; empty where it gave none
+    end: str = ""  # how it ended where it gave none, in words that follow "the process that reads it"
     why: str = ""
-    passing: bool = False
-    in_its_start: bool = False
+    passing: bool = False  # the reason lies in this machine, so that another call may find more
+    in_its_start: bool = False  # the DLL's own code ended it before the first sample
 
 
 def note_beside(answer: Path) -> Path:
@@ -55,14 +37,9 @@ def note_beside(answer: Path) -> Path:
 def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
     """Read a DLL in a process of its own.
 
-    Parameters
-    ----------
-    reader
-        Module that is run for it.
-    longest
-        Time for the DLL's own code, counted from when it is loaded [s].
-    more
-        Further words of the command.
+    ``reader``: Module that is run for it.
+    ``longest``: Time for the DLL's own code, counted from when it is loaded [s].
+    ``more``: Further words of the command.
     """
     folder = own_folder("dll")
     try:

@@ -20,12 +20,8 @@ BridgeKind = Literal["modulation", "voltage"]
 ANGLE = "frame.angle"
 """State that the host sets anew at each sample: it follows from the time, so it is none of the device's states."""
 
-BRIDGE = ("bridge.a", "bridge.b", "bridge.c")
-"""Inputs that the controller gives: modulation indices, or phase voltages."""
-
-TRIMS = ("trim.P", "trim.Q", "trim.V")
-"""Inputs that the host sets while it looks for the start."""
-
+BRIDGE = ("bridge.a", "bridge.b", "bridge.c")  # inputs that the controller gives: modulation indices, or phase voltages
+TRIMS = ("trim.P", "trim.Q", "trim.V")  # inputs that the host sets while it looks for the start
 REFERENCES = ("P_ref", "Q_ref", "V_ref")
 MEASURED = tuple(f"{name}_{phase}" for name in ("u", "v", "i_s", "i_g") for phase in "abc")
 """Phase quantities at the circuit: voltages at the filter and at the bus, currents of the bridge and into the grid."""
@@ -33,8 +29,7 @@ MEASURED = tuple(f"{name}_{phase}" for name in ("u", "v", "i_s", "i_g") for phas
 BASES = {"voltage": "base.voltage", "current": "base.current", "power": "S_n"}
 """Parameters that hold what 1 pu is [kV, kA, MVA]."""
 
-S_N, P_0, V_N = 100.0, 0.8, 0.69
-"""Default rating [MVA], dispatch [pu] and rated voltage [kV]."""
+S_N, P_0, V_N = 100.0, 0.8, 0.69  # default rating [MVA], dispatch [pu] and rated voltage [kV]
 
 
 @dataclass(frozen=True)
@@ -54,12 +49,9 @@ class _Branches:
 def converter_circuit(name: str, filter_kind: FilterKind, bridge: BridgeKind) -> Model:
     """The circuit as a model whose inputs are the bus voltage and what the controller gives.
 
-    Parameters
-    ----------
-    filter_kind
-        ``L``: one inductor. ``LC``: an inductor and a capacitor. ``LCL``: a second inductor, before the transformer.
-    bridge
-        What the controller gives: ``modulation`` of half the DC voltage, or a phase ``voltage`` [kV].
+    ``filter_kind``: ``L``: one inductor. ``LC``: an inductor and a capacitor. ``LCL``: a second inductor, before the
+    transformer.
+    ``bridge``: What the controller gives: ``modulation`` of half the DC voltage, or a phase ``voltage`` [kV].
     """
     m = ModelBuilder(name, "Converter circuit around a vendor's controller", internal_step=1e-5)
     rating = declare_rating(m, S_N)

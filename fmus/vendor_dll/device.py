@@ -39,59 +39,35 @@ class DeviceFileError(ValueError):
 
 @dataclass(frozen=True)
 class Route:
-    """One value that goes from the circuit to the DLL, or back.
-
-    Attributes
-    ----------
-    base
-        Parameter of the circuit with which it is multiplied; None for none.
-    """
+    """One value that goes from the circuit to the DLL, or back."""
 
     place: Place
     quantity: str
-    base: str | None
+    base: str | None  # parameter of the circuit with which it is multiplied; None for none
     factor: float
 
 
 @dataclass(frozen=True)
 class Device:
-    """A controller with a circuit around it.
-
-    Attributes
-    ----------
-    driven
-        The three signals of the bridge.
-    constants
-        Start values of inputs that the circuit does not give, by name.
-    parameters
-        Values of the DLL's parameters, instead of its defaults.
-    circuit
-        Default values of the circuit's parameters.
-    delay
-        Whether a signal of the bridge is applied one sample after it was computed.
-    trims
-        Which references are trimmed at the start: of P, Q, V.
-    longest_start, first_trim, trim_time
-        How long the start may take, when trimming begins, and its time constant [s].
-    voltage_per_q
-        Trim of V for a trim of Q.
-    """
-
     dll: Path
     filter_kind: FilterKind
     bridge: BridgeKind
     measured: tuple[Route, ...]
-    driven: tuple[Route, ...]
+    driven: tuple[Route, ...]  # the three signals of the bridge
+    # start values of inputs that the circuit does not give, by name.
     constants: Mapping[str, float] = field(default_factory=dict)
+    # values of the DLL's parameters, instead of its defaults.
     parameters: Mapping[str, float] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
-    circuit: Mapping[str, float] = field(default_factory=dict)
-    delay: bool = False
-    trims: tuple[str, ...] = ("P", "Q")
+    circuit: Mapping[str, float] = field(default_factory=dict)  # default values of the circuit's parameters
+    delay: bool = False  # whether a signal of the bridge is applied one sample after it was computed
+    trims: tuple[str, ...] = ("P", "Q")  # which references are trimmed at the start: of P, Q, V
+    # longest_start, first_trim, trim_time: how long the start may take, when trimming begins, and its time constant
+    # [s].
     longest_start: float = 20.0
     first_trim: float = 1.0
     trim_time: float = 0.1
-    voltage_per_q: float = 0.2
+    voltage_per_q: float = 0.2  # trim of V for a trim of Q
 
     def around(self, name: str) -> Model:
         made = converter_circuit(name, self.filter_kind, self.bridge)

@@ -22,8 +22,7 @@ from fmus.vendor_dll.state_trial import Trial
 from fmus.vendor_dll.text_files import hidden, places
 
 _LIBRARIES = {"linux64": ("dl",), "win64": (), "darwin64": ()}
-_LONGEST = 60
-"""Time for a DLL to tell what it is, or for the trial, from when it is loaded [s]."""
+_LONGEST = 60  # time for a DLL to tell what it is, or for the trial, from when it is loaded [s]
 
 _FORMATS = (
     (b"\x7fELF\x02", "linux64", "a library for 64-bit Linux"),
@@ -55,8 +54,7 @@ class VendorDll:
         return name if name[:1].isalpha() else f"dll_{name}"
 
 
-READER = "fmus.vendor_dll.reading"
-"""Module whose process reads a DLL."""
+READER = "fmus.vendor_dll.reading"  # module whose process reads a DLL
 
 
 def read_dll(
@@ -68,17 +66,11 @@ def read_dll(
 ) -> VendorDll:
     """Read a DLL in a process of its own, and try how it keeps its state.
 
-    Parameters
-    ----------
-    path, reader, also
-        The DLL, the module whose process reads it, and further platforms that this machine runs.
-    texts, folder
-        Values of text parameters, and where the files lie that they name.
+    ``path``, ``reader``, ``also``: The DLL, the module whose process reads it, and further platforms that this machine
+    runs.
+    ``texts``, ``folder``: Values of text parameters, and where the files lie that they name.
 
-    Raises
-    ------
-    DllError
-        If it is no such DLL, is not for this machine, or declares what no host can run.
+    Raises `DllError` if it is no such DLL, is not for this machine, or declares what no host can run.
     """
     path = Path(path).absolute()
     platform = platform_of(path, also)
@@ -147,12 +139,8 @@ def dll_fmu(
 ) -> Path:
     """Write the FMU of a DLL into a folder; it holds the DLL itself.
 
-    Parameters
-    ----------
-    texts
-        Value of parameters that are text; by default the DLL's own.
-    device
-        The circuit around the controller; by default there is none.
+    ``texts``: Value of parameters that are text; by default the DLL's own.
+    ``device``: The circuit around the controller; by default there is none.
     """
     return write_archive(destination / f"{dll.identifier}.fmu", dll_members(dll, texts, device))
 

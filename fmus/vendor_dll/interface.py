@@ -13,22 +13,12 @@ Number = int | float
 
 @dataclass(frozen=True)
 class DataType:
-    """One of the interface's ten data types.
+    """One of the interface's ten data types."""
 
-    Attributes
-    ----------
-    name
-        As the interface has it, such as ``real64``.
-    size
-        Of one value, which is also its alignment [bytes].
-    kind
-        Type of a variable of FMI 2.0 for it.
-    """
-
-    name: str
+    name: str  # as the interface has it, such as ``real64``
     c: str
-    size: int
-    kind: Literal["Real", "Integer", "String"]
+    size: int  # of one value, which is also its alignment [bytes]
+    kind: Literal["Real", "Integer", "String"]  # type of a variable of FMI 2.0 for it
 
 
 DATA_TYPES = {
@@ -48,19 +38,14 @@ DATA_TYPES = {
 CALLS = ("FirstCall", "CheckParameters", "Initialize", "Outputs", "Iterate", "Terminate", "PrintInfo")
 """Functions beside ``Model_GetInfo``, without their prefix ``Model_``."""
 
-CONTROLLER = "controller."
-"""Before the names of the DLL's variables, where a circuit lies around it."""
-
-_SHORTEST = 1e-9
-"""A shorter sample time is none [s]."""
-
+CONTROLLER = "controller."  # before the names of the DLL's variables, where a circuit lies around it
+_SHORTEST = 1e-9  # A shorter sample time is none [s]
 _VERSIONS = (0, 1, 2)
 """First numbers of the interface's version that are known: 1 is that of both editions of its API; some write 2 for the
 second edition, some nothing.
 """
 
-NEEDED = ("Initialize", "Outputs")
-"""Without these a DLL cannot be run."""
+NEEDED = ("Initialize", "Outputs")  # without these a DLL cannot be run
 
 
 @dataclass(frozen=True)
@@ -76,13 +61,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class DllParameter:
-    """A parameter; one that is ``fixed`` can be set before the start only.
-
-    Attributes
-    ----------
-    default, minimum, maximum
-        In the parameter's own type; text for a ``c_string``, which has no bounds.
-    """
+    """A parameter; one that is ``fixed`` can be set before the start only."""
 
     name: str
     group: str
@@ -90,6 +69,7 @@ class DllParameter:
     unit: str
     data_type: int
     fixed: bool
+    # default, minimum, maximum: in the parameter's own type; text for a ``c_string``, which has no bounds.
     default: Number | str
     minimum: Number | None
     maximum: Number | None
@@ -97,33 +77,17 @@ class DllParameter:
 
 @dataclass(frozen=True)
 class DllInterface:
-    """Everything that a DLL declares of itself.
+    """Everything that a DLL declares of itself."""
 
-    Attributes
-    ----------
-    texts
-        ``ModelName``, ``ModelVersion`` and the eight others, by the interface's names.
-    interface_version
-        Four numbers.
-    sample_time
-        ``FixedStepBaseSampleTime`` [s]; not positive means: that of the host.
-    mode
-        ``EMT_RMS_Mode``: 1 is EMT, 2 RMS, 3 both; others say nothing.
-    states
-        Numbers of integer, float and double states.
-    calls
-        Those of `CALLS` that the DLL has.
-    """
-
-    texts: dict[str, str]
-    interface_version: tuple[int, ...]
-    sample_time: float
-    mode: int
+    texts: dict[str, str]  # ``ModelName``, ``ModelVersion`` and the eight others, by the interface's names
+    interface_version: tuple[int, ...]  # four numbers
+    sample_time: float  # ``FixedStepBaseSampleTime`` [s]; not positive means: that of the host
+    mode: int  # ``EMT_RMS_Mode``: 1 is EMT, 2 RMS, 3 both; others say nothing
     inputs: tuple[Signal, ...]
     outputs: tuple[Signal, ...]
     parameters: tuple[DllParameter, ...]
-    states: tuple[int, int, int]
-    calls: tuple[str, ...]
+    states: tuple[int, int, int]  # numbers of integer, float and double states
+    calls: tuple[str, ...]  # those of `CALLS` that the DLL has
 
     def as_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -180,19 +144,11 @@ class DllInterface:
 
 @dataclass(frozen=True)
 class Place:
-    """One value in a structure of the host.
+    """One value in a structure of the host."""
 
-    Attributes
-    ----------
-    name
-        Of the signal or parameter, with its place in the array in brackets, from 1, where there is one.
-    offset
-        From the structure's start [bytes].
-    """
-
-    name: str
+    name: str  # of the signal or parameter, with its place in the array in brackets, from 1, where there is one
     row: Signal | DllParameter
-    offset: int
+    offset: int  # from the structure's start [bytes]
 
     @property
     def type(self) -> DataType:

@@ -8,12 +8,10 @@ from typing import Any, Protocol
 
 _WRITABLE, _LOADED, _RELOCATED_ONLY = 2, 1, 0x6474E552  # PF_W, PT_LOAD, PT_GNU_RELRO
 
-Region = tuple[int, int, int]
-"""Base of the library, start and size of a stretch of its memory."""
+Region = tuple[int, int, int]  # base of the library, start and size of a stretch of its memory
 
 
-Note = Callable[[str], None]
-"""Takes what the DLL is doing, in words that follow "while"."""
+Note = Callable[[str], None]  # takes what the DLL is doing, in words that follow "while"
 
 
 def unheard(_doing: str) -> None:
@@ -103,12 +101,7 @@ class _Segment(c.Structure):
 
 
 class _Loaded(c.Structure):
-    _fields_ = (
-        ("base", c.c_uint64),
-        ("name", c.c_char_p),
-        ("segments", c.POINTER(_Segment)),
-        ("count", c.c_uint16),
-    )
+    _fields_ = (("base", c.c_uint64), ("name", c.c_char_p), ("segments", c.POINTER(_Segment)), ("count", c.c_uint16))
 
 
 def _writable(path: Path) -> Iterator[Region]:

@@ -17,11 +17,8 @@ from fmus.vendor_dll.interface import CALLS, DATA_TYPES, DllInterface, DllParame
 from fmus.vendor_dll.memory import Library, LocalLibrary, Note
 from fmus.vendor_dll.state_trial import Trial, tried
 
-_MOST = 100_000
-"""More signals or parameters than this are taken for a structure of another layout."""
-
-_NOTE = 80
-"""Size of a note [bytes]."""
+_MOST = 100_000  # more signals or parameters than this are taken for a structure of another layout
+_NOTE = 80  # size of a note [bytes]
 
 _Text = Callable[[int | None], str]
 _Row = TypeVar("_Row", bound=c.Structure)

@@ -31,32 +31,19 @@ _STATES = {INT_STATE: ("IntStates", 6, 4), FLOAT_STATE: ("FloatStates", 8, 4), D
 
 @dataclass(frozen=True)
 class HostVariable:
-    """A variable of the FMU; its value reference is its place in the list of all.
-
-    Attributes
-    ----------
-    role
-        `PARAMETER` to `SAMPLES`.
-    kind
-        ``Real`` or ``Integer``.
-    data_type
-        The interface's number.
-    offset
-        In the structure or array it lies in [bytes].
-    local
-        Whether it is no output, though it is one of the DLL or the circuit: phase quantities never stand still.
-    """
+    """A variable of the FMU; its value reference is its place in the list of all."""
 
     name: str
-    role: int
-    kind: str
-    data_type: int
-    offset: int
+    role: int  # `PARAMETER` to `SAMPLES`
+    kind: str  # ``Real`` or ``Integer``
+    data_type: int  # the interface's number
+    offset: int  # in the structure or array it lies in [bytes]
     start: float = 0.0
     unit: str = ""
     text: str = ""
     parameter: DllParameter | Parameter | None = None
     declared: Variable | None = None
+    # whether it is no output, though it is one of the DLL or the circuit: phase quantities never stand still.
     local: bool = False
 
     @property
@@ -148,13 +135,7 @@ def _numbers(rows: Sequence[DllParameter] | Sequence[Signal]) -> list[Place]:
 
 
 def _variable(
-    place: Place,
-    name: str,
-    role: int,
-    *,
-    start: float = 0.0,
-    text: str = "",
-    parameter: DllParameter | None = None,
+    place: Place, name: str, role: int, *, start: float = 0.0, text: str = "", parameter: DllParameter | None = None
 ) -> HostVariable:
     row = place.row
     text = text or row.description

@@ -14,40 +14,26 @@ from typing import Any
 from fmus.vendor_dll.interface import DllInterface, DllParameter, Layout, Signal, layout
 from fmus.vendor_dll.memory import Library, Region
 
-_SAMPLES = 200
-"""In each of the runs."""
-
-_LARGEST = (1.5, 0.6)
-"""Of the inputs' waves; the second where the DLL refuses the first with an error."""
-
-_MODEST = (1e-12, 1e12)
-"""A word is taken for a number where its magnitude is zero or between these at all times."""
+_SAMPLES = 200  # in each of the runs
+_LARGEST = (1.5, 0.6)  # of the inputs' waves; the second where the DLL refuses the first with an error
+_MODEST = (1e-12, 1e12)  # A word is taken for a number where its magnitude is zero or between these at all times
 
 
 @dataclass(frozen=True)
 class Trial:
-    """How a DLL keeps its state.
+    """How a DLL keeps its state."""
 
-    Attributes
-    ----------
-    state
-        ``arrays``: in the host's arrays alone; ``library``: also in variables of its own, in the library's memory;
-        ``hidden``: neither brings it back; ``not tried``.
-    doubles, floats
-        Places of numbers in the library's memory that move in a run, from where the library was loaded [bytes].
-    regions
-        Start and size of each stretch of the library's memory that belongs to the state [bytes].
-    why
-        Reason in words where nothing was tried.
-    passing
-        That reason lies in this machine at this time, so that the DLL is tried again at the next call.
-    """
-
+    # ``arrays``: in the host's arrays alone; ``library``: also in variables of its own, in the library's memory;
+    # ``hidden``: neither brings it back; ``not tried``.
     state: str
+    # doubles, floats: places of numbers in the library's memory that move in a run, from where the library was loaded
+    # [bytes].
     doubles: tuple[int, ...] = ()
     floats: tuple[int, ...] = ()
+    # start and size of each stretch of the library's memory that belongs to the state [bytes].
     regions: tuple[tuple[int, int], ...] = ()
-    why: str = ""
+    why: str = ""  # reason in words where nothing was tried
+    # that reason lies in this machine at this time, so that the DLL is tried again at the next call.
     passing: bool = False
 
     def as_json(self) -> dict[str, Any]:

@@ -18,12 +18,8 @@ def _values(interface: DllInterface, texts: Mapping[str, str]) -> dict[str, str]
 def places(interface: DllInterface, texts: Mapping[str, str], library: Path, folder: Path) -> dict[str, Path]:
     """Where files would lie that text parameters name.
 
-    Parameters
-    ----------
-    texts
-        Values that somebody gave, absolute or from ``folder`` on.
-    library
-        The DLL, whose own defaults name files in its folder only: it must not choose what it may read.
+    ``texts``: Values that somebody gave, absolute or from ``folder`` on.
+    ``library``: The DLL, whose own defaults name files in its folder only: it must not choose what it may read.
     """
     found = {}
     for name, value in _values(interface, texts).items():

@@ -31,8 +31,7 @@ from orchestrator.fmi.refusal import FATAL, check_log, refusal
 from orchestrator.fmi.remote_calls import RemoteCalls
 
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
-_LOOK = 0.05
-"""Time [s] after which it is looked whether the process is still there."""
+_LOOK = 0.05  # time [s] after which it is looked whether the process is still there
 
 
 class ProcessEndedError(Exception):
@@ -46,12 +45,8 @@ class ProcessEndedError(Exception):
 class FmuProcess:
     """A process with instances of one FMU.
 
-    Attributes
-    ----------
-    deadline
-        `time.monotonic` after which no answer is waited for.
-    protections
-        What keeps it from the rest of the machine.
+    ``deadline``: `time.monotonic` after which no answer is waited for.
+    ``protections``: What keeps it from the rest of the machine.
     """
 
     def __init__(self, description: FmuDescription, directory: Path, limits: Limits) -> None:
@@ -109,24 +104,14 @@ class FmuProcess:
     ) -> tuple[int, int, int, Numbers]:  # fmt: skip
         """Set inputs, step and read, as often as asked.
 
-        Parameters
-        ----------
-        into, out
-            Value references that are set before a step, and read after it.
-        rows
-            Their values, shape (n, len(into)): one row a step, and none for the steps after the last row.
-        steps
-            How many; with 0 the first row is set and one row read, without a step.
-        time
-            At which the first step starts [s].
-        step_size
-            Communication step [s].
+        ``into``, ``out``: Value references that are set before a step, and read after it.
+        ``rows``: Their values, shape (n, len(into)): one row a step, and none for the steps after the last row.
+        ``steps``: How many; with 0 the first row is set and one row read, without a step.
+        ``time``: At which the first step starts [s].
+        ``step_size``: Communication step [s].
 
-        Returns
-        -------
-        status, stage, done, values
-            Of the call that was refused, or 0 or 1; what that call is; how many steps were finished; what was read,
-            shape (steps, len(out)), or one row without a step.
+        Returns of the call that was refused, or 0 or 1; what that call is; how many steps were finished; what was read,
+        shape (steps, len(out)), or one row without a step.
         """
         if self._ended is not None:
             raise self._ended
@@ -279,18 +264,11 @@ class HostedComponent(RemoteCalls, Derived):
     def run(self, into: RealBatch, rows: Numbers, out: RealBatch, steps: int, time: float, step_size: float) -> Numbers:
         """Step several times; rows of inputs before each, what was read after each.
 
-        Parameters
-        ----------
-        into, out
-            Variables that are set before a step, and read after it.
-        rows
-            Values of the inputs, shape (n, inputs): one row a step; after the last row they stay.
-        steps
-            How many; with 0 the first row is set and one row read, without a step.
-        time
-            At which the first step starts [s].
-        step_size
-            Communication step [s].
+        ``into`` and ``out``: variables that are set before a step, and read after it.
+        ``rows``: values of the inputs, shape (n, inputs): one row a step; after the last row they stay.
+        ``steps``: how many; with 0 the first row is set and one row read, without a step.
+        ``time``: at which the first step starts [s].
+        ``step_size``: communication step [s].
         """
         status, stage, done, values = self._process.run(
             self.number, _references(into), rows, _references(out), steps, time, step_size

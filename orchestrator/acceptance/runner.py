@@ -29,6 +29,7 @@ from orchestrator.acceptance.checks.running import RUN_FOR
 from orchestrator.acceptance.checks.subject import Subject, Use
 from orchestrator.acceptance.process import FmuProcess, ProcessEndedError
 from orchestrator.binding.binding import bind, read_table
+from orchestrator.binding.misfits import likely_cause
 from orchestrator.errors import (
     BindingError,
     ComponentError,
@@ -48,33 +49,19 @@ from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.protection import Protection, missing
 from orchestrator.safe_files import file_hash
 
-CRASH, _LAST = "crash", 3
-"""Fault of a process that dies; how many checks before it are named."""
-
-_PATIENCE = 10
-"""A check may take this many times the limit for one call."""
+CRASH, _LAST = "crash", 3  # fault of a process that dies; how many checks before it are named
+_PATIENCE = 10  # A check may take this many times the limit for one call
 
 
 @dataclass
 class AcceptanceReport:
-    """What all checks found.
-
-    Attributes
-    ----------
-    protections
-        What kept the FMU's process from the rest of the machine; empty where it was not started.
-    used_as
-        Component, scenario and operating point of the case, in words.
-    seed
-        Of the dips, jumps and operating points that were drawn at random.
-    """
-
     fmu: Path
     binding: Path | None
     results: list[CheckResult] = field(default_factory=list)
+    # what kept the FMU's process from the rest of the machine; empty where it was not started
     protections: tuple[Protection, ...] = ()
-    used_as: str = ""
-    seed: int = 0
+    used_as: str = ""  # component, scenario and operating point of the case, in words
+    seed: int = 0  # of the dips, jumps and operating points that were drawn at random
 
     @property
     def failures(self) -> list[CheckResult]:
@@ -146,23 +133,14 @@ def check_fmu(
 ) -> AcceptanceReport:
     """Run the acceptance tests.
 
-    Parameters
-    ----------
-    limits
-        What the FMU may take; the usual limits where None.
-    only
-        Names of checks; all of them where empty.
-    run_for
-        Wall-clock time for which it is made to run [s].
-    use
-        Step, operating point and values with which it is used; what the file declares where None.
-    seed
-        Of what is drawn at random; from the file's own bytes where None, so that its author cannot know it before.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or no such check, or the binding is not TOML, not of its form or not filled in.
+    ``limits``: what the FMU may take; the usual limits where None.
+    ``only``: names of checks; all of them where empty.
+    ``run_for``: wall-clock time for which it is made to run [s].
+    ``use``: step, operating point and values with which it is used; what the file declares where None.
+    ``seed``: of what is drawn at random; from the file's own bytes where None, so that its author cannot know it
+    before.
+    Raises an `InputError` if there is no such file or no such check, or the binding is not TOML, not of its form or not
+    filled in.
     """
     unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
     if unknown:
@@ -270,6 +248,8 @@ class _Runner:
         for place, name in enumerate(names):
             self._deadline = monotonic() + _PATIENCE * crowded() * self._limits.seconds
             result = self._answer(CHECKS[name])
+            if cause := likely_cause(self._subject.description, result.fault):
+                result = replace(result, evidence=f"{result.evidence}; {cause}")
             results.append(self._with_whom(result))
             self._asked.append(name)
             if name == "runs" and (because := self._too_bad(result)):

@@ -20,8 +20,7 @@ from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.mailbox import DIED, Served
 from orchestrator.fmi.port import BoundDescription, PortMap, without_binding
 
-_MOST = 256
-"""Instances at the same time."""
+_MOST = 256  # instances at the same time
 
 
 class Host(Worker):

@@ -16,9 +16,7 @@ from orchestrator.arrays import Matrix, Vector
 WIDTH = 16
 """Vectors at once. An eigenvalue that is there as often as that or more may be there more often than it was found."""
 
-MOST = 640
-"""Largest number of vectors; 48,000 states take 0.5 GB for them."""
-
+MOST = 640  # largest number of vectors; 48,000 states take 0.5 GB for them
 TOLERANCE = 1e-7
 """Of ν: the part that the rest may be of what is found. Left and right vectors together give ν to the square of it."""
 
@@ -29,28 +27,18 @@ to half their distance from the limit."""
 _GROWTH = 1.25
 """Values are looked at where the vectors have become more by this factor; there are many operations in it."""
 
-_DEPENDENT = 1e-12
-"""A direction that is smaller than this part of the largest one is none."""
-
-_AGAIN = 1e-2
-"""Where what is new of the vectors is less than this part of them, it is made orthogonal twice."""
-
-_EQUAL = 1e-6
-"""Values of ν that differ by less than this part are one."""
+_DEPENDENT = 1e-12  # A direction that is smaller than this part of the largest one is none
+_AGAIN = 1e-2  # where what is new of the vectors is less than this part of them, it is made orthogonal twice
+_EQUAL = 1e-6  # values of ν that differ by less than this part are one
 
 
 class BlockArnoldi:
     """The eigenvalues ν of largest size of an operator, and vectors, from a space that grows.
 
-    Parameters
-    ----------
-    apply
-        The operator, for complex vectors as columns, shape (n, k).
+    ``apply``: The operator, for complex vectors as columns, shape (n, k).
 
-    Attributes
-    ----------
-    values, accuracy
-        Approximations of the eigenvalues, largest first; and how large what they leave over is, as a part of each.
+    ``values``, ``accuracy``: Approximations of the eigenvalues, largest first; and how large what they leave over is,
+    as a part of each.
     """
 
     def __init__(self, apply: Callable[[Vector], Vector], size: int, most: int = MOST) -> None:

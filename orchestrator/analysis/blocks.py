@@ -29,35 +29,21 @@ inputs of a large phasor network."""
 class Blocks:
     """Linearised components with their wiring.
 
-    Parameters
-    ----------
-    master
-        A running system at its operating point. It is left as it was.
-    step_size
-        Communication step to linearise over [s]; by default the master's own. Components that know the step are
-        given this one meanwhile.
-    inputs, outputs
-        Names ``component.variable`` of the inputs and outputs of `state_space`: tunable parameters or open inputs, and
-        any outputs.
-    derivatives
-        Difference the FMUs' own derivatives as well, which `continuous_model` needs. This is not done if a component
-        knows the step, because blocks for a step map cannot serve a continuous model then.
-    without_step
-        For `continuous`: components that know the step are given 0 meanwhile.
-    directional
-        Take the FMUs' own directional derivatives instead of perturbing them.
-    known
-        Components whose linear model is known already, such as an identified one; they are not perturbed.
-    schedule
-        That the step maps will be composed for; the master's by default. Where its inputs follow straight lines,
-        components are linearised over a part of the step, and not told the step.
+    ``master``: A running system at its operating point. It is left as it was.
+    ``step_size``: Communication step to linearise over [s]; by default the master's own. Components that know the step
+    are given this one meanwhile.
+    ``inputs``, ``outputs``: Names ``component.variable`` of the inputs and outputs of `state_space`: tunable parameters
+    or open inputs, and any outputs.
+    ``derivatives``: Difference the FMUs' own derivatives as well, which `continuous_model` needs. This is not done if a
+    component knows the step, because blocks for a step map cannot serve a continuous model then.
+    ``without_step``: For `continuous`: components that know the step are given 0 meanwhile.
+    ``directional``: Take the FMUs' own directional derivatives instead of perturbing them.
+    ``known``: Components whose linear model is known already, such as an identified one; they are not perturbed.
+    ``schedule``: That the step maps will be composed for; the master's by default. Where its inputs follow straight
+    lines, components are linearised over a part of the step, and not told the step.
 
-    Attributes
-    ----------
-    period
-        Communication steps after which the system repeats; 1 where each step is like every other.
-    declared
-        By component and output: the inputs that its FMU says it depends on directly.
+    ``period``: Communication steps after which the system repeats; 1 where each step is like every other.
+    ``declared``: By component and output: the inputs that its FMU says it depends on directly.
     """
 
     def __init__(
@@ -231,12 +217,8 @@ def linearize_within(
 ) -> ComponentLinearization:
     """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step.
 
-    Parameters
-    ----------
-    master
-        At the operating point; it is left as it was.
-    step_size
-        Communication step to linearise over [s].
+    ``master``: at the operating point; it is left as it was.
+    ``step_size``: communication step to linearise over [s].
     """
     exchange, time = master.exchanges[name], master.time
     with other_step(master, name, 0.0 if without_step else step_size):

@@ -32,53 +32,36 @@ class StepMap(NamedTuple):
 
 @dataclass(frozen=True)
 class ComponentLinearization:
-    """x⁺ = A·x + B·u over one communication step with u held, y = C·x + D·u; and ẋ = A_c·x + B_c·u.
-
-    Attributes
-    ----------
-    states, inputs, outputs
-        Names. The connected inputs and outputs come first, then the requested inputs.
-    A, B, C, D
-        Of the step map, shapes (n, n), (n, m), (p, n), (p, m).
-    observed
-        Names of the requested outputs.
-    C_o, D_o
-        Rows of C and D for the requested outputs, shapes (q, n), (q, m).
-    A_c, B_c
-        A and B of the continuous model, from the FMU's own derivatives; None if the FMU declares no derivatives or they
-        were not requested.
-    disagreement
-        Largest difference of an element of A, B, C or D between the two perturbation sizes.
-    source
-        Origin of the model: ``perturbed``, ``directional``, ``packed`` or ``identified``.
-    variants
-        The same matrices, computed in other ways, which should hardly differ: with the other perturbation size, and
-        with a perturbation to one side only. Where some columns have a smaller size, also with twice the usual size.
-        Empty for a model that was not perturbed.
-    narrow
-        Size of the perturbation, relative to max(1, |value|), by the name of each state or input that needed a smaller
-        size than usual.
-    doubtful
-        States and inputs for which no two sizes agreed, or whose differences upwards and downwards deviate.
-    """
+    """x⁺ = A·x + B·u over one communication step with u held, y = C·x + D·u; and ẋ = A_c·x + B_c·u."""
 
     name: str
+    # states, inputs, outputs: Names. The connected inputs and outputs come first, then the requested inputs.
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    # A, B, C, D: of the step map, shapes (n, n), (n, m), (p, n), (p, m)
     A: Matrix
     B: Matrix
     C: Matrix
     D: Matrix
-    observed: tuple[str, ...]
+    observed: tuple[str, ...]  # names of the requested outputs
+    # C_o, D_o: rows of C and D for the requested outputs, shapes (q, n), (q, m)
     C_o: Matrix
     D_o: Matrix
+    # A_c, B_c: a and B of the continuous model, from the FMU's own derivatives; None if the FMU declares no derivatives
+    # or they were not requested
     A_c: Matrix | None
     B_c: Matrix | None
-    disagreement: float
-    source: str = PERTURBED
+    disagreement: float  # largest difference of an element of A, B, C or D between the two perturbation sizes
+    source: str = PERTURBED  # origin of the model: ``perturbed``, ``directional``, ``packed`` or ``identified``
+    # The same matrices, computed in other ways, which should hardly differ: with the other perturbation size, and with
+    # a perturbation to one side only. Where some columns have a smaller size, also with twice the usual size. Empty for
+    # a model that was not perturbed.
     variants: tuple[StepMap, ...] = ()
+    # size of the perturbation, relative to max(1, |value|), by the name of each state or input that needed a smaller
+    # size than usual
     narrow: Mapping[str, float] = field(default_factory=dict)
+    # states and inputs for which no two sizes agreed, or whose differences upwards and downwards deviate
     doubtful: tuple[str, ...] = ()
 
 
@@ -96,18 +79,11 @@ def linearize_component(
 
     Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
 
-    Parameters
-    ----------
-    time
-        Of the operating point [s].
-    step_size
-        Communication step to linearise over [s].
-    inputs, observed
-        Tunable parameters or open inputs, and outputs, in addition to the connected ones.
-    derivatives
-        Also difference the FMU's own derivatives, if it declares them; it costs a third more.
-    idle
-        Connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0.
+    ``time``: of the operating point [s].
+    ``step_size``: communication step to linearise over [s].
+    ``inputs`` and ``observed``: tunable parameters or open inputs, and outputs, in addition to the connected ones.
+    ``derivatives``: also difference the FMU's own derivatives, if it declares them; it costs a third more.
+    ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0.
     """
     component = exchange.component
     StateAccess(component)  # refuses a component that can neither be perturbed nor has a model inside

@@ -14,17 +14,10 @@ from orchestrator.analysis.similarity import similarity
 from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
-_SAME = 0.6
-"""Least similarity with which two modes of neighbouring models count as the same mode."""
-
-_SHORTEST = 1 / 64
-"""Length of the shortest stride, as a part of the path."""
-
+_SAME = 0.6  # least similarity with which two modes of neighbouring models count as the same mode
+_SHORTEST = 1 / 64  # length of the shortest stride, as a part of the path
 _NEIGHBOURS = 8
-
-_LITTLE = 0.3
-"""A mode of which less is in the states that are looked at is not recognised by them."""
-
+_LITTLE = 0.3  # A mode of which less is in the states that are looked at is not recognised by them
 _DEFECTIVE = 1e-12
 """Below this lᴴ·r is rounding: equal stages side by side share one eigenvector, and such a mode is like no other."""
 
@@ -79,17 +72,8 @@ def pair_at(model: LinearModel, eigenvalue: complex) -> Eigenpair:
 
 @dataclass(frozen=True)
 class Strides:
-    """How a path is walked.
-
-    Attributes
-    ----------
-    same
-        Least similarity with which a mode is taken for the same.
-    rival
-        Largest similarity that another one may have beside it. Near a double eigenvalue everything is like both.
-    """
-
-    same: float = _SAME
+    same: float = _SAME  # least similarity with which a mode is taken for the same
+    # Largest similarity that another one may have beside it. Near a double eigenvalue everything is like both.
     rival: float = np.inf
     shortest: float = _SHORTEST
 
@@ -110,14 +94,10 @@ def follow_along(
 ) -> Eigenpair:
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
-    Parameters
-    ----------
-    start
-        The mode at ``begin``.
-    begin, end
-        Ends of the path; the end may be the smaller one.
-    common
-        States by which modes are recognised, where not all models have the same; the start's vectors hold these alone.
+    ``start``: the mode at ``begin``.
+    ``begin`` and ``end``: ends of the path; the end may be the smaller one.
+    ``common``: states by which modes are recognised, where not all models have the same; the start's vectors hold these
+    alone.
     """
     shortest = abs(end - begin) * strides.shortest
     here, pair, stride = begin, start, end - begin

@@ -42,9 +42,7 @@ _SECONDS, _WALL, _LEAST, _SHORT = 5.0, 8.0, 0.1, 1.0
 _SAMPLE, _WINDOWS = 5e-3, 10
 """Time between compared points [s], and windows in which errors are taken relative to the response."""
 
-_DENSE = 500
-"""Up to this number of states, a power of the step map costs less than single steps."""
-
+_DENSE = 500  # up to this number of states, a power of the step map costs less than single steps
 _STANDS, _MOVES = 1e-10, 1e-7
 """A state stands still if its elements of the step map differ from those of a constant by less than the first figure,
 which is rounding. It should move if its declared derivatives, times the step, exceed the second figure."""
@@ -52,27 +50,13 @@ which is rounding. It should move if its declared derivatives, times the step, e
 
 @dataclass(frozen=True)
 class Disagreement:
-    """The largest difference of the FMUs' response from that of the linear model.
+    """The largest difference of the FMUs' response from that of the linear model."""
 
-    Attributes
-    ----------
-    state
-        Name ``component.state``.
-    time
-        After the disturbance [s].
-    error
-        Relative to the response's size at that time.
-    seconds
-        How long the response was followed [s].
-    size
-        Of the disturbance, one of `SIZES`.
-    """
-
-    state: str
-    time: float
-    error: float
-    seconds: float
-    size: float
+    state: str  # name ``component.state``
+    time: float  # after the disturbance [s]
+    error: float  # relative to the response's size at that time
+    seconds: float  # how long the response was followed [s]
+    size: float  # of the disturbance, one of `SIZES`
 
 
 def foreign_components(master: Master) -> list[str]:
@@ -88,14 +72,9 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
     """The verdict on a system, or "not known" if the linear model calls it stable and the response of a foreign FMU
     differs.
 
-    Parameters
-    ----------
-    master
-        The running system at the model's operating point; it is restored.
-    model
-        The step map composed of the blocks.
-    stability
-        The verdict on ``model``.
+    ``master``: the running system at the model's operating point; it is restored.
+    ``model``: the step map composed of the blocks.
+    ``stability``: the verdict on ``model``.
     """
     if not stability.stable:
         return stability

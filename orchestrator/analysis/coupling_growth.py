@@ -19,17 +19,10 @@ from orchestrator.coupling.master import Master
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.instance import open_component
 
-_STEPS = 20
-"""Communication steps of a response: what grows as below does not ask for what came before them."""
-
-_GROWS = 1.1
-"""Factor in a communication step: what grows less is left to the run, where it can be seen growing."""
-
-_MOVED = 1e-3
-"""By how much an input is moved, of 1 or of its value."""
-
-_TURNS, _LATE = 300, 100
-"""Steps of the linear model, and those at the end over which growth is measured."""
+_STEPS = 20  # communication steps of a response: what grows as below does not ask for what came before them
+_GROWS = 1.1  # factor in a communication step: what grows less is left to the run, where it can be seen growing
+_MOVED = 1e-3  # by how much an input is moved, of 1 or of its value
+_TURNS, _LATE = 300, 100  # steps of the linear model, and those at the end over which growth is measured
 
 
 def coupling_growth(master: Master, boxes: Sequence[str]) -> list[str]:

@@ -29,9 +29,7 @@ from orchestrator.analysis.threads import one_thread
 from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
-DENSE = 200
-"""Up to this number of states, the full spectrum is cheaper."""
-
+DENSE = 200  # up to this number of states, the full spectrum is cheaper
 _STRETCH = 1.35
 """The range is first cut into stretches whose ends have this ratio: the region is a wedge, so discs grow upwards."""
 
@@ -63,11 +61,8 @@ _BESIDE = 1e-7
 """An eigenvalue nearer to the point than this part of it drowns the others' digits: 1e-11 rad/s away they were off by
 6e-7 rad/s, on it by 1.5e-3. The point moves then."""
 
-_SMALLEST = 1e-4
-"""Smallest size of a cell of the region, relative to its distance from 0."""
-
-_UNSTABLE_MARGIN = 0.1
-"""How far into instability the region reaches: to this negative damping ratio."""
+_SMALLEST = 1e-4  # smallest size of a cell of the region, relative to its distance from 0
+_UNSTABLE_MARGIN = 0.1  # how far into instability the region reaches: to this negative damping ratio
 
 
 def find_critical_modes(
@@ -78,14 +73,10 @@ def find_critical_modes(
 ) -> list[Mode]:
     """Modes of a frequency range with less than a given damping, least damped first.
 
-    Parameters
-    ----------
-    model
-        Step map or continuous matrix, of any size.
-    lowest_hz, highest_hz
-        Range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
-    damping
-        Damping ratio between 0 and 0.9. All modes with less damping are found, down to a damping ratio of −0.1.
+    ``model``: step map or continuous matrix, of any size.
+    ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
+    ``damping``: damping ratio between 0 and 0.9. All modes with less damping are found, down to a damping ratio of
+    −0.1.
     """
     if not (0 < lowest_hz < highest_hz and 0 < damping <= 0.9):
         raise AnalysisError(
@@ -188,12 +179,8 @@ def _searched(model: LinearModel, cell: _Cell) -> "tuple[Search, NDArray[np.comp
 class Search:
     """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``.
 
-    Attributes
-    ----------
-    sigma
-        The point in the plane of A's own eigenvalues.
-    reach
-        Distance from ``sigma`` up to which the last search has found every eigenvalue.
+    ``sigma``: The point in the plane of A's own eigenvalues.
+    ``reach``: Distance from ``sigma`` up to which the last search has found every eigenvalue.
     """
 
     def __init__(self, model: LinearModel, centre: complex) -> None:
@@ -219,12 +206,8 @@ class Search:
     ) -> NDArray[np.complex128] | None:
         """All eigenvalues nearer than ``radius``; None if there are too many. Those that are not wanted may be rough.
 
-        Parameters
-        ----------
-        radius
-            Distance from ``centre`` [rad/s].
-        wanted
-            Whether an eigenvalue λ is looked for.
+        ``radius``: distance from ``centre`` [rad/s].
+        ``wanted``: whether an eigenvalue λ is looked for.
         """
         if self._solver.takes_many:
             self._blocks = BlockArnoldi(self._solver.solve, len(self._model.names))

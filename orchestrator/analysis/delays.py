@@ -21,9 +21,7 @@ ORDER = 24
 """Polynomials of a long delay. In a continuous model the delay is right to 1e-9 of its value where ω·T is below 24 rad,
 in a step map, where a delay is longer than `SHORT` steps, to 3e-4 below 12 rad and to 2e-3 below 24 rad."""
 
-SHORT = 100
-"""Up to so many communication steps a delay is a shift register in the step map."""
-
+SHORT = 100  # up to so many communication steps a delay is a shift register in the step map
 _FLAT = (-1 / 24, 13 / 12, -1 / 24)
 """Weights of three values that follow one another: they undo the loss of fast signals in values that are held over a
 step, up to the fourth power of the frequency."""
@@ -34,21 +32,11 @@ LARGEST_ERROR = 1e-3
 
 @dataclass(frozen=True)
 class WireLink:
-    """A connection that does not simply carry its value, as the linear model has it.
+    """A connection that does not simply carry its value, as the linear model has it."""
 
-    Attributes
-    ----------
-    name
-        ``a.out -> b.in``.
-    delay
-        [s]
-    is_cut
-        Whether nothing of the signal arrives.
-    """
-
-    name: str
-    delay: float
-    is_cut: bool
+    name: str  # ``a.out -> b.in``
+    delay: float  # [s]
+    is_cut: bool  # whether nothing of the signal arrives
 
     @property
     def is_ideal(self) -> bool:
@@ -68,8 +56,7 @@ class DelayLine:
     C: Matrix
     d: float
     C_before: Matrix
-    at_rest: Vector
-    """The states while a constant 1 is carried."""
+    at_rest: Vector  # the states while a constant 1 is carried
 
 
 def links_of(master: Master) -> dict[Endpoint, WireLink]:

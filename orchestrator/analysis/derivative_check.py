@@ -16,9 +16,7 @@ accuracy."""
 AGREES = 1e-4
 """Largest difference of an element from its central difference, relative to it: a hundredth of a point of damping."""
 
-_NEARBY = (1e-7, 1e-9, 1e-11)
-"""Smaller sizes, which are tried if a limit lies within the first ones."""
-
+_NEARBY = (1e-7, 1e-9, 1e-11)  # smaller sizes, which are tried if a limit lies within the first ones
 _BENT, _FITS = 0.1, 0.01
 """A difference quotient that changes by more than the first part depends on the size. A quotient that differs by less
 than the second part confirms the derivative."""
@@ -31,16 +29,10 @@ size of the difference."""
 def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[str], knowns: Sequence[str]) -> None:
     """Compare partial derivatives that an FMU gives with differences of its variables, and put the FMU back.
 
-    Parameters
-    ----------
-    component
-        Lets its states be set, and saves and restores its state.
-    given
-        Shape (unknowns, knowns).
-    unknowns
-        Variables whose derivatives are given, one for each row: rates and outputs.
-    knowns
-        Variables by which the unknowns are differentiated, one for each column: states and inputs.
+    ``component``: lets its states be set, and saves and restores its state.
+    ``given``: shape (unknowns, knowns).
+    ``unknowns``: variables whose derivatives are given, one for each row: rates and outputs.
+    ``knowns``: variables by which the unknowns are differentiated, one for each column: states and inputs.
     """
     one, two = _central_differences(component, unknowns, knowns)
     allowed = AGREES * np.abs(one) + 3 * np.abs(one - two) + _ROUNDING * np.abs(one).max(axis=1, initial=0.0)[:, None]

@@ -2,15 +2,23 @@
 
 from cmath import rect
 from collections.abc import Iterator, Mapping
+from contextlib import closing
+from dataclasses import replace
+from itertools import count
+
+import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.binding.misfits import SHOWN, Misfit, of_current, of_frequency, of_power
+from orchestrator.arrays import Numbers
+from orchestrator.binding.misfits import Misfit, at_rest, likely_cause, of_current, of_frequency, of_power
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CosimError
+from orchestrator.fmi.component import Component
+from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.port import BoundDescription
 
-_AT = 0.01
-"""Distance of the voltage from v_0 up to which the power is to be what the power flow asks for [pu]."""
+_HOLDS = 0.2  # time [s] for which a device is held alone before its omega is read
+_AT = 0.01  # distance of the voltage from v_0 up to which the power is to be what the power flow asks for [pu]
 
 
 def misfits_of(master: Master) -> dict[str, list[Misfit]]:
@@ -18,7 +26,7 @@ def misfits_of(master: Master) -> dict[str, list[Misfit]]:
     found = {}
     for name in master.components:
         try:
-            found[name] = list(_of(master, name))
+            found[name] = [_with_cause(misfit, master.components[name]) for misfit in _of(master, name)]
         except CosimError:
             continue
     return {name: misfits for name, misfits in found.items() if misfits}
@@ -28,14 +36,41 @@ def sentences(found: Mapping[str, list[Misfit]]) -> tuple[str, ...]:
     return tuple(misfit.sentence(name) for name, misfits in found.items() for misfit in misfits)
 
 
+def _with_cause(misfit: Misfit, component: Component) -> Misfit:
+    cause = likely_cause(component.description, misfit.fault)
+    return replace(misfit, evidence=f"{misfit.evidence}; {cause}") if cause else misfit
+
+
+def _omega_alone(master: Master, name: str) -> tuple[float, bool]:
+    """Its omega at rest in a second instance at an ideal bus, as `gfor check` sees it, and whether it has settled."""
+    plan, inputs, h = master.system.components[name], master.exchanges[name].inputs.names, master.clock.step_size
+    with closing(open_component(name, plan.description, isolated=plan.isolated)) as alone:
+        alone.setup(0.0, None)
+        alone.set(plan.parameters)
+        alone.enter_initialization_mode()
+        alone.set({**plan.inputs, **dict(zip(inputs, master.arriving(name).tolist(), strict=True))})
+        alone.exit_initialization_mode()
+        index = count()
+
+        def hold() -> Numbers:
+            omega = np.empty(max(1, round(_HOLDS / h)))
+            for k in range(len(omega)):
+                alone.step(next(index) * h, h)
+                omega[k] = alone.get(["omega"])["omega"]
+            return omega
+
+        return at_rest(hold)
+
+
 def _of(master: Master, name: str) -> Iterator[Misfit]:
     component = master.components[name]
     described = component.description
     if not isinstance(described, BoundDescription):
         return
-    omega = component.get(["omega"])["omega"] if "omega" in described.outputs else 1.0
-    if SHOWN[0] < omega < SHOWN[1] and (misfit := of_frequency(omega, described.port.f_n)):
-        yield misfit
+    if "omega" in described.outputs and of_frequency(component.get(["omega"])["omega"], None):
+        omega, settled = _omega_alone(master, name)
+        if settled and (misfit := of_frequency(omega, described.port.f_n)):
+            yield misfit
     inputs = master.exchanges[name].inputs
     given = dict(zip(inputs.names, inputs.values.tolist(), strict=True))
     start, outputs = component.values(["S_n", "P_0", "Q_0", "v_0", "theta_0"]), component.get(["i_re", "i_im"])

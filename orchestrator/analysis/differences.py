@@ -22,19 +22,13 @@ class Differences(NamedTuple):
 
 @dataclass(frozen=True)
 class PerturbedStep:
-    """One communication step of a component, which begins a little beside its operating point.
-
-    Attributes
-    ----------
-    inputs, exits
-        Names of the inputs that are perturbed after the states, and of the outputs that are read.
-    time, step_size
-        Of the operating point, and the communication step [s].
-    """
+    """One communication step of a component, which begins a little beside its operating point."""
 
     component: Component
+    # inputs, exits: names of the inputs that are perturbed after the states, and of the outputs that are read
     inputs: Sequence[str]
     exits: Sequence[str]
+    # time, step_size: of the operating point, and the communication step [s]
     time: float
     step_size: float
 
@@ -49,14 +43,9 @@ class PerturbedStep:
     def differences(self, varied: Sequence[int], size: float, rates: Sequence[str] = ()) -> Differences:
         """Central differences, one column for each perturbed state or input; the component is put back.
 
-        Parameters
-        ----------
-        varied
-            Places in ``names``.
-        size
-            Of the perturbation, relative to max(1, |value|).
-        rates
-            Names of the states' time derivatives, which are read before the step.
+        ``varied``: places in ``names``.
+        ``size``: of the perturbation, relative to max(1, |value|).
+        ``rates``: names of the states' time derivatives, which are read before the step.
         """
         component, names = self.component, self.names
         z_0 = RealBatch(component, names).read().copy()

@@ -14,8 +14,7 @@ from orchestrator.analysis.shifted_equations import ShiftedEquations
 from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
-GROWING = 2e-3
-"""Eigenvalues to the right of this count as growing [1/s]: what is closer to 0 may be the free angle."""
+GROWING = 2e-3  # eigenvalues to the right of this count as growing [1/s]: what is closer to 0 may be the free angle
 
 _STEP = 0.7
 """Largest change of the logarithm between two points, and from one half of the way to the other. An angle alone could
@@ -25,21 +24,15 @@ _HALVINGS = 40
 """How often the way between two points is halved; a line that is closer to an eigenvalue than that cannot be
 followed."""
 
-_FARTHEST = 1e7
-"""End of the imaginary axis [rad/s]: beyond it no part of a system answers any more."""
-
-_FIRST = 160
-"""Points to begin with, from 1e-3 rad/s to the end."""
+_FARTHEST = 1e7  # end of the imaginary axis [rad/s]: beyond it no part of a system answers any more
+_FIRST = 160  # points to begin with, from 1e-3 rad/s to the end
 
 
 def count_growing(equations: ShiftedEquations, alone: Sequence[complex] | Vector) -> int:
     """Number of eigenvalues to the right of `GROWING`, at any frequency; a pair counts twice.
 
-    Parameters
-    ----------
-    alone
-        All eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
-        determinant is theirs.
+    ``alone``: all eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
+    determinant is theirs.
     """
     poles = np.asarray(alone, dtype=complex)
 

@@ -12,14 +12,9 @@ def eigenvalue_shift(
 ) -> complex:
     """Δλ = lᴴ·(A' − A)·r [rad/s]; of a step map divided by μ·H, as λ = ln μ / H.
 
-    Parameters
-    ----------
-    model, varied
-        With the same states, in the same order: that with the eigenvalue, and the changed one.
-    eigenvalue
-        λ of ``model`` [rad/s].
-    left, right
-        Its eigenvectors, shape (n,), with lᴴ·r = 1.
+    ``model`` and ``varied``: with the same states, in the same order: that with the eigenvalue, and the changed one.
+    ``eigenvalue``: λ of ``model`` [rad/s].
+    ``left`` and ``right``: its eigenvectors, shape (n,), with lᴴ·r = 1.
     """
     change = complex(np.vdot(left, _apply(varied, right) - _apply(model, right)))
     if model.step_size is not None:
@@ -33,12 +28,8 @@ def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> 
     A slow eigenvalue beside the free angle's zero is nearly double: each one alone moves by the root of an error, in
     opposite directions, and their sum by the error itself.
 
-    Parameters
-    ----------
-    model, varied
-        With the same states, in the same order.
-    radius
-        Largest |λ| that counts [rad/s].
+    ``model`` and ``varied``: with the same states, in the same order.
+    ``radius``: largest |λ| that counts [rad/s].
     """
     step, A, changed = model.step_size, model.A, varied.A
 

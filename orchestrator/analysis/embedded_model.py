@@ -9,8 +9,7 @@ from orchestrator.fmi.component import Component
 from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
 from orchestrator.fmi.port import BoundDescription
 
-_TOLERANCE = 1e-6
-"""Largest difference of a variable from the model's operating point, relative to max(1, |value|)."""
+_TOLERANCE = 1e-6  # largest difference of a variable from the model's operating point, relative to max(1, |value|)
 
 
 def embedded_model(component: Component) -> EmbeddedModel | None:

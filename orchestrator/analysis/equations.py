@@ -22,10 +22,7 @@ class Equations:
     def next_state(self, rows: slice, states: slice, A: Matrix, w: Indices, B: Matrix) -> None:
         """Add z⁺[rows] = A·z[states] + B·w[w].
 
-        Parameters
-        ----------
-        states, A
-            On which states they depend, and how; shape (rows, states).
+        ``states`` and ``A``: on which states they depend, and how; shape (rows, states).
         """
         n = self._shapes["F"][0]
         self._add("F", np.arange(n)[rows], np.arange(n)[states], A)
@@ -34,10 +31,7 @@ class Equations:
     def output(self, rows: Indices, states: slice, C: Matrix, w: Indices, D: Matrix) -> None:
         """Add w[rows] = C·z[states] + D·w[w].
 
-        Parameters
-        ----------
-        states, C
-            On which states they depend, and how; shape (rows, states).
+        ``states`` and ``C``: on which states they depend, and how; shape (rows, states).
         """
         self._add("H", rows, np.arange(self._shapes["F"][0])[states], C)
         self._add("K", rows, w, D)

@@ -40,23 +40,15 @@ def examine(
 ) -> Examination:
     """Judge a step map, and look for what would make the verdict wrong; say what it leaves out of the connections.
 
-    Parameters
-    ----------
-    master
-        At the operating point at which the blocks were linearised; it is left as it was.
-    model, system
-        The step map composed of the blocks, and the continuous model; None where a component gives no derivatives.
-    spectrum
-        All eigenvalues of the step map, where they are known already.
-    of_system
-        All eigenvalues of the continuous model, where they are known already.
-    modes
-        Oscillations that must not depend on the perturbation; by default those of the range. If a component is
-        doubtful, all oscillations from 0.1 to 2 Hz are added.
-    shown
-        Modes that must not depend on the communication step; by default the same.
-    frequency_range
-        [Hz]
+    ``master``: at the operating point at which the blocks were linearised; it is left as it was.
+    ``model`` and ``system``: the step map composed of the blocks, and the continuous model; None where a component
+    gives no derivatives.
+    ``spectrum``: all eigenvalues of the step map, where they are known already.
+    ``of_system``: all eigenvalues of the continuous model, where they are known already.
+    ``modes``: oscillations that must not depend on the perturbation; by default those of the range. If a component is
+    doubtful, all oscillations from 0.1 to 2 Hz are added.
+    ``shown``: modes that must not depend on the communication step; by default the same.
+    ``frequency_range``: [Hz]
     """
     if spectrum is None:
         small = len(model.names) <= WHOLE
@@ -105,12 +97,7 @@ def _has_delays(blocks: Blocks, model: LinearModel, modes: Sequence[Mode]) -> bo
 
 
 def _turning(
-    blocks: Blocks,
-    master: Master,
-    model: LinearModel,
-    stability: Stability,
-    found: list[Doubt],
-    rightmost: list[Mode],
+    blocks: Blocks, master: Master, model: LinearModel, stability: Stability, found: list[Doubt], rightmost: list[Mode]
 ) -> list[Doubt]:
     """Doubts that leave the verdict open. If a mode grows, only doubts about this mode count."""
     turning = [doubt for doubt in found if doubt.turns]

@@ -10,8 +10,7 @@ from typing import NamedTuple
 from orchestrator.coupling.master import Master
 
 _NEEDED, _HELD, _VOLTAGE, _FIELD = "exciter.E_fd_0", "exciter.v_t_0", "v_t", "exciter.E_fd"
-_APART = 1e-4
-"""Difference that is said [pu]."""
+_APART = 1e-4  # difference that is said [pu]
 
 
 class _Outside(NamedTuple):

@@ -21,20 +21,11 @@ from orchestrator.errors import AnalysisError
 SLOWEST = 2 * np.pi * 1e-3
 """Smallest eigenvalue that is looked for [rad/s]: smaller ones grow by less than a hundredth in a second."""
 
-FASTEST = 2 * np.pi * 1e5
-"""Largest eigenvalue of a continuous model that is looked for [rad/s]."""
-
-_RING = 1.6
-"""Ratio of the radii of a ring."""
-
-_AT_A_TIME = (20, 80)
-"""Numbers of eigenvalues to find around one point: the first number and the largest one."""
-
-_STANDS_OUT = 1.1
-"""Multipliers of a step map beyond this size are found as the largest ones."""
-
-_THINNEST = 1e-3
-"""Smallest size of a sector, relative to its radius."""
+FASTEST = 2 * np.pi * 1e5  # largest eigenvalue of a continuous model that is looked for [rad/s]
+_RING = 1.6  # ratio of the radii of a ring
+_AT_A_TIME = (20, 80)  # numbers of eigenvalues to find around one point: the first number and the largest one
+_STANDS_OUT = 1.1  # multipliers of a step map beyond this size are found as the largest ones
+_THINNEST = 1e-3  # smallest size of a sector, relative to its radius
 
 
 @dataclass(frozen=True)

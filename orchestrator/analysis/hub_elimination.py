@@ -21,12 +21,8 @@ from numpy.typing import NDArray
 
 from orchestrator.arrays import Matrix, Vector
 
-BUSY = 100
-"""An equation with more unknowns than this belongs to the hub."""
-
-LEAST_HUB = 200
-"""Models with a smaller hub keep the sparse factorisation of the whole, and with it their last digits."""
-
+BUSY = 100  # an equation with more unknowns than this belongs to the hub
+LEAST_HUB = 200  # models with a smaller hub keep the sparse factorisation of the whole, and with it their last digits
 _ACCURATE = 1e-9
 """Largest part of a right side that a solution may leave over. Otherwise σ is too close to an eigenvalue of a block,
 and the whole is factorised instead."""
@@ -36,19 +32,12 @@ Places = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class HubEquations:
-    """The equations of a linear model without σ, in their parts, and what does not depend on σ.
+    """The equations of a linear model without σ, in their parts, and what does not depend on σ."""
 
-    Attributes
-    ----------
-    whole
-        The equations z⁺ − F·z − G·w = 0, w − H·z − K·w = 0 with turned signs, shape (n + m, n + m), where m counts only
-        what somebody takes.
-    states
-        Number n of states, which come first.
-    """
-
+    # the equations z⁺ − F·z − G·w = 0, w − H·z − K·w = 0 with turned signs, shape (n + m, n + m), where m counts only
+    # what somebody takes
     whole: sp.csr_array
-    states: int
+    states: int  # number n of states, which come first
     hub: Places
     rest: Places
 

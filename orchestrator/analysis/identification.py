@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.errors import AnalysisError
 
-TOLERANCE = 1e-6
-"""Singular values below this fraction of the largest are taken for noise."""
-
+TOLERANCE = 1e-6  # singular values below this fraction of the largest are taken for noise
 _MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
 _LARGEST_EXPONENT = 300.0
 """Largest exponent of e within the window. A larger exponent is not a signal, and its square exceeds the range of
@@ -23,17 +21,11 @@ numbers."""
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedMode:
-    """One component A·e^{λt} of a signal: λ [rad/s], and |A| at the window's start [unit of the signal].
-
-    Attributes
-    ----------
-    doubts
-        Why it may be no mode of the system, where that was asked; see `mode_doubts`.
-    """
+    """One component A·e^{λt} of a signal: λ [rad/s], and |A| at the window's start [unit of the signal]."""
 
     eigenvalue: complex
     amplitude: float
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # why it may be no mode of the system, where that was asked; see `mode_doubts`
 
     @property
     def frequency_hz(self) -> float:
@@ -56,14 +48,9 @@ def identify_modes(
 ) -> list[IdentifiedMode]:
     """Write a signal as a sum of damped exponentials.
 
-    Parameters
-    ----------
-    times, signal
-        Shape (n,); equally spaced samples of a free response, [s] and any unit.
-    tolerance
-        Singular values below this fraction of the largest are taken for noise.
-    highest_hz
-        The signal is thinned to ten samples per period of this frequency.
+    ``times`` and ``signal``: shape (n,); equally spaced samples of a free response, [s] and any unit.
+    ``tolerance``: singular values below this fraction of the largest are taken for noise.
+    ``highest_hz``: the signal is thinned to ten samples per period of this frequency.
     """
     used = sampling(times, highest_hz)
     thin, interval = used.thin, used.interval
@@ -91,22 +78,12 @@ def identify_modes(
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
-    """The samples that `identify_modes` uses of a record.
+    """The samples that `identify_modes` uses of a record."""
 
-    Attributes
-    ----------
-    recorded
-        Time between two samples of the record [s].
-    thin
-        Every so many of them are used.
-    finest
-        Time between two samples from which on they are thinned, however short the record [s].
-    """
-
-    recorded: float
-    thin: int
+    recorded: float  # time between two samples of the record [s]
+    thin: int  # every so many of them are used
     number: int
-    finest: float
+    finest: float  # time between two samples from which on they are thinned, however short the record [s]
 
     @property
     def interval(self) -> float:

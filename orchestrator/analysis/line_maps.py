@@ -16,11 +16,9 @@ def line_model(blocks: Blocks, schedule: Schedule) -> LinearModel:
     In w stand all outputs at the step's beginning, those at its end, those on the extrapolated lines' ends, and the
     external inputs, which are held.
 
-    Raises
-    ------
-    AnalysisError
-        If direct feed-through closes a loop; if an output depends on an input of which its FMU says that it does not,
-        as such an output is not read again after the step; or if a connection does more than carry its value.
+    Raises an `AnalysisError` if direct feed-through closes a loop; if an output depends on an input of which its FMU
+    says that it does not, as such an output is not read again after the step; or if a connection does more than carry
+    its value.
     """
     if blocks.links:
         disturbed = ", ".join(link.name for link in blocks.links.values())

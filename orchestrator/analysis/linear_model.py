@@ -19,8 +19,7 @@ from orchestrator.analysis.hub_elimination import HubEquations, hub_equations
 from orchestrator.arrays import Matrix, Vector
 
 HELD = " (held)"
-DELAYED = " (delayed"
-"""In the name of a state that stands for what is on its way over a connection."""
+DELAYED = " (delayed"  # in the name of a state that stands for what is on its way over a connection
 
 LEAST_IN_BLOCKS = 4_000
 """Models with fewer states are searched with one vector at a time, and keep the last digits of their modes."""
@@ -32,62 +31,40 @@ in the FMU's file, or a model fitted to measurements at its inputs and outputs."
 
 @dataclass(frozen=True)
 class ShiftedSolver:
-    """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``.
-
-    Attributes
-    ----------
-    takes_many
-        Whether both take many vectors as columns, and take hardly longer for them than for one.
-    """
+    """Solves (A − σI)·x = b with ``solve`` and (A − σI)ᴴ·x = b with ``solve_adjoint``."""
 
     solve: Callable[[Vector], Vector]
     solve_adjoint: Callable[[Vector], Vector]
-    takes_many: bool = False
+    takes_many: bool = False  # whether both take many vectors as columns, and take hardly longer for them than for one
 
 
 @dataclass(frozen=True)
 class LinearModel:
-    """z⁺ = A·z around an operating point.
+    """z⁺ = A·z around an operating point."""
 
-    Attributes
-    ----------
-    F, G, H, K
-        Sparse matrices, shapes (n, n), (n, m), (m, n), (m, m); I − K is regular.
-    names
-        ``component.state`` for states, ``component.output (held)`` for what the exchange remembers and
-        ``a.out -> b.in (delayed k)`` for what is on its way over a connection; length n.
-    step_size
-        Communication step [s]; None for a continuous model, whose A is in 1/s.
-    disagreement
-        Largest difference between the two perturbation sizes, in elements of the components' matrices.
-    period
-        Communication steps over which the map's power is that of the system; more than 1 with sampled controllers.
-    """
-
+    # F, G, H, K: sparse matrices, shapes (n, n), (n, m), (m, n), (m, m); I − K is regular
     F: sp.csr_array
     G: sp.csr_array
     H: sp.csr_array
     K: sp.csr_array
+    # ``component.state`` for states, ``component.output (held)`` for what the exchange remembers and ``a.out -> b.in
+    # (delayed k)`` for what is on its way over a connection; length n
     names: tuple[str, ...]
-    step_size: float | None
+    step_size: float | None  # communication step [s]; None for a continuous model, whose A is in 1/s
+    # largest difference between the two perturbation sizes, in elements of the components' matrices
     disagreement: float
     sources: Mapping[str, str] = field(default_factory=dict)
+    # communication steps over which the map's power is that of the system; more than 1 with sampled controllers
     period: int = 1
 
     @classmethod
     def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:
         """The model of one matrix, without outputs that travel between components.
 
-        Parameters
-        ----------
-        A
-            Shape (n, n); in 1/s for a continuous model.
-        names
-            Of the states, length n.
-        step_size
-            Communication step [s]; None for a continuous model.
-        disagreement
-            As in `LinearModel`.
+        ``A``: shape (n, n); in 1/s for a continuous model.
+        ``names``: of the states, length n.
+        ``step_size``: communication step [s]; None for a continuous model.
+        ``disagreement``: as in `LinearModel`.
         """
         n = len(A)
         G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))

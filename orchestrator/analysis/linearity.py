@@ -23,11 +23,8 @@ LARGEST_SHIFT = 1e-3
 """Shift of a mode from which a doubt is reported, as a part of |λ|: a tenth of a point of damping. In smooth systems,
 up to the IEEE 118-bus system, the shift is at most 1.5e-4."""
 
-_SLOWEST = 0.5
-"""The shift of a mode slower than this [rad/s] is divided by this figure instead of |λ|."""
-
-_DENSE = 1000
-"""Most states of a model whose slowest eigenvalues are told apart from the free angle by a Schur form."""
+_SLOWEST = 0.5  # the shift of a mode slower than this [rad/s] is divided by this figure instead of |λ|
+_DENSE = 1000  # most states of a model whose slowest eigenvalues are told apart from the free angle by a Schur form
 
 _WHY = (
     "a perturbation of twice the size has another effect per unit: look for noise in it, a coarse tolerance of its "
@@ -48,21 +45,14 @@ perturbation of 1e-5; beyond the limit it is larger."""
 
 @dataclass(frozen=True)
 class Doubt:
-    """A component for which the modes depend on how it was perturbed.
-
-    Attributes
-    ----------
-    shift
-        The shift of this mode, relative to |λ|.
-    turns
-        Whether the shift leaves open on which side of the stability limit a mode is. It does not if the model is right
-        for small changes.
-    """
+    """A component for which the modes depend on how it was perturbed."""
 
     component: str
     mode: Mode
-    shift: float
+    shift: float  # the shift of this mode, relative to |λ|
     why: str
+    # Whether the shift leaves open on which side of the stability limit a mode is. It does not if the model is right
+    # for small changes.
     turns: bool = False
 
     def __str__(self) -> str:

@@ -26,12 +26,9 @@ __all__ = ["Blocks", "compose", "continuous", "continuous_model", "linearize", "
 def linearize(master: Master, step_size: float | None = None, schedule: Schedule | None = None) -> LinearModel:
     """Linearise the coupled step map around the master's present state.
 
-    Parameters
-    ----------
-    master
-        At an operating point; it is left as it was.
-    step_size, schedule
-        By default the master's own; other values show the coupling's effect with another step or schedule.
+    ``master``: at an operating point; it is left as it was.
+    ``step_size`` and ``schedule``: by default the master's own; other values show the coupling's effect with another
+    step or schedule.
     """
     return compose(Blocks(master, step_size), schedule or master.schedule)
 
@@ -136,10 +133,7 @@ def continuous(blocks: Blocks) -> LinearModel:
 def continuous_model(master: Master, blocks: Blocks | None = None) -> LinearModel | None:
     """The system without a communication step; None if a component gives no derivatives.
 
-    Parameters
-    ----------
-    blocks
-        Blocks with derivatives, if they exist already. They are used if no component knows the step.
+    ``blocks``: blocks with derivatives, if they exist already. They are used if no component knows the step.
     """
     if blocks is None or not blocks.serves_continuous:
         return where_given(lambda: continuous(Blocks(master, without_step=True)))

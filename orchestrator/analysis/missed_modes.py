@@ -16,19 +16,14 @@ from orchestrator.analysis.shifted_equations import ShiftedEquations
 from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
-_STRETCH = 3.0
-"""Ratio of the ends of a stretch of frequencies around each point."""
-
-_GROWTH = 0.3
-"""How far into instability the search reaches: to this negative damping ratio."""
-
+_STRETCH = 3.0  # ratio of the ends of a stretch of frequencies around each point
+_GROWTH = 0.3  # how far into instability the search reaches: to this negative damping ratio
 _AT_A_TIME = (2, 64)
 """Numbers of unknown eigenvalues to find around one point: the first, and the largest where that does not reach far
 enough."""
 
 
-_ROUGH = 1e-3
-"""Accuracy of what is found: enough to say whether something is there."""
+_ROUGH = 1e-3  # accuracy of what is found: enough to say whether something is there
 
 
 def missed(
@@ -36,12 +31,8 @@ def missed(
 ) -> list[complex]:
     """Eigenvalues [rad/s] of a region beside the known ones.
 
-    Parameters
-    ----------
-    lowest, highest
-        Range of Im λ [rad/s], above 0.
-    damping
-        Damping ratio below which nothing may be missed, down to −0.3. What is found is rough.
+    ``lowest`` and ``highest``: range of Im λ [rad/s], above 0.
+    ``damping``: damping ratio below which nothing may be missed, down to −0.3. What is found is rough.
     """
     norms = np.einsum("ij,ij->j", known.left.conj(), known.right)
     left = (known.left / norms.conj()).conj().T

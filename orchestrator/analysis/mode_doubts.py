@@ -9,21 +9,11 @@ from numpy.typing import NDArray
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.window_halves import WindowPart, near
 
-FEWEST_PERIODS = 2.0
-"""A mode with fewer periods in the window may be a part of a trend."""
-
-LARGEST_DAMPING = 40.0
-"""With a higher damping [%] less than a fifteenth of an amplitude is left after one period."""
-
-LEAST_ENERGY = 1e-3
-"""Least part of the energy of all oscillations in the window."""
-
-AGREE = 0.05
-"""Largest distance, as a part of |λ|, to the same mode in another identification of the same signal."""
-
-STEEP = 10.0
-"""A straight line that changes by this many times the strongest oscillation may hide smaller ones."""
-
+FEWEST_PERIODS = 2.0  # A mode with fewer periods in the window may be a part of a trend
+LARGEST_DAMPING = 40.0  # with a higher damping [%] less than a fifteenth of an amplitude is left after one period
+LEAST_ENERGY = 1e-3  # least part of the energy of all oscillations in the window
+AGREE = 0.05  # largest distance, as a part of |λ|, to the same mode in another identification of the same signal
+STEEP = 10.0  # A straight line that changes by this many times the strongest oscillation may hide smaller ones
 SHORTER, COARSER = 0.1, 30.0
 """The other identification leaves out this part of the window at its beginning, and takes singular values for noise
 that are this factor larger, so that its order is lower where noise made modes."""
@@ -38,14 +28,9 @@ def with_doubts(
 ) -> list[IdentifiedMode]:
     """The modes, each with its doubts; real poles have none, as they do not swing.
 
-    Parameters
-    ----------
-    length
-        Of the window [s].
-    others
-        Modes of the same signal by another order and window; None where that shows none.
-    noise_like
-        Whether the modes leave nothing of the signal but noise.
+    ``length``: of the window [s].
+    ``others``: modes of the same signal by another order and window; None where that shows none.
+    ``noise_like``: whether the modes leave nothing of the signal but noise.
     """
     energies = [_energy(mode, length) for mode in modes]
     total = sum(energy for mode, energy in zip(modes, energies, strict=True) if _swings(mode, length))
@@ -71,10 +56,7 @@ def worth_showing(modes: Sequence[IdentifiedMode], length: float, weakest: float
     A straight line comes out as exponentials of huge amplitudes that cancel, so that oscillations are compared with the
     strongest one that swings at least once in the window.
 
-    Parameters
-    ----------
-    length
-        Of the window [s].
+    ``length``: of the window [s].
     """
     largest = max((mode.amplitude for mode in modes), default=0.0)
     swing = max((mode.amplitude for mode in modes if _swings(mode, length)), default=largest)
@@ -133,12 +115,8 @@ def _energy(mode: IdentifiedMode, length: float) -> float:
 def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> str:
     """A sentence on a window that is too short for the strongest oscillation; else empty.
 
-    Parameters
-    ----------
-    modes
-        The strongest first.
-    start, stop
-        Of the window [s].
+    ``modes``: the strongest first.
+    ``start`` and ``stop``: of the window [s].
     """
     length = stop - start
     strongest = next((mode for mode in modes if mode.frequency_hz > 0 and not is_trend(mode, length)), None)
@@ -154,10 +132,7 @@ def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> 
 def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:
     """A sentence where no oscillation was found in a window of this length [s]; else empty.
 
-    Parameters
-    ----------
-    length
-        Of the window [s].
+    ``length``: of the window [s].
     """
     if not modes:
         return "Nothing above the noise: the window shows no mode."
@@ -169,10 +144,7 @@ def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:
 def straight_line(times: NDArray[np.float64], signal: NDArray[np.float64]) -> float:
     """By how much the straight line through a signal changes from its first to its last sample [unit of the signal].
 
-    Parameters
-    ----------
-    times, signal
-        Shape (n,); [s] and any unit.
+    ``times`` and ``signal``: shape (n,); [s] and any unit.
     """
     centred = times - times.mean()
     return float(centred @ (signal - signal.mean()) / (centred @ centred) * (times[-1] - times[0]))
@@ -181,14 +153,9 @@ def straight_line(times: NDArray[np.float64], signal: NDArray[np.float64]) -> fl
 def over_a_trend(modes: Sequence[IdentifiedMode], length: float, line: float) -> str:
     """A sentence on a trend that is large beside the strongest oscillation, or that is all there is; else empty.
 
-    Parameters
-    ----------
-    modes
-        The strongest first.
-    length
-        Of the window [s].
-    line
-        Change of the straight line through the signal, as `straight_line`.
+    ``modes``: the strongest first.
+    ``length``: of the window [s].
+    ``line``: change of the straight line through the signal, as `straight_line`.
     """
     swing = max((2 * mode.amplitude for mode in modes if _swings(mode, length)), default=0.0)
     trends = any(is_trend(mode, length) for mode in modes)

@@ -12,18 +12,10 @@ LEAST_ANGLE = 45.0
 """Two groups that swing less than this apart [degrees] swing together. The angle of an inter-area mode falls far below
 180 degrees where its damping is high."""
 
-LEAST_SHARE = 0.02
-"""A group whose participation is below this part of the other's rests in a mode."""
-
-LEAST_COMMON = 0.5
-"""A group in which less than this part of the participation is a common motion swings within itself."""
-
-CLEAR = 0.8
-"""A name is in doubt if another mode reaches this part of the measure of the mode that it would go to."""
-
-CONTESTED = 0.5
-"""From this part on it is worth asking which of both the mode was, before something was changed."""
-
+LEAST_SHARE = 0.02  # A group whose participation is below this part of the other's rests in a mode
+LEAST_COMMON = 0.5  # A group in which less than this part of the participation is a common motion swings within itself
+CLEAR = 0.8  # A name is in doubt if another mode reaches this part of the measure of the mode that it would go to
+CONTESTED = 0.5  # from this part on it is worth asking which of both the mode was, before something was changed
 NO_RESONANCE = 1 / np.sqrt(2)
 """From this damping ratio on a mode amplifies no frequency, and is no rival of one that does."""
 
@@ -31,34 +23,20 @@ LEFT_OVER = 0.5
 """A name takes a mode that is not its best one, because that has another name, only from this part of the best one's
 measure on."""
 
-_TRIED = 4
-"""Up to this number of names, all ways to give them to the modes that fit best are tried."""
+_TRIED = 4  # up to this number of names, all ways to give them to the modes that fit best are tried
 
-Measure = Callable[[Mode], float]
-"""How well a mode fits to a name, from 0 to 1."""
+Measure = Callable[[Mode], float]  # how well a mode fits to a name, from 0 to 1
 
 
 @dataclass(frozen=True)
 class Naming:
-    """What each name went to.
-
-    Attributes
-    ----------
-    reasons
-        Why a name that fits some mode is borne by none, by name.
-    contested
-        Names for which another mode fits at least `CONTESTED` as well as the one that fits best.
-    fits
-        The best mode of each name with the sum of all measures in view, doubts or not; and what its name measures.
-    remarks
-        What else is to be known of a name.
-    """
-
     named: Mapping[str, Mode]
-    reasons: Mapping[str, str] = field(default_factory=dict)
+    reasons: Mapping[str, str] = field(default_factory=dict)  # why a name that fits some mode is borne by none, by name
+    # names for which another mode fits at least `CONTESTED` as well as the one that fits best
     contested: tuple[str, ...] = ()
+    # the best mode of each name with the sum of all measures in view, doubts or not; and what its name measures
     fits: Mapping[str, tuple[Mode, Measure]] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what else is to be known of a name
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -74,10 +52,7 @@ def opposition(mode: Mode, side: Sequence[str], other: Sequence[str]) -> float:
     groups' energies times sin²(φ/2) of the angle φ between their motions: the part of two equal motions that lies in
     their difference.
 
-    Parameters
-    ----------
-    mode
-        With its participations and its shape.
+    ``mode``: With its participations and its shape.
 
     Returns
     -------

@@ -15,48 +15,29 @@ from orchestrator.analysis.shifted_equations import ShiftedEquations
 from orchestrator.arrays import Vector
 
 _ROUNDS = 8
-_SETTLED = 1e-8
-"""The eigenvalues have settled where a round moves none of them by more than this part."""
-
-_REST = 1e-4
-"""What A·r may differ from λ·r by, as a part of λ and r. The eigenvalue has the square of it."""
-
-_SPREAD = 1.1
-"""Eigenvalues whose sizes differ by up to this factor share a point."""
-
+_SETTLED = 1e-8  # the eigenvalues have settled where a round moves none of them by more than this part
+_REST = 1e-4  # what A·r may differ from λ·r by, as a part of λ and r. The eigenvalue has the square of it.
+_SPREAD = 1.1  # eigenvalues whose sizes differ by up to this factor share a point
 _BESIDE = 1e-3
 """The point lies beside the middle of its eigenvalues by this part: on one of them nothing could be solved."""
 
 
 @dataclass(frozen=True)
 class RefinedModes:
-    """Eigenvalues λ [rad/s], shape (m,), with left and right eigenvectors as columns, shape (n, m).
-
-    Attributes
-    ----------
-    settled
-        Whether the last round left them where they were. Others are not to be trusted.
-    """
+    """Eigenvalues λ [rad/s], shape (m,), with left and right eigenvectors as columns, shape (n, m)."""
 
     values: NDArray[np.complex128]
     left: Vector
     right: Vector
-    settled: bool
+    settled: bool  # Whether the last round left them where they were. Others are not to be trusted.
 
 
 def refine(
-    model: LinearModel,
-    equations: ShiftedEquations,
-    values: NDArray[np.complex128],
-    left: Vector,
-    right: Vector,
+    model: LinearModel, equations: ShiftedEquations, values: NDArray[np.complex128], left: Vector, right: Vector
 ) -> RefinedModes:
     """Modes of a continuous model, from values and vectors that are nearly so.
 
-    Parameters
-    ----------
-    values, left, right
-        As in `RefinedModes`, of a similar model with the same states.
+    ``values`` and ``left`` and ``right``: as in `RefinedModes`, of a similar model with the same states.
     """
     settled = False
     for _ in range(_ROUNDS):

@@ -16,34 +16,22 @@ from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.similarity import similarity
 from orchestrator.arrays import Complex
 
-THRESHOLD = 0.5
-"""Least similarity with which two modes count as the same mode."""
-
-_MARGIN = 0.3
-"""A mode is left unmatched if the similarities of its two best candidates differ by less than this."""
-
+THRESHOLD = 0.5  # least similarity with which two modes count as the same mode
+_MARGIN = 0.3  # A mode is left unmatched if the similarities of its two best candidates differ by less than this
 _DISTANCE_WEIGHT = 0.1
 """Weight of the relative distance between eigenvalues; the similarity, from 0 to 1, has the weight 1."""
 
-_EDGE = 1.1
-"""A mode whose frequency is within this factor of an end of the range may leave or enter the range there."""
+_EDGE = 1.1  # A mode whose frequency is within this factor of an end of the range may leave or enter the range there
 
 At = TypeVar("At", bound=Hashable)
 
 
 @dataclass(frozen=True)
 class ModeSet:
-    """The modes of one operating point.
+    """The modes of one operating point."""
 
-    Attributes
-    ----------
-    eigenvalues
-        λ [rad/s], shape (m,).
-    left, right
-        Eigenvectors as rows, shape (m, n), in any scaling.
-    """
-
-    eigenvalues: Complex
+    eigenvalues: Complex  # λ [rad/s], shape (m,)
+    # left, right: eigenvectors as rows, shape (m, n), in any scaling
     left: Complex
     right: Complex
     names: tuple[str, ...]
@@ -130,12 +118,8 @@ def near_an_end(frequency: float, frequency_range: tuple[float, float]) -> bool:
 def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], threshold: float = THRESHOLD) -> bool:
     """Whether a mode of one point has no partner in the other without being near an end of the range [Hz].
 
-    Parameters
-    ----------
-    frequency_range
-        In which modes were looked for [Hz].
-    threshold
-        Least similarity of partners, from 0 to 1.
+    ``frequency_range``: in which modes were looked for [Hz].
+    ``threshold``: least similarity of partners, from 0 to 1.
     """
     links = match(a, b, threshold)
     paired = ({link.source for link in links}, {link.target for link in links})
@@ -148,27 +132,15 @@ def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], t
 
 @dataclass
 class Followed(Generic[At]):
-    """The trajectory of every mode.
-
-    Attributes
-    ----------
-    trajectory
-        Numbers of the trajectories of a point's modes.
-    similarity
-        Similarity of each mode to its predecessor; NaN where a trajectory begins.
-    origin
-        The predecessor's point; None where a trajectory begins.
-    """
-
-    trajectory: dict[At, list[int]] = field(default_factory=dict)
+    trajectory: dict[At, list[int]] = field(default_factory=dict)  # numbers of the trajectories of a point's modes
+    # similarity of each mode to its predecessor; NaN where a trajectory begins
     similarity: dict[At, list[float]] = field(default_factory=dict)
+    # the predecessor's point; None where a trajectory begins
     origin: dict[At, list[At | None]] = field(default_factory=dict)
 
 
 def number_trajectories(
-    points: Mapping[At, ModeSet],
-    route: Iterable[tuple[At, Sequence[At]]],
-    threshold: float = THRESHOLD,
+    points: Mapping[At, ModeSet], route: Iterable[tuple[At, Sequence[At]]], threshold: float = THRESHOLD
 ) -> Followed[At]:
     result: Followed[At] = Followed()
     count = 0

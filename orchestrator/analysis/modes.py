@@ -24,12 +24,8 @@ guarded."""
 HIGHEST_SWING_HZ = 5.0
 """Frequency [Hz] up to which electromechanical modes outside of a range are named: small machines beside large ones."""
 
-_DEAD = 1e-9
-"""A multiplier of the step map smaller than this decays within one step and is not a mode."""
-
-ALL_VECTORS = 400
-"""Up to this number of states, all eigenvectors are computed: they take no time that anyone notices."""
-
+_DEAD = 1e-9  # A multiplier of the step map smaller than this decays within one step and is not a mode
+ALL_VECTORS = 400  # up to this number of states, all eigenvectors are computed: they take no time that anyone notices
 _REAL = 1e-2
 """A pair whose imaginary part is smaller than this share of its real part is a double real pole split by rounding."""
 
@@ -47,21 +43,12 @@ def damping_percent(eigenvalue: complex) -> float:
 
 @dataclass(frozen=True)
 class Mode:
-    """One eigenvalue λ [rad/s] with its participation factors and its shape.
-
-    Attributes
-    ----------
-    participation
-        Factor of every state, largest first; the factors of a mode sum to 1.
-    shape
-        Right eigenvector by state name, scaled so that its largest element is 1.
-    left
-        Left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere.
-    """
+    """One eigenvalue λ [rad/s] with its participation factors and its shape."""
 
     eigenvalue: complex
-    participation: tuple[tuple[str, float], ...]
-    shape: dict[str, complex]
+    participation: tuple[tuple[str, float], ...]  # factor of every state, largest first; the factors of a mode sum to 1
+    shape: dict[str, complex]  # right eigenvector by state name, scaled so that its largest element is 1
+    # left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere
     left: dict[str, complex] = field(default_factory=dict, repr=False)
 
     @property
@@ -122,16 +109,11 @@ class Mode:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """All eigenvalues [rad/s] of a model, and the modes of a frequency range, least damped first.
-
-    Attributes
-    ----------
-    rightmost
-        The mode of the largest real part at any frequency, zeros left out; None if all eigenvalues are zeros.
-    """
+    """All eigenvalues [rad/s] of a model, and the modes of a frequency range, least damped first."""
 
     eigenvalues: NDArray[np.complex128]
     modes: list[Mode]
+    # the mode of the largest real part at any frequency, zeros left out; None if all eigenvalues are zeros
     rightmost: Mode | None
 
     @property
@@ -173,12 +155,8 @@ def find_spectrum(
 ) -> Spectrum:
     """Every eigenvalue, and the modes with a frequency in a range, one of each conjugate pair.
 
-    Parameters
-    ----------
-    model
-        Step map or continuous matrix.
-    lowest_hz, highest_hz
-        Range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
+    ``model``: step map or continuous matrix.
+    ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
     """
     lambdas, vectors = _values_and_vectors(model)
     chosen, k = in_range(lambdas, lowest_hz, highest_hz), index_of_rightmost(lambdas)
@@ -235,14 +213,9 @@ def make_mode(
 ) -> Mode:
     """A mode from its eigenvalue λ [rad/s] and the eigenvectors of A and Aᴴ, each of shape (n,).
 
-    Parameters
-    ----------
-    value
-        λ [rad/s].
-    left
-        Eigenvector of Aᴴ, shape (n,), of any length and angle.
-    right
-        Eigenvector of A, shape (n,), of any length and angle.
+    ``value``: λ [rad/s].
+    ``left``: eigenvector of Aᴴ, shape (n,), of any length and angle.
+    ``right``: eigenvector of A, shape (n,), of any length and angle.
     """
     factors = np.abs(left.conj() * right)
     factors /= factors.sum()

@@ -22,24 +22,17 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule, gauss_seidel
 from orchestrator.errors import AnalysisError
 
-_SIZE = 1e-6
-"""Of a perturbation, relative to the state's scale."""
-
+_SIZE = 1e-6  # of a perturbation, relative to the state's scale
 _LOOKS = 40
 """Times in a period at which a perturbed system is looked at: modes up to 20 times the period's frequency are told."""
 
-_ALIVE = 1e-4
-"""Multipliers over a period below this belong to what decays within it."""
-
-_REAL = 1e-6
-"""Largest imaginary part of the map that is put together from its modes again, relative to the map."""
-
+_ALIVE = 1e-4  # multipliers over a period below this belong to what decays within it
+_REAL = 1e-6  # largest imaginary part of the map that is put together from its modes again, relative to the map
 _MOVING, _SAME = 1e-4, 1e-9
 """A state that changes by more than the first in a period may count; then a period from the changed value must be the
 same, to the second, in all states."""
 
-_SHIFT = 1e-7
-"""Above the rounding in an eigenvalue 1, as in `orchestrator.analysis.steady_state`."""
+_SHIFT = 1e-7  # above the rounding in an eigenvalue 1, as in `orchestrator.analysis.steady_state`
 
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
@@ -47,30 +40,15 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class PeriodicPoint:
-    """A state that repeats after a period.
+    """A state that repeats after a period."""
 
-    Attributes
-    ----------
-    names
-        Of all states; outputs that are held over a step follow those of the components.
-    x
-        Values of all states, shape (n,).
-    change
-        Of all states over a period, relative to their scale, 0 for those that count, shape (n,).
-    first
-        The largest one at the start.
-    iterations
-        Of Newton's method.
-    counting
-        Whether a state grows by the same in each period without any effect, such as a clock, or an angle by whole
-        turns, shape (n,).
-    """
-
-    names: tuple[str, ...]
-    x: Matrix
-    change: Matrix
-    first: float
-    iterations: int
+    names: tuple[str, ...]  # of all states; outputs that are held over a step follow those of the components
+    x: Matrix  # values of all states, shape (n,)
+    change: Matrix  # of all states over a period, relative to their scale, 0 for those that count, shape (n,)
+    first: float  # the largest one at the start
+    iterations: int  # of Newton's method
+    # whether a state grows by the same in each period without any effect, such as a clock, or an angle by whole turns,
+    # shape (n,)
     counting: Mask
 
     @property

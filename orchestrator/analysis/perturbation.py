@@ -28,24 +28,14 @@ it is at most 0.05."""
 
 @dataclass(frozen=True)
 class PerturbationResult:
-    """Differences by every state and input, each with a size that fits.
+    """Differences by every state and input, each with a size that fits."""
 
-    Attributes
-    ----------
-    small, large
-        With one size for each column, and with twice that size; only ``small`` has the time derivatives.
-    usual
-        With twice the usual size for all columns.
-    narrow
-        Sizes of the columns that took a smaller one than usual, by name.
-    doubtful
-        Names of states and inputs for which no two sizes agreed, or that are answered differently up and down.
-    """
-
+    # small, large: with one size for each column, and with twice that size; only ``small`` has the time derivatives
     small: Differences
     large: Differences
-    usual: Differences
-    narrow: dict[str, float]
+    usual: Differences  # with twice the usual size for all columns
+    narrow: dict[str, float]  # sizes of the columns that took a smaller one than usual, by name
+    # names of states and inputs for which no two sizes agreed, or that are answered differently up and down
     doubtful: tuple[str, ...]
 
 

@@ -19,23 +19,15 @@ from numpy.typing import NDArray
 from orchestrator.arrays import Matrix, Vector
 
 _NAMES = ("dgebal", "dgehrd", "dorghr", "dhseqr", "dtrevc", "dgebak")
-
-_SIZES = (1e-120, 1e120)
-"""Matrices whose largest element lies outside are scaled by LAPACK's driver, and left to it."""
+_SIZES = (1e-120, 1e120)  # matrices whose largest element lies outside are scaled by LAPACK's driver, and left to it
 
 
 class RealSchur:
     """The Schur form of a balanced matrix.
 
-    Parameters
-    ----------
-    A
-        Real, shape (n, n), n > 0.
+    ``A``: Real, shape (n, n), n > 0.
 
-    Attributes
-    ----------
-    values
-        All eigenvalues, shape (n,): the same as those of `scipy.linalg.eig`, in the same order.
+    ``values``: All eigenvalues, shape (n,): the same as those of `scipy.linalg.eig`, in the same order.
     """
 
     def __init__(self, A: Matrix) -> None:
@@ -48,10 +40,7 @@ class RealSchur:
     def vectors(self, chosen: Sequence[int]) -> tuple[Vector, Vector]:
         """Left and right eigenvectors, each of shape (n, m), of any length: lᴴ·A = λ·lᴴ and A·r = λ·r.
 
-        Parameters
-        ----------
-        chosen
-            Places of m eigenvalues in ``values``.
+        ``chosen``: places of m eigenvalues in ``values``.
         """
         places = np.asarray(chosen, dtype=np.int64)
         if self._all is not None:

@@ -25,9 +25,7 @@ MOVED, LOST = 0.01, 0.1
 """A step that moves a mode by the first part of its size gives a warning. A mode that moves by the second part is
 lost."""
 
-SWINGING = 0.5
-"""Largest damping ratio of a compared mode; a mode with more damping does not swing."""
-
+SWINGING = 0.5  # largest damping ratio of a compared mode; a mode with more damping does not swing
 SLOW_HZ = 5.0
 """Frequency below which a lost mode is an error [Hz]. A faster lost mode, which only a wide range shows, gives a
 warning."""
@@ -74,27 +72,18 @@ def check_resolution(
 ) -> tuple[str, ...]:
     """Warn of an unstable coupling, and compare the modes of a step map with those of the continuous system.
 
-    Parameters
-    ----------
-    master
-        At the operating point; it is left as it was.
-    model, system
-        The step map, and the continuous model. If this is None, because a component gives no derivatives, nothing is
-        compared.
-    frequency_range
-        Range of the modes [Hz].
-    stability
-        The verdict. Where the coupling is unstable, a step at which it is stable is looked for even if the modes
-        are resolved.
+    ``master``: At the operating point; it is left as it was.
+    ``model``, ``system``: The step map, and the continuous model. If this is None, because a component gives no
+    derivatives, nothing is compared.
+    ``frequency_range``: Range of the modes [Hz].
+    ``stability``: The verdict. Where the coupling is unstable, a step at which it is stable is looked for even if the
+    modes are resolved.
 
     Returns
     -------
     Warnings, with a step that is short enough; it is computed, not estimated.
 
-    Raises
-    ------
-    InputError
-        If a slow mode is lost, because the mode in its place would give a wrong verdict.
+    Raises `InputError` if a slow mode is lost, because the mode in its place would give a wrong verdict.
     """
     said = verdict_warnings(stability)
     if model.step_size is None or system is None:

@@ -41,29 +41,19 @@ ONE_SIDED = 0.1
 """Largest relative difference between the effects of steps up and down. A larger difference shows a limit, or the edge
 of a dead band."""
 
-DURATION = 0.1
-"""Time for which the FMU's response is compared [s]."""
-
-MOST_STEPS = 1000
-"""Largest number of communication steps in one response."""
-
+DURATION = 0.1  # time for which the FMU's response is compared [s]
+MOST_STEPS = 1000  # largest number of communication steps in one response
 _HOLDS = (1, 1, 2, 3, 5, 8, 13, 21, 34, 55, 89, 144)
 """Numbers of communication steps for which an input is held, in turn. They excite fast parts and slow ones."""
 
-_ROUNDING = 1e-11
-"""Relative error of what an FMU computes, before it is divided by the size of a step."""
+_ROUNDING = 1e-11  # relative error of what an FMU computes, before it is divided by the size of a step
 
 
 @dataclass(frozen=True)
 class ContinuousModel:
-    """ẋ = A·x + B·u, y = C·x + D·u, with names.
+    """ẋ = A·x + B·u, y = C·x + D·u, with names."""
 
-    Attributes
-    ----------
-    states, rates, inputs, outputs
-        Names of the FMU's variables; rates are the derivatives of the states.
-    """
-
+    # states, rates, inputs, outputs: names of the FMU's variables; rates are the derivatives of the states
     states: tuple[str, ...]
     rates: tuple[str, ...]
     inputs: tuple[str, ...]
@@ -103,24 +93,15 @@ class _Plan:
 
 @dataclass(frozen=True)
 class _Response:
-    """The response of the FMU, divided by the steps' size.
+    """The response of the FMU, divided by the steps' size."""
 
-    Attributes
-    ----------
-    course
-        Half the difference between steps up and down, shape (k, signals).
-    peaks, curved, one_sided
-        Figures of every signal: its largest value, the difference with half a step, and the difference between up and
-        down.
-    floors
-        Difference that rounding alone may cause.
-    """
-
-    course: Matrix
+    course: Matrix  # half the difference between steps up and down, shape (k, signals)
+    # peaks, curved, one_sided: figures of every signal: its largest value, the difference with half a step, and the
+    # difference between up and down
     peaks: Matrix
     curved: Matrix
     one_sided: Matrix
-    floors: Matrix
+    floors: Matrix  # difference that rounding alone may cause
 
     @property
     def too_curved(self) -> NDArray[np.bool_]:
@@ -134,22 +115,12 @@ _AGREED: WeakKeyDictionary[Component, set[bytes]] = WeakKeyDictionary()
 def check_response(component: Component, model: ContinuousModel, what: str, time: float, step_size: float) -> None:
     """Compare a linear model with its FMU, and restore the FMU's state.
 
-    Parameters
-    ----------
-    component
-        At the model's operating point; it can save and restore its state.
-    what
-        What the model is, for the error: ``the linear model inside its FMU``.
-    time
-        Of the operating point [s].
-    step_size
-        Communication step [s].
-
-    Raises
-    ------
-    AnalysisError
-        If the responses differ, with the signal, time and size of the largest difference; or if the FMU is not linear
-        there.
+    ``component``: at the model's operating point; it can save and restore its state.
+    ``what``: what the model is, for the error: ``the linear model inside its FMU``.
+    ``time``: of the operating point [s].
+    ``step_size``: communication step [s].
+    Raises an `AnalysisError` if the responses differ, with the signal, time and size of the largest difference; or if
+    the FMU is not linear there.
     """
     values = RealBatch(component, (*model.states, *model.inputs, *model.outputs)).read().copy()
     key = _digest(model, values, step_size)

@@ -12,11 +12,8 @@ from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component
 
-LONGEST = 1.0
-"""Common periods above this [s] are refused."""
-
-_FINEST = 10**12
-"""Times and frequencies are taken as fractions with denominators up to this."""
+LONGEST = 1.0  # common periods above this [s] are refused
+_FINEST = 10**12  # times and frequencies are taken as fractions with denominators up to this
 
 
 def repeating(master: Master) -> dict[str, tuple[Fraction, ...]]:

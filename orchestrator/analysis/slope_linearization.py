@@ -15,15 +15,11 @@ from orchestrator.arrays import Matrix
 from orchestrator.coupling.turns import Exchange
 from orchestrator.fmi.component import Component, RealBatch
 
-_SIZE = 1e-5
-"""Of a perturbation, relative to max(1, |value|)."""
-
+_SIZE = 1e-5  # of a perturbation, relative to max(1, |value|)
 _EVEN, _FLOOR = 0.1, 1e-2
 """An element's answers up and down may differ by this part of it, and of this rate [1/s]: beyond, a limit is near."""
 
-_MANY = 100
-"""From this number of states and inputs on, variables are perturbed together."""
-
+_MANY = 100  # from this number of states and inputs on, variables are perturbed together
 _HOLDS, _ROUNDING = 1e-3, 1e-9
 """A perturbation in all directions at once may differ by the first part of its answer from the sum of the single
 ones, and by the second part of the answer at rest: more is an effect that the pattern does not have."""
@@ -45,18 +41,12 @@ def linearize_slopes(
 ) -> ComponentLinearization:
     """ẋ = A_c·x + B_c·u and y = C·x + D·u of one component; it has no step map.
 
-    Parameters
-    ----------
-    exchange
-        The component, at its operating point, with its connected inputs and outputs.
-    time, step_size
-        Of the operating point, and of a step, should one be needed [s].
-    inputs, observed
-        Tunable parameters or open inputs, and outputs, in addition to the connected ones.
-    like
-        The same FMU at another operating point. Variables that had no common effect there are perturbed together; a
-        perturbation in all directions then shows whether that holds here, too. It serves where it has all states,
-        inputs and outputs that are asked for.
+    ``exchange``: the component, at its operating point, with its connected inputs and outputs.
+    ``time`` and ``step_size``: of the operating point, and of a step, should one be needed [s].
+    ``inputs`` and ``observed``: tunable parameters or open inputs, and outputs, in addition to the connected ones.
+    ``like``: the same FMU at another operating point. Variables that had no common effect there are perturbed together;
+    a perturbation in all directions then shows whether that holds here, too. It serves where it has all states, inputs
+    and outputs that are asked for.
     """
     component = exchange.component
     states, rates = component.description.states, component.description.rates

@@ -4,6 +4,7 @@ The step map is what a simulation runs, the continuous model is the system itsel
 destabilise a stable system, and a long communication step may damp a mode that grows in the system.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
@@ -30,8 +31,7 @@ from orchestrator.analysis.modes import (
 WHOLE = 4000
 """Up to this number of states, all eigenvalues are computed; in larger systems only growing ones are searched for."""
 
-_GROWING = 1e-6
-"""A real part above this [1/s], and above 1e-8 of the eigenvalue's size, is growth and not rounding."""
+_GROWING = 1e-6  # A real part above this [1/s], and above 1e-8 of the eigenvalue's size, is growth and not rounding
 
 SLOW = 0.05
 """Eigenvalues of a step map up to this size [rad/s] are judged by the continuous model if there is one. No usual step
@@ -42,9 +42,7 @@ _COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
 """The coupling is the cause of growth if the step map's growth rate exceeds the continuous system's rate times the
 first figure plus the second [1/s]."""
 
-_DENSE_VECTORS = 200
-"""Up to this number of states, all eigenvectors cost less than a search for one."""
-
+_DENSE_VECTORS = 200  # up to this number of states, all eigenvectors cost less than a search for one
 _STATES_NAMED = 3
 _SWINGS_SHOWN = 3
 
@@ -113,42 +111,29 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Stability:
-    """The verdict on a linearised system.
+    """The verdict on a linearised system."""
 
-    Attributes
-    ----------
-    stable
-        Whether no mode grows; None if this is not known.
-    mode
-        The mode of the largest real part: of the step map, or of the continuous system if only this one grows.
-    growing
-        Number of growing modes of the same model; a conjugate pair counts once.
-    zeros
-        Eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`), clocks left out: the free angle.
-    cause
-        The cause of growth; None if no mode grows.
-    continuous_growth_rate
-        Largest real part [1/s] of the continuous system; None where a component gives no derivatives.
-    step_size
-        Communication step [s]; None for a continuous model.
-    reason
-        Why the verdict is not known, or the region that was not searched.
-    """
-
-    stable: bool | None
+    stable: bool | None  # whether no mode grows; None if this is not known
+    # the mode of the largest real part: of the step map, or of the continuous system if only this one grows
     mode: Mode | None = None
-    growing: int = 0
-    zeros: int = 0
+    growing: int = 0  # number of growing modes of the same model; a conjugate pair counts once
+    zeros: int = 0  # eigenvalues taken for zero (`orchestrator.analysis.modes.ZERO`), clocks left out: the free angle
     eigenvalues: int = 0
-    cause: Cause | None = None
+    cause: Cause | None = None  # the cause of growth; None if no mode grows
+    # largest real part [1/s] of the continuous system; None where a component gives no derivatives
     continuous_growth_rate: float | None = None
-    step_size: float | None = None
-    reason: str = ""
+    step_size: float | None = None  # communication step [s]; None for a continuous model
+    reason: str = ""  # why the verdict is not known, or the region that was not searched
 
     @property
     def largest_growth_rate(self) -> float | None:
         """Largest real part [1/s] of the whole spectrum, zeros left out."""
         return None if self.mode is None else self.mode.eigenvalue.real
+
+    def doubted(self, misfits: Iterable[str]) -> "Stability":
+        """Not known to be stable where something does not fit between devices and bindings; growth stays growth."""
+        what = "; ".join(misfits)
+        return replace(self, stable=None, reason=what) if what and self.stable else self
 
     @property
     def verdict(self) -> str:
@@ -265,14 +250,9 @@ def judge(
 ) -> Stability:
     """The verdict on a step map, or on a continuous model.
 
-    Parameters
-    ----------
-    spectrum
-        All eigenvalues of the model where they are known already.
-    system
-        The continuous model of the same system; None where a component gives no derivatives.
-    of_system
-        All eigenvalues of ``system`` where they are known already.
+    ``spectrum``: all eigenvalues of the model where they are known already.
+    ``system``: the continuous model of the same system; None where a component gives no derivatives.
+    ``of_system``: all eigenvalues of ``system`` where they are known already.
     """
     spectrum = spectrum or whole_spectrum(model)
     own = _look_at(model, spectrum)

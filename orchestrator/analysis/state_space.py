@@ -16,41 +16,27 @@ from orchestrator.fmi.linear_model import read_embedded_model
 
 @dataclass(frozen=True)
 class StateSpace:
-    """x⁺ = A·x + B·u and y = C·x + D·u in deviations from an operating point.
+    """x⁺ = A·x + B·u and y = C·x + D·u in deviations from an operating point."""
 
-    Attributes
-    ----------
-    A, B, C, D
-        Shapes (n, n), (n, m), (p, n), (p, m). Units are those of the variables; for a continuous model
-        A and B give derivatives per second.
-    states, inputs, outputs
-        Names ``component.variable``; among the states may be ``component.output (held)`` and
-        ``a.out -> b.in (delayed k)``.
-    step_size
-        Communication step [s]; None for a continuous model, ẋ for x⁺.
-    sources
-        How the linear model of every component was found.
-    """
-
+    # A, B, C, D: Shapes (n, n), (n, m), (p, n), (p, m). Units are those of the variables; for a continuous model A and
+    # B give derivatives per second.
     A: Matrix
     B: Matrix
     C: Matrix
     D: Matrix
+    # states, inputs, outputs: names ``component.variable``; among the states may be ``component.output (held)`` and
+    # ``a.out -> b.in (delayed k)``
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    step_size: float | None
-    sources: Mapping[str, str] = field(default_factory=dict)
+    step_size: float | None  # communication step [s]; None for a continuous model, ẋ for x⁺
+    sources: Mapping[str, str] = field(default_factory=dict)  # how the linear model of every component was found
 
     def step_response(self, change: Matrix, times: Matrix) -> Matrix:
         """Outputs after a step of the inputs at t = 0.
 
-        Parameters
-        ----------
-        change
-            Size of the step of every input, shape (m,).
-        times
-            [s], shape (k,), not before 0 and in equal distances; of a step map, multiples of its step.
+        ``change``: Size of the step of every input, shape (m,).
+        ``times``: [s], shape (k,), not before 0 and in equal distances; of a step map, multiples of its step.
 
         Returns
         -------

@@ -20,36 +20,19 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import gauss_seidel
 from orchestrator.errors import AnalysisError, ErrorKind
 
-_SHIFT = 1e-7
-"""Far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode."""
-
-_SHORT = 1e-4
-"""For steps shorter than this [s], the accepted change is a rate per second."""
+_SHIFT = 1e-7  # far above the rounding in a computed eigenvalue 1, and far below 1 − |μ| of the slowest mode
+_SHORT = 1e-4  # for steps shorter than this [s], the accepted change is a rate per second
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """A steady state of the coupled system.
+    """A steady state of the coupled system."""
 
-    Attributes
-    ----------
-    residual
-        Largest change of any state over one communication step [the state's unit, mostly pu].
-    drift
-        Largest rate of change of any state [the state's unit per second].
-    initial_residual
-        Residual at the power flow's operating point, before any correction.
-    iterations
-        Number of Newton iterations; 0 if the power flow's point is a steady state already.
-    states
-        Values of the states by ``component.state``.
-    """
-
-    residual: float
-    drift: float
-    initial_residual: float
-    iterations: int
-    states: dict[str, float]
+    residual: float  # largest change of any state over one communication step [the state's unit, mostly pu]
+    drift: float  # largest rate of change of any state [the state's unit per second]
+    initial_residual: float  # residual at the power flow's operating point, before any correction
+    iterations: int  # number of Newton iterations; 0 if the power flow's point is a steady state already
+    states: dict[str, float]  # values of the states by ``component.state``
 
 
 def find_operating_point(
@@ -57,18 +40,12 @@ def find_operating_point(
 ) -> OperatingPoint:
     """Verify that the initialised system stands still, or move it to a steady state.
 
-    Parameters
-    ----------
-    master
-        Initialised; it is left at the operating point.
-    tolerance
-        Largest accepted change of a state over one communication step of 100 µs or more; proportionally less over a
-        shorter step.
-    accept
-        Below this change, the power flow's point is taken as it is. Between ``accept`` and ``tolerance`` a better point
-        is searched for, and kept if it is better.
-    max_iterations
-        Largest number of iterations of Newton's method on the step map.
+    ``master``: initialised; it is left at the operating point.
+    ``tolerance``: largest accepted change of a state over one communication step of 100 µs or more; proportionally less
+    over a shorter step.
+    ``accept``: below this change, the power flow's point is taken as it is. Between ``accept`` and ``tolerance`` a
+    better point is searched for, and kept if it is better.
+    ``max_iterations``: largest number of iterations of Newton's method on the step map.
     """
     if (steps := steps_of_period(master, master.clock.step_size)) > 1:
         return _periodic_point(master, steps, tolerance, accept, max_iterations)

@@ -24,10 +24,7 @@ def side_by_side() -> Iterator[Executor]:
     one thread on each side, so that both cores work and no last digit depends on their number. What is submitted must
     not touch an FMU, nor what the block changes.
 
-    Yields
-    ------
-    Executor
-        Its ``submit(compute).result()`` raises what ``compute`` raised.
+    Yields its ``submit(compute).result()`` raises what ``compute`` raised.
     """
     with one_thread(), ThreadPoolExecutor(2) as pool:
         try:

@@ -8,47 +8,25 @@ from numpy.typing import NDArray
 
 from orchestrator.analysis.identification import IdentifiedMode
 
-SAME = 0.015
-"""Distance, as a part of |λ|, within which a half shows the same mode where there is no noise."""
-
-SENSIBLE = 0.3
-"""Distance, as a part of |λ|, beyond which a mode is another one."""
-
-_CERTAIN = 5.0
-"""Standard deviations of an eigenvalue within which a half shows the same mode in noise."""
-
+SAME = 0.015  # distance, as a part of |λ|, within which a half shows the same mode where there is no noise
+SENSIBLE = 0.3  # distance, as a part of |λ|, beyond which a mode is another one
+_CERTAIN = 5.0  # standard deviations of an eigenvalue within which a half shows the same mode in noise
 _FEWEST_PERIODS = 2.0
-_WHITE = 0.3
-"""Largest correlation of noise with itself one to three samples later."""
-
-_LEFT = 0.01
-"""Part of a mode's amplitude below which next to nothing of it is left."""
-
-_BEATING = 0.2
-"""Part of a mode's amplitude from which on another one beats with it."""
-
+_WHITE = 0.3  # largest correlation of noise with itself one to three samples later
+_LEFT = 0.01  # part of a mode's amplitude below which next to nothing of it is left
+_BEATING = 0.2  # part of a mode's amplitude from which on another one beats with it
 _MOST_SAMPLES = 4000
 
 
 @dataclass(frozen=True, slots=True)
 class WindowPart:
-    """Modes of a part of a signal, and what they leave of it.
-
-    Attributes
-    ----------
-    length
-        Of this part [s].
-    remainder
-        Root mean square of what the modes leave [unit of the signal].
-    noise_like
-        Whether the remainder is not correlated with itself.
-    """
+    """Modes of a part of a signal, and what they leave of it."""
 
     modes: Sequence[IdentifiedMode]
-    length: float
+    length: float  # of this part [s]
     samples: int
-    remainder: float
-    noise_like: bool
+    remainder: float  # root mean square of what the modes leave [unit of the signal]
+    noise_like: bool  # whether the remainder is not correlated with itself
 
     def shows(self, mode: IdentifiedMode) -> bool | None:
         """Whether this part shows a mode of all of the signal; None where it cannot tell.
@@ -97,10 +75,7 @@ def near(modes: Sequence[IdentifiedMode] | None, mode: IdentifiedMode) -> Identi
 def part_of(times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequence[IdentifiedMode]) -> WindowPart:
     """What the modes of a part of a signal leave of it.
 
-    Parameters
-    ----------
-    times, signal
-        Shape (n,); the part of the signal, [s] and any unit.
+    ``times`` and ``signal``: shape (n,); the part of the signal, [s] and any unit.
     """
     thin = -(-len(times) // _MOST_SAMPLES)
     t, y = times[::thin] - times[0], signal[::thin]

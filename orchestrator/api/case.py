@@ -1,57 +1,48 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
-from typing import Any, Unpack, cast
+from typing import Any, Unpack
 
 import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.coordinated_design import WORKERS_IMPORT as COORDINATED_IMPORT
+from orchestrator.api.coordinated_design import STUDY as COORDINATED_DESIGN
 from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoints, request_of
-from orchestrator.api.coordinated_design import compute as designed
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
-from orchestrator.api.design_wishes import in_ratios
-from orchestrator.api.executors import Compute, Plan, Shown, choose_executor
-from orchestrator.api.interactions import WORKERS_IMPORT as INTERACTIONS_IMPORT
+from orchestrator.api.design import request_of as design_of
+from orchestrator.api.executors import Plan, PointStudy, Result, Shown, choose_executor
+from orchestrator.api.interactions import STUDY as INTERACTIONS
 from orchestrator.api.interactions import Interactions, WantedInteractions
-from orchestrator.api.interactions import compute as interacting
 from orchestrator.api.interactions import request_of as interactions_of
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
-from orchestrator.api.screening import WORKERS_IMPORT as SCREENING_IMPORT
+from orchestrator.api.screening import STUDY as SCREENING
 from orchestrator.api.screening import Screening
-from orchestrator.api.screening import compute as screened
 from orchestrator.api.show import page
-from orchestrator.api.sweep import WORKERS_IMPORT, ParameterSweep, compute, plan
-from orchestrator.api.values import (
-    Names,
-    Paths,
-    Time,
-    case_values,
-    damping_percent,
-    flag,
-    frequency_range,
-    in_seconds,
-    parameter_files,
-    text_or_none,
-)
-from orchestrator.api.values import names as names_given
+from orchestrator.api.siting import Siting
+from orchestrator.api.sweep import STUDY as SWEEP
+from orchestrator.api.sweep import ParameterSweep, plan
+from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.api.values import path as path_of
+from orchestrator.asked import Names, flag, frequency_range, percent, text_or_none
+from orchestrator.asked import names as names_given
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
+from orchestrator.cases.forcing import forced
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
-from orchestrator.points.executor import Executor
 from orchestrator.points.store import POINTS
 from orchestrator.results.lock import held
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 from orchestrator.screening.study import plan_screening
+from orchestrator.siting.study import SiteRequest, find_sites
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -134,6 +125,8 @@ class Case:
         parameters: Paths = (),
         schedule: ScheduleName | None = None,
         tolerance: float | None = None,
+        sharing: str | None = None,
+        force: Names = (),
     ) -> Scenario:
         """One scenario, checked and ready to run; FMUs that are missing are built.
 
@@ -155,6 +148,12 @@ class Case:
         tolerance
             Steps of a run are as long as this error of a coupled output allows, of 1 or of its value, from 1e-8 to
             0.1; under ``newton`` unless the schedule is ``midpoint``. By default steps are fixed, or the case's.
+        sharing
+            How the other units feed what units fed that ``values`` take out of service, such as ``sg5.connected``:
+            ``"droop"``, ``"rating"``, or ``"slack"``; as the case says by default, which is by droop. Where ``values``
+            give powers (``P_0``) as well, nothing is shared.
+        force
+            References that swing, in the place of the case's events: ``"sg1 0.8 Hz 2 %"``, as ``gfor run --force``.
 
         Raises
         ------
@@ -175,8 +174,9 @@ class Case:
             )
         names = [name] if name else []
         (chosen,) = choose(
-            self.file, names, values, step=step, parameters=parameters, schedule=schedule, tolerance=tolerance
-        )
+            forced(self.file, names_given(force, "force")), names, values, step=step, parameters=parameters,
+            schedule=schedule, tolerance=tolerance, sharing=sharing,
+        )  # fmt: skip
         question([chosen.prepared])
         return chosen
 
@@ -190,6 +190,7 @@ class Case:
         parameters: Paths = (),
         schedule: ScheduleName | None = None,
         tolerance: float | None = None,
+        sharing: str | None = None,
     ) -> list[Scenario]:
         """Several scenarios, or all; the mistakes of all are reported together.
 
@@ -197,7 +198,7 @@ class Case:
         ----------
         names
             Of the scenarios; all of them where empty.
-        values, step, parameters, schedule, tolerance
+        values, step, parameters, schedule, tolerance, sharing
             As for `scenario`.
         stop
             Time at which runs end [s]; the case's by default.
@@ -215,7 +216,7 @@ class Case:
         """
         chosen = choose(
             self.file, names, values, step=step, stop=stop, parameters=parameters, schedule=schedule,
-            tolerance=tolerance,
+            tolerance=tolerance, sharing=sharing,
         )  # fmt: skip
         question(scenario.prepared for scenario in chosen)
         return chosen
@@ -229,6 +230,7 @@ class Case:
         step: Time | None = None,
         parameters: Paths = (),
         frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        until: str | float | None = None,
         workers: int | None = 1,
         scheduler: str | None = None,
         tls: str | Path | None = None,
@@ -248,6 +250,9 @@ class Case:
             As for `scenario`.
         frequencies
             Modes from the first to the second are followed [Hz].
+        until
+            ``"unstable"``, or a damping such as ``"5 %"``: bisect how far the only range that is varied may go, such as
+            ``"grid.X_L=0.1:2"``. The result is in ``limits``.
         workers
             Processes to compute in; one for each core where None.
         scheduler
@@ -275,10 +280,9 @@ class Case:
         0       0.1          0.58            10.59
         1       0.2          0.43            18.01
         """
-        executor = choose_executor(workers, scheduler, WORKERS_IMPORT, tls)
-        planned = plan(self.file, vary, scenarios, values, step=step, parameters=parameters, frequencies=frequencies)
-        question(planned.scenarios)
-        return _computed(compute, planned, executor, folder, "Points", shown=progress)
+        planned = partial(plan, self.file, vary, scenarios, values, step=step, parameters=parameters,
+                          frequencies=frequencies, until=until)  # fmt: skip
+        return _studied(SWEEP, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
 
     def screen(
         self,
@@ -342,19 +346,79 @@ class Case:
            point  frequency_hz  damping_percent
         0  00:00          0.58            10.57
         """
-        executor = choose_executor(workers, scheduler, SCREENING_IMPORT, tls)
-        ratio = damping_percent(damping, "damping", most=100 * MOST_DAMPING)
-        wanted = CriticalRegion(*frequency_range(frequencies), ratio or 0.0)
+        wanted = CriticalRegion(*frequency_range(frequencies), percent(damping, "damping", most=100 * MOST_DAMPING))
         if sharing is not None and sharing not in list(SharingRule):
             raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
-        planned = plan_screening(
-            self.file, None if points is None else path_of(points, "points", "file"),
+        planned = partial(
+            plan_screening, self.file, None if points is None else path_of(points, "points", "file"),
             outages if outages is None else ",".join(names_given(outages, "outages")), scenario, case_values(values),
             in_seconds(step, "step"), wanted, parameter_files(parameters), whole=whole,
             sharing=None if sharing is None else SharingRule(sharing),
         )  # fmt: skip
-        question([planned.prepared])
-        return _computed(screened, planned, executor, folder, "Points", shown=progress)
+        return _studied(SCREENING, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
+
+    def site(
+        self,
+        device: str | Path = "pod_p",
+        scenario: str | None = None,
+        values: Mapping[str, Any] | None = None,
+        *,
+        binding: str | Path | None = None,
+        step: Time | None = None,
+        parameters: Paths = (),
+        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+        below: float = 10,
+        outages: str | Sequence[str] | None = None,
+        confirm: int = 3,
+        rating: float = 100,
+        gain: float = 200,
+    ) -> Siting:
+        """Where to put a converter: how far support at each bus moves each poorly damped mode.
+
+        Residues of the whole linear model between the frequency of a bus and P or Q injected there; the operating
+        point stays. The best buses are confirmed: a converter at rest is put there as an FMU, its POD is tuned, and
+        the coupled system's mode is compared.
+
+        Parameters
+        ----------
+        device
+            ``"pod_p"``, ``"pod_q"``, ``"droop"``, or the path of an FMU.
+        scenario
+            Its name; the first one where None.
+        values, step, parameters
+            As for `scenario`.
+        binding
+            Of the FMU.
+        frequencies
+            Modes from the first to the second are looked at [Hz] …
+        below
+            … where they are damped less than this [%]; the least damped one where none is.
+        outages
+            Rank for these too: ``"n-1"``, ``"lines"``, ``"units"``, or names; the least of all counts.
+        confirm
+            How many of the best buses are confirmed.
+        rating
+            Of the converter that confirms [MVA].
+        gain
+            Largest of its POD [pu of its rating].
+
+        Raises
+        ------
+        InputError
+            If the case has no network, no oscillation is in the range, or the device cannot be used.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> places = gfor.load("two_area_rms").site("pod_p", scenario="gfor", confirm=1)
+        >>> places.ranking, places.agrees
+        (('bus_2', 'bus_3'), True)
+        """
+        return Siting(find_sites(self.file, SiteRequest(
+            str(device), None if binding is None else path_of(binding, "binding", "file"), scenario, below,
+            frequency_range(frequencies), None if outages is None else ",".join(names_given(outages, "outages")),
+            confirm, rating, gain, case_values(values), parameter_files(parameters), in_seconds(step, "step"),
+        )))  # fmt: skip
 
     def interactions(
         self,
@@ -392,11 +456,9 @@ class Case:
         >>> found.modes()[["frequency_hz", "share.gfor", "share.grid"]].round(2).iloc[0].tolist()
         [45.53, 0.4, 0.6]
         """
-        executor = choose_executor(workers, None, INTERACTIONS_IMPORT)
-        own, files = case_values(values), parameter_files(parameters)
-        planned = plan_interactions(self.file, interactions_of(wanted), scenario, own, in_seconds(step, "step"), files)
-        question([planned.prepared])
-        return _computed(interacting, planned, executor, folder, "Systems", shown=progress)
+        of_case = (scenario, case_values(values), in_seconds(step, "step"), parameter_files(parameters))
+        planned = partial(plan_interactions, self.file, interactions_of(wanted), *of_case)
+        return _studied(INTERACTIONS, planned, (workers, None, None), folder, "Systems", shown=progress)
 
     def design(
         self,
@@ -440,13 +502,10 @@ class Case:
         >>> design.parameters["gfor.pod_p.K"]
         200.0
         """
-        files = parameter_files(parameters)
-        step_size = in_seconds(step, "step")
-        ratios = cast("Wanted", in_ratios(wanted))
+        request = design_of(controller, wanted, scenario, overrides=case_values(values),
+                            parameters=parameter_files(parameters), step_size=in_seconds(step, "step"))  # fmt: skip
         with shown_stages(shown=progress) as report:
-            design = design_controller(
-                self.file, controller, scenario, case_values(values), step_size, files, ratios, report=report
-            )
+            design = design_controller(self.file, request, report=report)
         question([design.result.prepared])
         return design
 
@@ -509,10 +568,8 @@ class Case:
         request = request_of(names_given(controllers, "controllers"), wanted, scenario=scenario,
                              overrides=case_values(values), parameters=parameter_files(parameters),
                              step_size=in_seconds(step, "step"))  # fmt: skip
-        executor = choose_executor(workers, scheduler, COORDINATED_IMPORT, tls)
-        planned = plan_points_design(self.file, request, path_of(points, "points", "file"), outages)
-        question([planned.prepared])
-        return _computed(designed, planned, executor, folder, "Points", shown=progress)
+        planned = partial(plan_points_design, self.file, request, path_of(points, "points", "file"), outages)
+        return _studied(COORDINATED_DESIGN, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
 
     def __repr__(self) -> str:
         return f"<Case {self.name}: {', '.join(self.scenarios)}>"
@@ -523,19 +580,23 @@ class Case:
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
 
 
-def _computed(
-    compute: Compute[Plan, Shown],
-    planned: Plan,
-    executor: Executor,
+def _studied(
+    study: PointStudy[Plan, Result, Shown],
+    plan: Callable[[], Plan],
+    where: tuple[int | None, str | None, str | Path | None],
     folder: str | Path | None,
     title: str,
     *,
     shown: bool,
 ) -> Shown:
-    """What a planned study gives; a folder that keeps its points is kept from other commands meanwhile."""
+    """Plan a study and compute it; a folder that keeps its points is kept from other commands meanwhile."""
+    workers, scheduler, tls = where
+    executor = choose_executor(workers, scheduler, (study.worker,), tls)
+    planned = plan()
+    question(study.prepared(planned), above=1)
     kept = None if folder is None else _folder(folder)
     with shown_progress(title, shown=shown) as report, nullcontext() if kept is None else held(kept):
-        return compute(planned, executor, kept, report)
+        return study.compute(planned, executor, kept, report)
 
 
 def _folder(given: str | Path) -> Path:

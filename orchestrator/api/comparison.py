@@ -13,7 +13,8 @@ from orchestrator.analysis.threads import side_by_side
 from orchestrator.api.identification import doubt_text, identified_mode_json, opened
 from orchestrator.api.results import Run
 from orchestrator.api.show import page
-from orchestrator.api.values import Names, Time, moment, names
+from orchestrator.api.values import Time, moment
+from orchestrator.asked import Names, names
 from orchestrator.errors import InputError
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.results.recorded import in_memory
@@ -77,10 +78,7 @@ class RunComparison:
 
 
 def compare(
-    a: Run | xr.Dataset | str | Path,
-    b: Run | xr.Dataset | str | Path,
-    signals: Names = (),
-    start: Time | None = None,
+    a: Run | xr.Dataset | str | Path, b: Run | xr.Dataset | str | Path, signals: Names = (), start: Time | None = None
 ) -> RunComparison:
     """Compare two runs: how far signals differ, and what each rings with.
 

@@ -7,7 +7,7 @@ import xarray as xr
 
 from orchestrator.api.identification import opened
 from orchestrator.api.results import Run
-from orchestrator.api.values import Names, names
+from orchestrator.asked import Names, names
 from orchestrator.errors import InputError
 from orchestrator.results.comtrade.writing import write_comtrade
 from orchestrator.study.comparison import recorded

@@ -6,25 +6,15 @@ from typing import Any, TypedDict
 
 import pandas as pd
 
-from orchestrator.api.design import parameter_file_path
-from orchestrator.api.design_wishes import check_wishes, in_ratios
-from orchestrator.api.executors import computing
+from orchestrator.api.design import parameter_file_path, require_controllers
+from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
-from orchestrator.api.values import Names, whole_number
-from orchestrator.api.values import names as names_given
+from orchestrator.asked import Names, checked, require_known
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.coordinated_design.files import as_json, points_rows, ranking_rows, save
-from orchestrator.coordinated_design.study import (
-    PointsDesign,
-    PointsDesignRequest,
-    design_over_points,
-    values_of,
-)
+from orchestrator.coordinated_design.study import PointsDesign, PointsDesignRequest, design_over_points, values_of
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.errors import InputError
-
-WORKERS_IMPORT = ("orchestrator.coordinated_design.worker",)
-"""Modules that a process of a design imports once, before its first point."""
 
 
 class WantedOverPoints(TypedDict, total=False):
@@ -56,23 +46,11 @@ def request_of(controllers: Sequence[str], wanted: WantedOverPoints, **rest: Any
     InputError
         If one of the wishes is unknown, not of its kind or outside of its range; it is named.
     """
-    for controller in controllers:
-        if controller not in DAMPING_CONTROLLERS:
-            raise InputError(f"there is no controller {controller!r}; there are: {', '.join(DAMPING_CONTROLLERS)}")
+    require_controllers(controllers)
     if not controllers:
         raise InputError(f"controllers is empty; name one or both of {', '.join(DAMPING_CONTROLLERS)}")
-    known = tuple(WantedOverPoints.__annotations__)
-    own = in_ratios(wanted)
-    if unknown := [name for name in own if name not in known]:
-        raise InputError(f"a design over points cannot be asked for {', '.join(map(repr, unknown))}; it can for "
-                         f"{', '.join(known)}")  # fmt: skip
-    several: dict[str, Any] = {
-        name: tuple(names_given(own.pop(name), name)) for name in ("components", "modes") if name in own
-    }
-    if "ranked" in own:
-        whole_number(own["ranked"], "ranked", 0, 1000)
-    alike = check_wishes({name: value for name, value in own.items() if name != "ranked"})
-    return PointsDesignRequest(tuple(controllers), **several, **own | alike, **rest)
+    require_known(wanted, WantedOverPoints.__annotations__, "a design over points")
+    return PointsDesignRequest(tuple(controllers), **checked(PointsDesignRequest, wanted), **rest)
 
 
 class CoordinatedDesign:
@@ -149,4 +127,4 @@ class CoordinatedDesign:
         return page(f"Design over points of {self.result.plan.case.name}", lines, self.points())
 
 
-compute = computing(design_over_points, CoordinatedDesign)
+STUDY = PointStudy(design_over_points, CoordinatedDesign, "orchestrator.coordinated_design.worker")

@@ -1,20 +1,18 @@
 """The design of a POD controller."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypedDict
 
 import pandas as pd
 
-from orchestrator.api.design_wishes import check_wishes
 from orchestrator.api.show import page
 from orchestrator.api.values import path as path_of
-from orchestrator.api.values import text_or_none
+from orchestrator.asked import checked, require_known, text_or_none
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
-from orchestrator.cases.parameter_files import ParameterFile, parameter_file_text
-from orchestrator.cases.schema import Value
+from orchestrator.cases.parameter_files import parameter_file_text
 from orchestrator.coordinated_design.one_point import search_settings
 from orchestrator.errors import InputError
 from orchestrator.pod_design.design import DesignRequest, PodDesign, StageReport, design_pod
@@ -138,54 +136,39 @@ class ControllerDesign:
         return page(repr(self).strip("<>"), lines, self.table())
 
 
-def design_controller(
-    file: CaseFile,
-    controller: str,
-    scenario: str | None,
-    values: Mapping[str, Value],
-    step_size: float | None,
-    parameters: Sequence[ParameterFile],
-    wanted: Wanted,
-    *,
-    report: StageReport = lambda text: None,
-    store: PointStore | None = None,
-) -> ControllerDesign:
-    """Design a controller, as `Case.design` offers it.
+def request_of(controller: str, wanted: Wanted, scenario: str | None, **rest: Any) -> DesignRequest:
+    """A request of checked wishes; dampings are in percent.
 
     Parameters
     ----------
-    file
-        The case.
     controller
         ``pod_p`` or ``pod_q``.
-    scenario
-        Its name; where None, the one in which all PODs are there and off.
-    values
-        Values by ``component.variable``; they go before the parameter files.
-    step_size
-        Communication step [s]; the case's where None.
-    parameters
-        Parameter files.
     wanted
         As `Case.design`; a name that it does not have is refused.
-    report
-        Called with the name of each stage when the stage begins.
-    store
-        Keeps figures on the way, as `design_pod` takes it.
+    scenario
+        Its name; where None, the one in which all PODs are there and off.
+    rest
+        Other fields of the request.
     """
-    if controller not in DAMPING_CONTROLLERS:
-        raise InputError(f"there is no controller {controller!r}; there are: {', '.join(DAMPING_CONTROLLERS)}")
-    unknown = [name for name in wanted if name not in Wanted.__annotations__]
-    if unknown:
-        known = ", ".join(Wanted.__annotations__)
-        raise InputError(f"a design cannot be asked for {', '.join(map(repr, unknown))}; it can for {known}")
+    require_controllers([controller])
+    require_known(wanted, Wanted.__annotations__, "a design")
     if "damping" in wanted and "damping_increment" in wanted:
         raise InputError("damping and damping_increment both say what is required; give one of them")
     text_or_none(scenario, "scenario", "a design is made for one scenario: give its name, or leave it out")
-    wishes = check_wishes(wanted)
-    request = DesignRequest(
-        controller, scenario=scenario, overrides=values, parameters=parameters, step_size=step_size, **wishes
-    )
+    return DesignRequest(controller, scenario=scenario, **checked(DesignRequest, wanted), **rest)
+
+
+def require_controllers(controllers: Sequence[str]) -> None:
+    """Refuse a controller that there is not."""
+    for controller in controllers:
+        if controller not in DAMPING_CONTROLLERS:
+            raise InputError(f"there is no controller {controller!r}; there are: {', '.join(DAMPING_CONTROLLERS)}")
+
+
+def design_controller(
+    file: CaseFile, request: DesignRequest, *, report: StageReport = lambda text: None, store: PointStore | None = None
+) -> ControllerDesign:
+    """As `Case.design`; ``store`` keeps figures on the way."""
     return ControllerDesign(design_pod(file, request, report, store, search_settings))
 
 

@@ -1,6 +1,7 @@
 """The modes in a recorded signal."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ from orchestrator.analysis.identification import IdentifiedMode, Sampling, sampl
 from orchestrator.analysis.mode_doubts import is_trend, nothing_swings, over_a_trend, short_window, straight_line
 from orchestrator.api.results import Run
 from orchestrator.api.show import page
-from orchestrator.api.values import Time, moment, text_or_none
+from orchestrator.api.values import Time, moment
+from orchestrator.asked import text_or_none
 from orchestrator.errors import InputError
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recorded import warn_of_early_end
@@ -20,6 +22,7 @@ from orchestrator.study.comparison import open_trajectory, recorded, require_num
 _ONE_SIGNAL = "give one signal, 'a.b' or the difference 'a.b - c.d' of two"
 
 
+@dataclass(eq=False, repr=False)
 class SignalModes:
     """A recorded signal as a sum of modes, the strongest first. `identify` makes it.
 
@@ -31,36 +34,18 @@ class SignalModes:
         Beginning and end of the part of the record that was used [s].
     modes
         Eigenvalue [rad/s], damping and amplitude [unit of the signal] of each mode.
-    interval
-        Time between the samples used [s].
+    used
+        Which samples of the record were used.
+    line
+        By how much the straight line through the samples changes from start to stop [unit of the signal].
     """
 
-    def __init__(
-        self,
-        signal: str,
-        start: float,
-        stop: float,
-        modes: Sequence[IdentifiedMode],
-        used: Sampling,
-        line: float = 0.0,
-    ) -> None:
-        """Keep the result of an identification.
-
-        Parameters
-        ----------
-        signal
-            The signal: ``"a.b"`` or ``"a.b - c.d"``.
-        start, stop
-            Beginning and end of the part of the record that was used [s].
-        modes
-            The modes, the strongest first.
-        used
-            Which samples of the record were used.
-        line
-            By how much the straight line through the samples changes from start to stop [unit of the signal].
-        """
-        self._line = line
-        self.signal, self.start, self.stop, self.modes, self._used = signal, start, stop, list(modes), used
+    signal: str
+    start: float
+    stop: float
+    modes: Sequence[IdentifiedMode]
+    used: Sampling
+    line: float = 0.0
 
     def __iter__(self) -> Iterator[IdentifiedMode]:
         return iter(self.modes)
@@ -71,7 +56,7 @@ class SignalModes:
     @property
     def interval(self) -> float:
         """Time between the samples used [s]."""
-        return self._used.interval
+        return self.used.interval
 
     def is_trend(self, mode: IdentifiedMode) -> bool:
         """Whether a component is an offset or a slow trend, whose damping says nothing about growth.
@@ -98,13 +83,13 @@ class SignalModes:
         if near:
             texts.append(
                 f"Above a quarter of the sampling frequency of {1 / self.interval:.4g} Hz, and perhaps no frequency "
-                f"of the system: {', '.join(near)}. To be sure, {self._used.remedy}."
+                f"of the system: {', '.join(near)}. To be sure, {self.used.remedy}."
             )
         length = self.stop - self.start
         about = [
             nothing_swings(self.modes, length),
             short_window(self.modes, self.start, self.stop),
-            over_a_trend(self.modes, length, self._line),
+            over_a_trend(self.modes, length, self.line),
         ]
         doubtful = [m for m in self.modes if m.doubts and not self.is_trend(m)]
         return [*texts, *filter(None, about), *(f"? {doubt_text(m)}." for m in doubtful)]

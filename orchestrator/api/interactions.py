@@ -3,31 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import Any, TypedDict
 
-from orchestrator.api.executors import computing
+from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
-from orchestrator.api.values import Names, binding_path, flag, frequency_range, text_or_none
-from orchestrator.api.values import names as names_given
+from orchestrator.api.values import binding_path
 from orchestrator.api.values import path as path_of
+from orchestrator.asked import Names, checked, require_known
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.interactions.judgement import JudgedInteractions
-from orchestrator.interactions.request import RANGE_HZ, THRESHOLD, GivenDevice, InteractionsRequest
+from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import InteractionsResult, run_interactions
 from orchestrator.interactions.tables import as_json, assignment_rows, mode_rows, pair_rows, warnings_of
 from orchestrator.interactions.words import sentences
-from orchestrator.late import Late
+from orchestrator.late import pd
 from orchestrator.safe_files import made_folder
-
-if TYPE_CHECKING:
-    import pandas as pd
-else:
-    pd = Late("pandas")
-
-WORKERS_IMPORT = ("orchestrator.interactions.worker",)
-"""Modules that a process of such a study imports once, before its first system."""
 
 
 class WantedInteractions(TypedDict, total=False):
@@ -49,39 +42,19 @@ class WantedInteractions(TypedDict, total=False):
 def request_of(wanted: WantedInteractions) -> InteractionsRequest:
     """A request of checked wishes.
 
-    Parameters
-    ----------
-    wanted
-        What is asked for.
-
     Raises
     ------
     InputError
         If one of the wishes is unknown, not of its kind or outside of its range; it is named.
     """
-    known = tuple(WantedInteractions.__annotations__)
-    if unknown := [name for name in wanted if name not in known]:
-        raise InputError(f"interactions cannot be asked for {', '.join(map(repr, unknown))}; they can for "
-                         f"{', '.join(known)}")  # fmt: skip
-    threshold = wanted.get("threshold", THRESHOLD)
-    if isinstance(threshold, bool) or not isinstance(threshold, int | float) or not 0 < threshold <= 0.5:
-        raise InputError(f"threshold = {threshold!r}; it must be a share above 0, and at most 0.5: 0.05 is 5 %")
-    bindings, given = wanted.get("bindings", {}), wanted.get("devices", {})
-    if lonely := [name for name in bindings if name not in given]:
-        raise InputError(f"bindings: there is no device {lonely[0]!r}; the devices are: {', '.join(given) or 'none'}")
-    devices = []
-    for name, file in given.items():
-        binding = binding_path(bindings.get(name))
-        devices.append(GivenDevice(name, as_device(path_of(file, "devices"), binding), binding))
-    return InteractionsRequest(
-        threshold,
-        frequency_range(wanted.get("frequencies", RANGE_HZ)),
-        text_or_none(wanted.get("stand_in"), "stand_in", "it must be the name of a model"),
-        flag(wanted.get("swap", False), "swap") or bool(devices),
-        tuple(devices),
-        names_given(wanted.get("places", ()), "places"),
-        flag(wanted.get("black_box", False), "black_box"),
-    )
+    require_known(wanted, WantedInteractions.__annotations__, "interactions")
+    bindings, files = wanted.get("bindings", {}), wanted.get("devices", {})
+    if lonely := [name for name in bindings if name not in files]:
+        raise InputError(f"bindings: there is no device {lonely[0]!r}; the devices are: {', '.join(files) or 'none'}")
+    given = {name: (path_of(file, "devices"), binding_path(bindings.get(name))) for name, file in files.items()}
+    devices = tuple(GivenDevice(name, as_device(*of), of[1]) for name, of in given.items())
+    request = InteractionsRequest(**checked(InteractionsRequest, wanted), devices=devices)
+    return replace(request, swap=request.swap or bool(devices))
 
 
 class Interactions:
@@ -143,18 +116,7 @@ class Interactions:
         return as_json(self.judgement)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write tables, ``interactions.json`` and the page ``interactions.html``; give their paths.
-
-        Parameters
-        ----------
-        folder
-            Folder for the files; it is made where it is missing.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be made.
-        """
+        """Write tables, ``interactions.json`` and the page ``interactions.html`` into a folder; give their paths."""
         from orchestrator.interactions.files import save  # noqa: PLC0415 - imports what only pages need
 
         return save(self.judgement, made_folder(Path(folder)))
@@ -167,4 +129,4 @@ class Interactions:
         return page(repr(self).strip("<>"), self.sentences, self.pairs())
 
 
-compute = computing(run_interactions, Interactions)
+STUDY = PointStudy(run_interactions, Interactions, "orchestrator.interactions.worker")

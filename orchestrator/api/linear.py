@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.state_space import StateSpace
@@ -14,12 +13,7 @@ from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.api.show import page
 from orchestrator.api.values import path as path_of
 from orchestrator.errors import InputError
-from orchestrator.late import Late
-
-if TYPE_CHECKING:
-    import pandas as pd
-else:
-    pd = Late("pandas")
+from orchestrator.late import pd
 
 UNKNOWN = OperatingPoint(math.nan, math.nan, math.nan, 0, {})
 """That of a model which was read from an FMU."""

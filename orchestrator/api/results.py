@@ -10,21 +10,18 @@ import numpy as np
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
 from orchestrator.api.show import Axes, axes_or_new, curves_on, page
+from orchestrator.api.sources import Sources, sources_of
+from orchestrator.api.values import Time
 from orchestrator.errors import CosimError, InputError
-from orchestrator.late import Late
+from orchestrator.late import pd, xr
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import recorded
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
-
     from orchestrator.analysis.stability import Stability
     from orchestrator.study.modes import ModesResult
     from orchestrator.study.run import RunResult
     from orchestrator.watch.finding import Finding
-else:
-    pd = Late("pandas")
 
 _STATES = 3
 """States with the largest participation that stand in a table."""
@@ -266,6 +263,16 @@ class Run:
     def table(self) -> pd.DataFrame:
         """All recorded signals over the time [s]."""
         return self.dataset.to_dataframe()
+
+    def source(self, start: Time | None = None, stop: Time | None = None) -> Sources:
+        """Where the run's oscillations come from; see `orchestrator.source`.
+
+        Parameters
+        ----------
+        start, stop
+            The part of the run that is used [s]; by default all of it.
+        """
+        return sources_of(self.dataset, str(self.dataset.attrs.get("scenario", "run")), start, stop)
 
     def summary(self) -> dict[str, Any]:
         """The same as ``gfor run --json`` prints of this scenario, as JSON's types."""

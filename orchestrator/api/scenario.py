@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
@@ -15,44 +15,31 @@ from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
 from orchestrator.api.sensitivities import Sensitivities
 from orchestrator.api.show import page
-from orchestrator.api.values import (
-    Names,
-    Paths,
-    Time,
-    case_values,
-    damping_percent,
-    frequency_range,
-    in_seconds,
-    parameter_files,
-    plain_value,
-)
-from orchestrator.api.values import names as names_given
+from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.api.values import path as path_of
+from orchestrator.asked import Names, frequency_range, percent, plain_value, whole_number
+from orchestrator.asked import names as names_given
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.load_models import as_powers, is_open
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import SharingRule
+from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
 from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
 from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
-from orchestrator.late import Late
+from orchestrator.late import pd
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-else:
-    pd = Late("pandas")
 
 
 class RunEndedWarning(UserWarning):
@@ -172,7 +159,8 @@ class Scenario:
         """
         from orchestrator.study.modes import compute_modes, running  # noqa: PLC0415 - only modes need it
 
-        frequencies, critical = frequency_range(frequencies), damping_percent(critical, "critical")
+        frequencies = frequency_range(frequencies)
+        critical = None if critical is None else percent(critical, "critical")
         if critical is not None and not frequencies[0] > 0:
             raise InputError("a search for critical modes needs frequencies that begin above 0 Hz, such as (0.1, 2.0)")
         if not black_box:
@@ -247,7 +235,8 @@ class Scenario:
 
         prepared = self._until(in_seconds(stop, "stop"))
         _check_observers(observers)
-        _check_threads(threads)
+        if threads is not None:
+            whole_number(threads, "threads", 1, MOST_THREADS)
         _check_kind(
             recording, RecordingFolder, "recording", "give a RecordingFolder; `checkpoints` takes a folder's path"
         )
@@ -407,6 +396,30 @@ class Scenario:
             raise InputError(f"steps: {wrong_lengths[0]:g} s; give communication steps above 0")
         return choose_step(self.prepared, Allowed(*allowed), lengths, chosen, frequency_range(frequencies))
 
+    def strengths(self, converter_current: float = 0.0, rating: float | None = None) -> list[BusStrength]:
+        """Short-circuit power of every bus, with the short-circuit ratio of the converters there.
+
+        Parameters
+        ----------
+        converter_current
+            That a converter feeds into a short circuit [pu of its rating].
+        rating
+            Of a converter that every bus is judged for [MVA]; the converters' own at their buses by default.
+
+        Raises
+        ------
+        InputError
+            If the case has no power flow, or nothing feeds a short circuit.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> weakest = min(gfor.load("ieee39").scenario("base").strengths(), key=lambda bus: bus.s_sc_mva)
+        >>> weakest.bus, round(weakest.s_sc_mva)
+        ('bus_12', 2751)
+        """
+        return ShortCircuit.of(self.prepared).strengths(converter_current, rating)
+
     def linearize(self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False) -> LinearSystem:
         """The linear model A, B, C, D around the steady state, with names and the verdict on it.
 
@@ -455,11 +468,6 @@ def _check_observers(given: Sequence[Observer]) -> None:
         raise InputError(f"observers = {given!r}; give a list of observers, or leave it out")
 
 
-def _check_threads(given: int | None) -> None:
-    if given is not None and (isinstance(given, bool) or not isinstance(given, int) or not 1 <= given <= MOST_THREADS):
-        raise InputError(f"threads = {given!r}; give a whole number from 1 to {MOST_THREADS}, or leave it out")
-
-
 def _check_kind(given: object, kind: type, argument: str, rule: str) -> None:
     if given is not None and not isinstance(given, kind):
         raise InputError(f"{argument} = {given!r}; {rule}, or leave it out")
@@ -492,34 +500,14 @@ def choose(
     parameters: Paths = (),
     schedule: ScheduleName | None = None,
     tolerance: float | None = None,
+    sharing: str | None = None,
 ) -> list[Scenario]:
-    """Scenarios of a case, as `Case.choose` offers them.
-
-    Parameters
-    ----------
-    file
-        The case.
-    names
-        Of the scenarios; all of them where empty.
-    values
-        Values by ``component.variable``; they go before the parameter files.
-    step, stop
-        Communication step, and time at which runs end [s]; the case's where None.
-    parameters
-        Paths of parameter files.
-    schedule
-        In which order components step, and what inputs do meanwhile; the case's where None.
-    tolerance
-        Largest error of a coupled output in a pair of steps, of 1 or of its value; None for fixed steps, or the case's.
-
-    Raises
-    ------
-    CaseError
-        With every problem of the case and of the values.
-    """
+    """As `Case.choose` offers them."""
     if schedule is not None and schedule not in SCHEDULES:
         raise InputError(f"schedule = {schedule!r}; give one of {', '.join(SCHEDULES)}")
-    files = parameter_files(parameters)
+    if sharing is not None and sharing not in list(SharingRule):
+        raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
+    file, files = replace(file, sharing=SharingRule(sharing) if sharing else None), parameter_files(parameters)
     chosen, step_size, stop_time = case_values(values), in_seconds(step, "step"), in_seconds(stop, "stop")
     prepared = file.prepare(names_given(names, "names"), chosen, step_size, stop_time, files)
     prepared = [_as_asked(one, schedule, tolerance) for one in prepared]
@@ -537,7 +525,7 @@ def _as_asked(prepared: PreparedScenario, schedule: ScheduleName | None, toleran
     return prepared if tolerance is None else prepared.with_tolerance(tolerance)
 
 
-def question(scenarios: Iterable[PreparedScenario]) -> None:
-    """Warn about data that are most unusual, each once, where the caller of the caller stands."""
+def question(scenarios: Iterable[PreparedScenario], above: int = 0) -> None:
+    """Warn about data that are most unusual, each once, where the caller of the caller stands, or ``above`` it."""
     for text in dict.fromkeys(str(one) for prepared in scenarios for one in prepared.questions):
-        warnings.warn(f"question: {text}", UnusualDataWarning, stacklevel=3)
+        warnings.warn(f"question: {text}", UnusualDataWarning, stacklevel=3 + above)

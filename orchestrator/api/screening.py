@@ -5,15 +5,12 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.api.executors import computing
+from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
 from orchestrator.safe_files import made_folder
 from orchestrator.screening.study import ScreeningResult, run_screening
 from orchestrator.screening.summary import ModeAt, Summary, as_json
 from orchestrator.screening.words import verdict_sentence, what_was_counted
-
-WORKERS_IMPORT = ("orchestrator.screening.worker",)
-"""Modules that a process of a screening imports once, before its first point."""
 
 
 class Screening:
@@ -66,18 +63,7 @@ class Screening:
         return as_json(self.summary)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write ``items.csv``, ``modes.csv``, ``screening.json`` and the page ``screening.html``.
-
-        Parameters
-        ----------
-        folder
-            Folder for the files; it is made where it is missing.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be made.
-        """
+        """Write ``items.csv``, ``modes.csv``, ``screening.json`` and the page ``screening.html`` into a folder."""
         from orchestrator.screening.files import save  # noqa: PLC0415 - imports Matplotlib, a second
 
         return save(self.summary, made_folder(Path(folder)))
@@ -90,4 +76,4 @@ class Screening:
         return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
 
 
-compute = computing(run_screening, Screening)
+STUDY = PointStudy(run_screening, Screening, "orchestrator.screening.worker")

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from orchestrator.api.show import page
-from orchestrator.late import Late
+from orchestrator.late import pd
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import made_folder
 from orchestrator.sensitivities.sensitivities import SensitivityResult
 from orchestrator.sensitivities.tables import as_json, rows_of
-
-if TYPE_CHECKING:
-    import pandas as pd
-else:
-    pd = Late("pandas")
 
 
 class Sensitivities:

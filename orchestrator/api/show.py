@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.late import Late
-
-if TYPE_CHECKING:
-    import pandas as pd
-else:
-    pd = Late("pandas")
+from orchestrator.late import pd
 
 Axes = Any
 """``matplotlib.axes.Axes``; to import the class takes a second, which only plots are worth."""

@@ -8,20 +8,10 @@ import pandas as pd
 import xarray as xr
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.executors import computing
+from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import Axes, axes_or_new, page
-from orchestrator.api.values import (
-    Names,
-    Paths,
-    Time,
-    case_values,
-    check_case_name,
-    frequency_range,
-    in_seconds,
-    names,
-    parameter_files,
-    plain_value,
-)
+from orchestrator.api.values import Paths, Time, case_values, check_case_name, in_seconds, parameter_files
+from orchestrator.asked import Names, frequency_range, names, plain_value
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.errors import InputError
 from orchestrator.results.mode_json import eigenvalue_json
@@ -29,10 +19,8 @@ from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
+from orchestrator.sweep.limit import Until
 from orchestrator.sweep.sweep import SweepPlan, SweepResult, plan_sweep, run_sweep
-
-WORKERS_IMPORT = ("orchestrator.sweep.worker",)
-"""Modules that a process of a sweep imports once, before its first point."""
 
 
 class ParameterSweep:
@@ -44,11 +32,14 @@ class ParameterSweep:
         All points, and the modes followed over them.
     samples
         The modes' figures at every point, for tables and plots.
+    limits
+        How far the parameter may go in each scenario, where ``until`` asks for it.
     """
 
     def __init__(self, result: SweepResult) -> None:
         self.result = result
         self.samples = Samples(result)
+        self.limits = tuple(result.limits)
 
     @property
     def remarks(self) -> list[str]:
@@ -151,9 +142,9 @@ class ParameterSweep:
 
         place = made_folder(Path(folder))
         with staged(place, new_run_id()) as staging:
-            save_sweep(self.samples, staging)
+            tables = save_sweep(self.samples, staging)
             plots = save_sweep_plots(self.samples, staging)
-        return [place / name for name in ("sweep.nc", "sweep.csv", *(path.name for path in plots))]
+        return [place / name for name in (*tables, *(path.name for path in plots))]
 
     def plot(self, ax: Axes = None) -> Axes:
         """The modes in the complex plane; a circle where each begins.
@@ -198,37 +189,30 @@ def plan(
     step: Time | None = None,
     parameters: Paths = (),
     frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    until: str | float | None = None,
 ) -> SweepPlan:
-    """Check a sweep, and build the FMUs that it needs, as `Case.sweep` does first.
-
-    Parameters
-    ----------
-    file
-        The case.
-    vary
-        Values by ``component.parameter``, or texts as with ``--vary``.
-    scenarios
-        Names of the scenarios; all of them where empty.
-    values
-        Values by ``component.variable`` that hold at every point. They have priority over the parameter files.
-    step
-        Communication step [s]; the case's where None.
-    parameters
-        Paths of parameter files.
-    frequencies
-        Modes from the first to the second are followed [Hz].
-
-    Raises
-    ------
-    InputError
-        If a value, a name or a file cannot be used.
-    """
+    """As `Case.sweep` takes it, checked, and its FMUs built."""
     files, fixed = parameter_files(parameters), case_values(values)
     chosen, seen = names(scenarios, "scenarios"), frequency_range(frequencies)
-    return plan_sweep(file, _varied(vary), chosen, fixed, in_seconds(step, "step"), seen, files)
+    return plan_sweep(file, _varied(vary), chosen, fixed, in_seconds(step, "step"), seen, files, _until(until))
 
 
-compute = computing(run_sweep, ParameterSweep)
+def _until(given: str | float | None) -> Until | None:
+    """What must not be given up: ``unstable``, or a damping [%]."""
+    if given is None:
+        return None
+    if isinstance(given, str) and given.strip().lower() == "unstable":
+        return Until()
+    try:
+        damping = float(given.strip().removesuffix("%") if isinstance(given, str) else given)
+    except (TypeError, ValueError):
+        damping = -1.0
+    if isinstance(given, bool) or not 0 < damping < 100:
+        raise InputError(f"until = {given!r}; give 'unstable', or a damping from 0 to 100 % such as '5 %'")
+    return Until(damping)
+
+
+STUDY = PointStudy(run_sweep, ParameterSweep, "orchestrator.sweep.worker", lambda plan: plan.scenarios)
 
 
 def _varied(vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary]) -> list[Vary]:

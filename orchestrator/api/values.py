@@ -5,28 +5,22 @@ Each reader here raises an `InputError` that says which argument it was, the val
 """
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cases.build_choices import ALPHA
+from orchestrator.asked import number_in, plain_value
+from orchestrator.cases.build_choices import ALPHA, MODELS
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import flatten, given_twice
 from orchestrator.errors import InputError
-from orchestrator.units import to_unit
 
 Time = float | str
 """A time: a number of seconds, or text with a unit such as ``"200 us"``."""
 
-Names = str | Sequence[str]
-"""One name, or several."""
-
 Paths = str | Path | Iterable[str | Path]
 """One path, or several."""
-
-_LARGEST = 10**308
-"""Of a whole number that a floating-point number can hold."""
 
 _SHOWN = 60
 """Characters of an overlong path that an error shows."""
@@ -67,7 +61,7 @@ def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> d
 
 def check_case_name(name: str, argument: str) -> None:
     """Refuse a name that is not of the form ``component.variable``."""
-    if not _CASE_VALUE.fullmatch(name) and name != ALPHA:
+    if not _CASE_VALUE.fullmatch(name) and name not in (ALPHA, MODELS):
         raise InputError(f"{argument}: {name!r} is not of the form component.variable, such as 'grid.X_L'")
 
 
@@ -76,24 +70,6 @@ def _keys(values: Mapping[Any, Any]) -> Iterable[Any]:
         yield key
         if isinstance(value, dict):
             yield from _keys(value)
-
-
-def plain_value(value: Any) -> Value:
-    """A value, as Python's own number where it is one of NumPy."""
-    own: Value = value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
-    if isinstance(own, int) and abs(own) > _LARGEST:
-        raise InputError("a whole number beyond 1e308 was given as a value; give a number that a float can hold")
-    return own
-
-
-def names(given: Names, argument: str) -> tuple[str, ...]:
-    """One name or several, as a tuple."""
-    if isinstance(given, str):
-        return (given,)
-    listed: tuple[Any, ...] = tuple(given) if isinstance(given, Iterable) else (None,)
-    if isinstance(given, bytes) or not all(isinstance(name, str) for name in listed):
-        raise InputError(f"{argument} = {given!r}; give a name, or a list of names")
-    return listed
 
 
 def path(given: Any, argument: str, kind: str = "file") -> Path:
@@ -123,7 +99,7 @@ def in_seconds(time: Time | None, argument: str) -> float | None:
     """A time [s]; None for None."""
     if time is None:
         return None
-    number = _number(time, "s", argument, "a time above 0 and finite, such as 5.0 or '200 us'")
+    number = number_in(time, "s", argument, "a time above 0 and finite, such as 5.0 or '200 us'")
     if not 0 < number < float("inf"):
         raise InputError(f"{argument} = {time!r}; it must be a time above 0 and finite, such as 5.0 or '200 us'")
     return number
@@ -132,7 +108,7 @@ def in_seconds(time: Time | None, argument: str) -> float | None:
 def moment(time: Any, argument: str) -> float:
     """A time on the axis of a run [s], which begins at 0."""
     rule = "a time of 0 or later and finite, such as 2.0 or '500 ms'"
-    number = _number(time, "s", argument, rule)
+    number = number_in(time, "s", argument, rule)
     if not 0 <= number < float("inf"):
         raise InputError(f"{argument} = {time!r}; it must be {rule}")
     return number
@@ -149,7 +125,7 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
         The least that is of use [MB].
     """
     rule = "an amount of memory in MB, such as 4096, or '4 GB'"
-    number = _number(given, "MB", argument, rule)
+    number = number_in(given, "MB", argument, rule)
     if not number < float("inf") or not number > 0:
         raise InputError(f"{argument} = {given!r}; it must be above 0 MB and finite, such as 4096 or '4 GB'")
     if number < least:
@@ -158,76 +134,6 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
             "4096 or '4 GB'"
         )
     return number
-
-
-def frequency_range(given: Any) -> tuple[float, float]:
-    """Two frequencies [Hz], the lower one first."""
-    rule = "give two in Hz, the lower one first, such as (0.1, 2.0)"
-    if isinstance(given, str) or not isinstance(given, Sequence | tuple) or len(given) != 2:
-        raise InputError(f"frequencies = {given!r}; {rule}")
-    low, high = (_number(one, "Hz", "frequencies", rule) for one in given)
-    if not 0 <= low < high:
-        raise InputError(f"frequencies = {given!r}; {rule}")
-    return low, high
-
-
-def damping_percent(given: Any, argument: str, most: float = 90.0) -> float | None:
-    """A damping [%] as a ratio; None for None. A number below 1 looks like a ratio and is refused."""
-    if given is None:
-        return None
-    own = plain_value(given)
-    if isinstance(own, bool | str) or not isinstance(own, int | float) or not 0 < own <= most:
-        raise InputError(
-            f"{argument} = {given!r}; it is a damping in percent, above 0 and at most {most:g}, such as 20"
-        )
-    if own < 1:
-        raise InputError(
-            f"{argument} = {given!r} is read in percent, at least 1; write {100 * own:g} for a damping ratio of {own:g}"
-        )
-    return own / 100
-
-
-def text_or_none(given: Any, argument: str, rule: str) -> str | None:
-    """One text; None for None."""
-    if given is not None and (not isinstance(given, str) or not given):
-        raise InputError(f"{argument} = {given!r}; {rule}")
-    return given
-
-
-def whole_number(given: Any, argument: str, least: int, most: int) -> int:
-    """A whole number from ``least`` to ``most``.
-
-    Parameters
-    ----------
-    given, argument
-        What the caller gave, and the name of the argument.
-    least, most
-        The range, both ends included.
-    """
-    own = plain_value(given)
-    if isinstance(own, bool) or not isinstance(own, int) or not least <= own <= most:
-        raise InputError(f"{argument} = {given!r}; give a whole number from {least} to {most}")
-    return own
-
-
-def flag(given: Any, argument: str) -> bool:
-    """A truth value."""
-    own = plain_value(given)
-    if not isinstance(own, bool):
-        raise InputError(f"{argument} = {given!r}; give True or False")
-    return own
-
-
-def _number(given: Any, unit: str, argument: str, rule: str) -> float:
-    own = plain_value(given)
-    if isinstance(own, bool) or not isinstance(own, int | float | str):
-        raise InputError(f"{argument} = {given!r}; give {rule.removeprefix('give ')}")
-    try:
-        return to_unit(own, unit)
-    except ValueError as error:
-        raise InputError(f"{argument}: {error}") from error
-    except OverflowError as error:
-        raise InputError(f"{argument} is a number beyond 1e308; give {rule.removeprefix('give ')}") from error
 
 
 def parameter_files(paths: Paths) -> list[ParameterFile]:

@@ -14,24 +14,14 @@ from orchestrator.binding.scales import PER_UNIT, Bases, UnitsDifferError, amoun
 from orchestrator.binding.tables import BindingTable, PhasorTable, SignalTable, StartTable
 from orchestrator.errors import BindingError, ErrorKind, Problem
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_description
-from orchestrator.fmi.port import (
-    START,
-    BoundDescription,
-    Form,
-    Matrix2,
-    PhasorMap,
-    PortMap,
-    SignalMap,
-    StartMap,
-)
+from orchestrator.fmi.port import START, BoundDescription, Form, Matrix2, PhasorMap, PortMap, SignalMap, StartMap
 from orchestrator.toml_files import fault_of, read_toml
 from orchestrator.units import to_unit
 
 _FORMS = {"rectangular": Form.RECTANGULAR, "dq": Form.RECTANGULAR, "qd": Form.RECTANGULAR, "polar": Form.POLAR,
           "abc": Form.ABC, "power": Form.POWER}  # fmt: skip
 _FREQUENCY = ("omega", "frequency")
-_SWITCH = ".enabled"
-"""End of our names of Boolean variables, such as ``pod_p.enabled``."""
+_SWITCH = ".enabled"  # end of our names of Boolean variables, such as ``pod_p.enabled``
 
 
 def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescription:
@@ -84,9 +74,8 @@ class _Reader:
             voltage, current = self._voltage(bases), self._current(bases, own_rating)
             start, signals, settings = self._start(bases, own_rating), self._signals(bases), self._settings()
             if voltage is not None and current is not None:
-                port = PortMap(
-                    bases.rating, bases.frequency, voltage, current, start, signals, settings, self._current_limit()
-                )
+                port = PortMap(bases.rating, bases.frequency, voltage, current, start, signals, settings,
+                               self._current_limit(), bases.voltage)  # fmt: skip
                 self._check_once(port)
         if self._problems or port is None:
             raise BindingError(self._source, self._problems)

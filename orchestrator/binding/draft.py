@@ -56,16 +56,10 @@ class Guess:
 def draft_binding(fmu: FmuDescription, beside: Path | None = None) -> str:
     """Write the text of a binding file.
 
-    Parameters
-    ----------
-    beside
-        Folder of the binding file. The FMU's path is written relative to it; None writes the file's name alone.
+    ``beside``: Folder of the binding file. The FMU's path is written relative to it; None writes the file's name alone.
 
-    Returns
-    -------
-    str
-        TOML. Lines with ``GUESS`` are to be confirmed; values that begin with ``REQUIRED`` are to be filled in, and
-        `bind` accepts none of them.
+    Returns TOML. Lines with ``GUESS`` are to be confirmed; values that begin with ``REQUIRED`` are to be filled in, and
+    `bind` accepts none of them.
     """
     voltage = _find(fmu, "input", _VOLTAGE, VOLTS, ("rectangular", "dq", "polar", "abc"))
     current = _find(fmu, "output", _CURRENT, AMPERES, ("rectangular", "dq", "polar", "abc"))
@@ -205,10 +199,7 @@ def _phasor(table: str, guess: Guess | None, names: Sequence[str]) -> list[str]:
     listed = ", ".join(names[:20]) + (", …" if len(names) > 20 else "")
     if guess is None:
         forms = "rectangular, dq, qd, polar or abc" + (", or power" if table == "current" else "")
-        lines += [
-            f'form = "{REQUIRED}: {forms}"',
-            f'variables = ["{REQUIRED}: one or more of: {_comment(listed)}"]',
-        ]
+        lines += [f'form = "{REQUIRED}: {forms}"', f'variables = ["{REQUIRED}: one or more of: {_comment(listed)}"]']
     else:
         lines.append(f'form = "{guess.form}"  # GUESS; qd is f = f_q − j·f_d, dq is f = f_d + j·f_q')
         lines.append(f"variables = [{', '.join(_quoted(v.name) for v in guess.variables)}]  # GUESS")

@@ -3,18 +3,23 @@ words, for every command.
 """
 
 from cmath import phase
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import pi, sqrt
+
+import numpy as np
+
+from orchestrator.arrays import Numbers
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.port import BoundDescription
 
 BALANCE = 0.02
 """Deviation of the power from what was asked [of it] up to which signs and bases are right; losses are below it."""
 
-FREQUENCY_APART = 0.02
-"""Deviation of omega at rest from 1 above which a device is made for another frequency."""
-
-SHOWN = (0.4, 2.5)
-"""What omega is at the start of a device that shows it there at all."""
+FREQUENCY_APART = 0.02  # deviation of omega at rest from 1 above which a device is made for another frequency
+SLIGHT = 1e-3  # the same below which nothing is said
+_HELD = 5
+"""How often a device is held again whose omega still comes nearer to 1, as a meter's does that begins elsewhere."""
 
 REMEDIES = {
     "wrong rated frequency": "set f_n of the binding's [rating] to the frequency that it is made for; a network of "
@@ -28,6 +33,9 @@ REMEDIES = {
 }
 
 
+_OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit")
+
+
 @dataclass(frozen=True)
 class Misfit:
     """A fault, by its name among `REMEDIES`, and what shows it."""
@@ -39,6 +47,23 @@ class Misfit:
     def sentence(self, name: str) -> str:
         """The whole finding on the component of a name."""
         return f"{name}: {self.fault}: {self.evidence}; {REMEDIES[self.fault]}"
+
+
+def at_rest(hold: Callable[[], Numbers]) -> tuple[float, bool]:
+    """The omega of a device that is held at a bus for a while, again and again, and whether it has settled."""
+    late = float("nan")
+    for _ in range(_HELD):
+        omega = hold()
+        tenth, half = max(1, len(omega) // 10), max(1, len(omega) // 2)
+        middle, late = float(np.median(omega[:half][-tenth:])), float(np.median(omega[-tenth:]))
+        if abs(late - 1) <= SLIGHT or abs(late - 1) >= 0.9 * abs(middle - 1):
+            return late, True
+    return late, False
+
+
+def likely_cause(described: FmuDescription, fault: str) -> str:
+    """What of the binding's ratings brings a fault; "" where nothing does."""
+    return described.likely_cause() if fault in _OF_RATING and isinstance(described, BoundDescription) else ""
 
 
 def omega_seen(omega: float) -> str:
@@ -72,6 +97,12 @@ def of_current(size: float, limit: float | None) -> Misfit | None:
     if limit is None or size <= limit * (1 + BALANCE):
         return None
     return Misfit("above its current limit", f"at rest {size:.3g} pu of its rating; {limit:g} pu is declared")
+
+
+def of_dip(size: float, limit: float, begin: float) -> Misfit:
+    """By its current in a disturbance [pu, S_n], over a cycle, that begins to be above its limit at a time [s]."""
+    seen = f"{size:.3g} pu of its rating over a cycle, from t = {begin:.4g} s; {limit:g} pu is declared"
+    return Misfit("above its current limit", seen, {"mean": size, "declared": limit})
 
 
 def power_seen(at: str, asked: complex, found: complex) -> str:

@@ -7,12 +7,7 @@ from orchestrator.units import to_unit
 
 PER_UNIT = "pu"
 _NO_UNIT = {"", "1", "-", "pu", "p.u.", "p.u", "PU", "per unit", "per_unit"}
-_VALUES = {
-    "line-to-line rms": 1.0,
-    "line-to-line peak": sqrt(2),
-    "phase rms": 1 / sqrt(3),
-    "phase peak": sqrt(2 / 3),
-}
+_VALUES = {"line-to-line rms": 1.0, "line-to-line peak": sqrt(2), "phase rms": 1 / sqrt(3), "phase peak": sqrt(2 / 3)}
 """Factor of each kind of voltage to the line-to-line rms voltage."""
 
 
@@ -49,10 +44,7 @@ def factor(unit: str, target: str, name: str) -> float:
 def amount(text: str | float, unit: str, what: str) -> float:
     """A number from text with a unit, which is required.
 
-    Raises
-    ------
-    ValueError
-        If the text is not a quantity of this kind, or the number does not exceed 0.
+    Raises a `ValueError` if the text is not a quantity of this kind, or the number does not exceed 0.
     """
     try:
         value = to_unit(text, unit)
@@ -66,14 +58,9 @@ def amount(text: str | float, unit: str, what: str) -> float:
 class Bases:
     """Rating and rated voltage of an FMU, and the factors from its units to per unit.
 
-    Parameters
-    ----------
-    rating
-        S_n [MVA].
-    voltage
-        V_n, line to line [kV]; None if the binding does not give it.
-    frequency
-        f_n [Hz].
+    ``rating``: s_n [MVA].
+    ``voltage``: v_n, line to line [kV]; None if the binding does not give it.
+    ``frequency``: f_n [Hz].
     """
 
     def __init__(self, rating: float, voltage: float | None, frequency: float) -> None:
@@ -87,12 +74,8 @@ class Bases:
     def voltage_unit(self, unit: str, base: str | None, value: str | None, name: str) -> float:
         """Number of the FMU's units in 1 pu of voltage.
 
-        Parameters
-        ----------
-        base
-            Voltage of 1 pu, such as ``"220 kV"``; V_n where None. Only the unit pu has a base.
-        value
-            Kind of value, such as ``"phase peak"``; required for every unit except pu.
+        ``base``: voltage of 1 pu, such as ``"220 kV"``; V_n where None. Only the unit pu has a base.
+        ``value``: kind of value, such as ``"phase peak"``; required for every unit except pu.
         """
         if unit == PER_UNIT:
             if base in (None, "V_n"):
@@ -105,12 +88,8 @@ class Bases:
     def current_unit(self, unit: str, base: str | None, value: str | None, name: str) -> float:
         """Number of the FMU's units in 1 pu of current on the rating.
 
-        Parameters
-        ----------
-        base
-            Power of the base, such as ``"100 MVA"``; S_n where None. Only the unit pu has a base.
-        value
-            ``"rms"`` or ``"peak"``; required for every unit except pu.
+        ``base``: power of the base, such as ``"100 MVA"``; S_n where None. Only the unit pu has a base.
+        ``value``: ``"rms"`` or ``"peak"``; required for every unit except pu.
         """
         if unit == PER_UNIT:
             return self.rating / self._power_base(base, name)

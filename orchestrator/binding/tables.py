@@ -6,8 +6,7 @@ from pydantic import Field, field_validator, model_validator
 
 from orchestrator.toml_files import Table
 
-REQUIRED = "REQUIRED"
-"""Word that `gfor bind` writes for an unknown value. A binding that still contains it is refused."""
+REQUIRED = "REQUIRED"  # word that `gfor bind` writes for an unknown value. A binding that still contains it is refused.
 
 
 class DraftedTable(Table):

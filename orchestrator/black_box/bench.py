@@ -35,38 +35,23 @@ the period, where a sampled controller of phase quantities makes the output repe
 
 @dataclass
 class Bench:
-    """Start of a device, and the variables through which it is measured.
+    """Start of a device, and the variables through which it is measured."""
 
-    Attributes
-    ----------
-    description, parameters
-        The FMU and what it is given before initialisation: rating, power-flow values, its own parameters.
-    inputs, outputs
-        Names, such as ``v_re``, ``v_im`` and ``i_re``, ``i_im``.
-    rest
-        Values of the inputs at the operating point, shape (m,).
-    held
-        Constant values of the inputs that the bench does not change.
-    step_size
-        Communication step [s].
-    restore
-        Whether the bench saves and restores the FMU's state; None if it does so with every FMU that can.
-    isolated
-        As in `open_component`.
-    longest_wait
-        Longest time that the device may take to come to rest [s].
-    """
-
+    # description, parameters: the FMU and what it is given before initialisation: rating, power-flow values, its own
+    # parameters
     description: FmuDescription
     parameters: Mapping[str, float | bool]
-    rest: Numbers
+    rest: Numbers  # values of the inputs at the operating point, shape (m,)
+    # inputs, outputs: names, such as ``v_re``, ``v_im`` and ``i_re``, ``i_im``
     inputs: Sequence[str] = ("v_re", "v_im")
     outputs: Sequence[str] = ("i_re", "i_im")
+    # constant values of the inputs that the bench does not change
     held: Mapping[str, float] = field(default_factory=dict)
-    step_size: float = 1e-4
+    step_size: float = 1e-4  # communication step [s]
+    # whether the bench saves and restores the FMU's state; None if it does so with every FMU that can
     restore: bool | None = None
-    isolated: bool | None = None
-    longest_wait: float = 120.0
+    isolated: bool | None = None  # as in `open_component`
+    longest_wait: float = 120.0  # longest time that the device may take to come to rest [s]
 
     @property
     def saves_state(self) -> bool:
@@ -86,12 +71,8 @@ class Bench:
 class Runs:
     """Runs on a bench; each begins at the operating point.
 
-    Attributes
-    ----------
-    still_after
-        Time that the device needed to come to rest [s].
-    operating_point
-        Outputs at the operating point, shape (p,).
+    ``still_after``: Time that the device needed to come to rest [s].
+    ``operating_point``: Outputs at the operating point, shape (p,).
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -118,10 +99,7 @@ class Runs:
     def respond(self, parts: Iterable[Numbers]) -> Iterator[Numbers]:
         """Outputs after every step while the inputs deviate from rest, part by part as they are asked for.
 
-        Parameters
-        ----------
-        parts
-            Deviations in the order of time, each of shape (n, m); row k holds from point k to point k + 1.
+        ``parts``: Deviations in the order of time, each of shape (n, m); row k holds from point k to point k + 1.
 
         Yields
         ------

@@ -28,8 +28,7 @@ from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component
 from orchestrator.study.modes import ModesResult, modes_from, modes_of
 
-STEADY = 1e-6
-"""Largest difference of the box's current [pu] at the ideal bus from the power flow's."""
+STEADY = 1e-6  # largest difference of the box's current [pu] at the ideal bus from the power flow's
 
 STILL = 1e-9
 """Largest change of a known component's state in one communication step; the same limit holds without a black box."""
@@ -37,23 +36,17 @@ STILL = 1e-9
 
 @dataclass(frozen=True)
 class BoxedSystem:
-    """A coupled system linearised with one component as a black box.
-
-    Attributes
-    ----------
-    residual
-        The larger of two changes: of a known component's state in one communication step, and of the box's current from
-        its start to its rest at the ideal bus.
-    warnings
-        Reasons in the other components for doubts about the modes from 0.1 to 2 Hz.
-    """
+    """A coupled system linearised with one component as a black box."""
 
     component: str
     response: FrequencyResponse
     identified: IdentifiedModel
     model: LinearModel
+    # the larger of two changes: of a known component's state in one communication step, and of the box's current from
+    # its start to its rest at the ideal bus
     residual: float
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # reasons in the other components for doubts about the modes from 0.1 to 2 Hz
+    misfits: tuple[str, ...] = ()  # what does not fit between devices and their bindings; among the warnings too
 
     def modes(
         self, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
@@ -91,16 +84,11 @@ def linearize_with_box(
 ) -> BoxedSystem:
     """Identify one component and linearise the coupled system around where the master is.
 
-    Parameters
-    ----------
-    master
-        Initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as well.
-    component
-        Name of the black box. Only its inputs are set and its outputs read.
-    excitation
-        Signals that excite the box; the usual signals where None.
-    restore
-        Whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
+    ``master``: initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as
+    well.
+    ``component``: name of the black box. Only its inputs are set and its outputs read.
+    ``excitation``: signals that excite the box; the usual signals where None.
+    ``restore``: whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
     """
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
@@ -112,7 +100,8 @@ def linearize_with_box(
     blocks = Blocks(master, known={component: _as_component(component, identified)})
     model = compose(blocks, master.schedule)
     doubtful = doubts(blocks, master.schedule, model, find_spectrum(model).modes)
-    return BoxedSystem(component, response, identified, model, max(moved, residual), (*misfits, *map(str, doubtful)))
+    return BoxedSystem(component, response, identified, model, max(moved, residual), (*misfits, *map(str, doubtful)),
+                       misfits)  # fmt: skip
 
 
 def modes_with_boxes(
@@ -125,10 +114,8 @@ def modes_with_boxes(
 ) -> ModesResult:
     """Modes as `modes_of` finds them; components that hide their states are identified first.
 
-    Parameters
-    ----------
-    prepared, master, frequency_range, critical
-        As `modes_of`; to identify anything, the master must be at rest at the power flow's operating point.
+    ``prepared`` and ``master`` and ``frequency_range`` and ``critical``: as `modes_of`; to identify anything, the
+    master must be at rest at the power flow's operating point.
     """
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:

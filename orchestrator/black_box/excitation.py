@@ -25,12 +25,8 @@ def odd_lines(lowest_hz: float, highest_hz: float, count: int) -> NDArray[np.int
 def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Numbers:
     """One period of a sum of cosines of equal size. Schroeder's phases keep its peak low.
 
-    Parameters
-    ----------
-    lines
-        Multiples of the base frequency, shape (f,).
-    amplitude
-        Largest magnitude of the sum.
+    ``lines``: Multiples of the base frequency, shape (f,).
+    ``amplitude``: Largest magnitude of the sum.
 
     Returns
     -------
@@ -46,12 +42,8 @@ def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Number
 def line_response(u: Numbers, y: Numbers, lines: NDArray[np.int64]) -> Complex:
     """M at the excited lines from whole periods, shape (f, p).
 
-    Parameters
-    ----------
-    u
-        One period, shape (n,).
-    y
-        The same period of the outputs, shape (n, p).
+    ``u``: one period, shape (n,).
+    ``y``: the same period of the outputs, shape (n, p).
     """
     delay = np.exp(-2j * np.pi * lines / len(u))  # y[k] is read one step after u[k] begins
     return np.asarray(np.fft.rfft(y, axis=0)[lines] / np.fft.rfft(u)[lines][:, None] * delay[:, None])
@@ -60,10 +52,7 @@ def line_response(u: Numbers, y: Numbers, lines: NDArray[np.int64]) -> Complex:
 def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Complex:
     """M at any frequencies [Hz] from the response to a pulse of one step, shape (f, p).
 
-    Parameters
-    ----------
-    m
-        Response, shape (n, p), long enough to have died out.
+    ``m``: response, shape (n, p), long enough to have died out.
     """
     total = np.zeros((len(frequencies), m.shape[1]), dtype=complex)
     turn = -2j * np.pi * np.asarray(frequencies)[:, None] * step_size

@@ -26,8 +26,7 @@ _MOST_ITERATIONS = 30
 """Largest number of iterations of the pole relocation. A fit that has not converged by then has more poles than the
 response."""
 
-_COUNTS = 1e-7
-"""A residue's singular value counts from this part of the largest response on."""
+_COUNTS = 1e-7  # A residue's singular value counts from this part of the largest response on
 
 
 def require_fitting() -> None:
@@ -39,12 +38,7 @@ def require_fitting() -> None:
 class IdentifiedModel:
     """x⁺ = A·x + B·u, y = C·x + D·u over a communication step, u held.
 
-    Attributes
-    ----------
-    poles
-        As eigenvalues λ = ln μ/H [rad/s], shape (n,).
-    error
-        Largest difference from the measured response at any frequency, relative to it (2-norms).
+    ``poles``: As eigenvalues λ = ln μ/H [rad/s], shape (n,).
     """
 
     A: Matrix
@@ -54,7 +48,7 @@ class IdentifiedModel:
     step_size: float
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    error: float
+    error: float  # largest difference from the measured response at any frequency, relative to it (2-norms)
 
     @property
     def poles(self) -> Complex:
@@ -71,10 +65,7 @@ class IdentifiedModel:
 def fit(response: FrequencyResponse, largest_error: float = 0.01) -> IdentifiedModel:
     """Fit the smallest model that is as close as the measurement is certain.
 
-    Raises
-    ------
-    AnalysisError
-        If none of `ORDERS` comes within ``largest_error``.
+    Raises an `AnalysisError` if none of `ORDERS` comes within ``largest_error``.
     """
     wanted = max(_WANTED, response.largest_bound)
     best: IdentifiedModel | None = None

@@ -14,9 +14,7 @@ from orchestrator.black_box.excitation import line_response, multisine, odd_line
 from orchestrator.errors import AnalysisError
 
 METHODS = ("multisine", "pulse")
-_MOST_SECONDS = 400.0
-"""Time after which a response must have settled [s]."""
-
+_MOST_SECONDS = 400.0  # time after which a response must have settled [s]
 _APART = 10.0
 """Shortest time between two periods that are compared [s]: short periods in direct succession always look alike."""
 
@@ -27,26 +25,15 @@ more than this part of its size has left the operating point."""
 
 @dataclass(frozen=True)
 class Excitation:
-    """How the device is excited.
-
-    Attributes
-    ----------
-    method
-        ``multisine``: periods of many sines until they repeat. ``pulse``: one step up and one step down, each
-        followed until it has died out.
-    lowest_hz, highest_hz, lines
-        Range of frequencies [Hz], and approximate number of frequencies.
-    amplitude
-        Largest deviation of an input [its unit]. Every measurement is repeated with half of it.
-    settled
-        Two successive periods, or the rest of a pulse response, may still differ by this part of the largest response.
-    """
-
+    # ``multisine``: periods of many sines until they repeat. ``pulse``: one step up and one step down, each followed
+    # until it has died out.
     method: str = "multisine"
+    # lowest_hz, highest_hz, lines: range of frequencies [Hz], and approximate number of frequencies
     lowest_hz: float = 0.05
     highest_hz: float = 1000.0
     lines: int = 120
-    amplitude: float = 1e-3
+    amplitude: float = 1e-3  # Largest deviation of an input [its unit]. Every measurement is repeated with half of it.
+    # two successive periods, or the rest of a pulse response, may still differ by this part of the largest response
     settled: float = 1e-5
 
     def __post_init__(self) -> None:
@@ -56,36 +43,19 @@ class Excitation:
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """A measured response M(e^(jωH)): inputs held over a step, outputs read at its end.
+    """A measured response M(e^(jωH)): inputs held over a step, outputs read at its end."""
 
-    Attributes
-    ----------
-    frequencies
-        [Hz], shape (f,).
-    values
-        Shape (f, p, m).
-    bounds
-        Bound of the error of every value, shape (f, p, m): the sum of its differences from the value at half the
-        amplitude and from the last repetition. It covers noise, transients and the leading nonlinearity.
-    feedthrough
-        Direct effect of inputs on outputs, shape (p, m).
-    step_size
-        Communication step [s].
-    operating_point
-        Outputs at rest, shape (p,).
-    seconds
-        Time simulated on the bench [s].
-    """
-
-    frequencies: Numbers
-    values: Complex
+    frequencies: Numbers  # [Hz], shape (f,)
+    values: Complex  # shape (f, p, m)
+    # Bound of the error of every value, shape (f, p, m): the sum of its differences from the value at half the
+    # amplitude and from the last repetition. It covers noise, transients and the leading nonlinearity.
     bounds: Numbers
-    feedthrough: Numbers
-    operating_point: Numbers
-    step_size: float
+    feedthrough: Numbers  # direct effect of inputs on outputs, shape (p, m)
+    operating_point: Numbers  # outputs at rest, shape (p,)
+    step_size: float  # communication step [s]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    seconds: float
+    seconds: float  # time simulated on the bench [s]
     method: str
 
     @property
@@ -215,10 +185,7 @@ def _by_pulses(
 def _check_returned(bench: Bench, column: int, away: float, size: float) -> None:
     """A device that ran away to another operating point, a limit for instance, answers there as calmly as a stable one.
 
-    Raises
-    ------
-    AnalysisError
-        If the rest of the response [pu] is too large a part of it.
+    Raises an `AnalysisError` if the rest of the response [pu] is too large a part of it.
     """
     if not away <= _AWAY * size:
         raise AnalysisError(

@@ -15,22 +15,13 @@ from orchestrator.black_box.frequency_response import FrequencyResponse
 
 @dataclass(frozen=True)
 class Passivity:
-    """Passivity of a measured admittance.
-
-    Attributes
-    ----------
-    index
-        Smallest eigenvalue of (Y + Yᴴ)/2 [unit of Y], shape (f,).
-    relative
-        ``index`` over the largest singular value of Y: from −1, where the device only delivers power, to 1.
-    bounds
-        Bounds of ``index``, from the bounds of Y.
-    """
+    """Passivity of a measured admittance."""
 
     frequencies: Numbers
-    index: Numbers
+    index: Numbers  # smallest eigenvalue of (Y + Yᴴ)/2 [unit of Y], shape (f,)
+    # ``index`` over the largest singular value of Y: from −1, where the device only delivers power, to 1
     relative: Numbers
-    bounds: Numbers
+    bounds: Numbers  # bounds of ``index``, from the bounds of Y
 
     def ranges(self) -> list[tuple[float, float]]:
         """Ranges of measured frequencies [Hz] in which the index is negative beyond its bound."""

@@ -10,36 +10,22 @@ from orchestrator.black_box.frequency_response import FrequencyResponse
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Powers that a device feeds in, over changes of the voltage at its terminals.
+    """Powers that a device feeds in, over changes of the voltage at its terminals."""
 
-    Attributes
-    ----------
-    frequencies
-        Of the change [Hz], shape (f,).
-    p_theta, q_v
-        P over the angle [pu/rad], and Q over the relative change of the magnitude [pu], shape (f,).
-    p_v, q_theta
-        The same crosswise [pu, pu/rad], shape (f,).
-    p_omega
-        P over the frequency of the voltage [pu/pu], shape (f,).
-    """
-
-    frequencies: Numbers
+    frequencies: Numbers  # of the change [Hz], shape (f,)
+    # p_theta, q_v: P over the angle [pu/rad], and Q over the relative change of the magnitude [pu], shape (f,)
     p_theta: Complex
     q_v: Complex
+    # p_v, q_theta: the same crosswise [pu, pu/rad], shape (f,)
     p_v: Complex
     q_theta: Complex
-    p_omega: Complex
+    p_omega: Complex  # P over the frequency of the voltage [pu/pu], shape (f,)
 
     def least(self, values: Complex, low: float, high: float) -> tuple[float, float]:
         """Least size of one of them in a band, and its frequency [Hz].
 
-        Parameters
-        ----------
-        values
-            One of its responses, shape (f,).
-        low, high
-            Band [Hz].
+        ``values``: one of its responses, shape (f,).
+        ``low`` and ``high``: band [Hz].
         """
         inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
         if not len(inside):
@@ -54,14 +40,9 @@ def stiffness(response: FrequencyResponse, voltage: complex, omega_b: float) -> 
     With S = v·i* and i = Y·v in real and imaginary parts, a change dv gives dS = dv·i* + v·(Y·dv)*. A change of the
     angle is dv = j·v·dθ, one of the magnitude dv = v·dV/V.
 
-    Parameters
-    ----------
-    response
-        From the voltage to the current that the device feeds in, both as real and imaginary part [pu].
-    voltage
-        At the operating point [pu].
-    omega_b
-        2π times the rated frequency [rad/s].
+    ``response``: from the voltage to the current that the device feeds in, both as real and imaginary part [pu].
+    ``voltage``: at the operating point [pu].
+    ``omega_b``: 2π times the rated frequency [rad/s].
     """
     Y = response.continuous()
     current = complex(*response.operating_point)

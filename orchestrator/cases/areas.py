@@ -9,11 +9,8 @@ from orchestrator.coupling.system import System
 def areas_of(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, str]:
     """Area of every component that has one.
 
-    Parameters
-    ----------
-    areas
-        Patterns by area. A component belongs to the first area with a pattern that fits its own name, or the
-        bus (the scope of the variables) that feeds it.
+    ``areas``: patterns by area. A component belongs to the first area with a pattern that fits its own name, or the bus
+    (the scope of the variables) that feeds it.
     """
     return {name: found[0] for name, found in _fitting(areas, system).items()}
 

@@ -11,29 +11,21 @@ from dataclasses import dataclass
 
 from orchestrator.cases.schema import Value
 
-ALPHA = "units.alpha"
-"""Key of the share that all converters have; ``units.alpha.<label>`` is that of one unit."""
-
+ALPHA = "units.alpha"  # key of the share that all converters have; ``units.alpha.<label>`` is that of one unit
+MODELS = "models"  # key of the kind of all models, EMT or phasor; see `model_kinds`
 _NATIVE = "native"
 
 PARTS = ("machine", "exciter", "governor", "stabilizer")
 """Keys of a component's table, of ``[units]`` and columns of its file that choose the parts of a generator."""
 
-Place = Callable[[str], str]
-"""Key → where it is written."""
+Place = Callable[[str], str]  # key → where it is written
 
 
 @dataclass(frozen=True)
 class NativeChoice:
-    """Whether some components run as native FMUs.
+    """Whether some components run as native FMUs."""
 
-    Attributes
-    ----------
-    pattern
-        Name of a component, or a pattern such as ``*``.
-    """
-
-    pattern: str
+    pattern: str  # name of a component, or a pattern such as ``*``
     given: Value
     place: str
 
@@ -49,18 +41,8 @@ class NativeChoice:
 
 @dataclass(frozen=True)
 class PartChoice:
-    """A part of some components.
-
-    Attributes
-    ----------
-    pattern
-        Name of a component, or a pattern such as ``g*``.
-    part
-        One of `PARTS`.
-    """
-
-    pattern: str
-    part: str
+    pattern: str  # name of a component, or a pattern such as ``g*``
+    part: str  # one of `PARTS`
     given: Value
     place: str
 
@@ -93,23 +75,12 @@ class ShareChoice:
 
 @dataclass(frozen=True)
 class Layer:
-    """What one source gives: a parameter file, the scenario, or the command line.
+    """What one source gives: a parameter file, the scenario, or the command line."""
 
-    Attributes
-    ----------
-    values
-        Of the components' variables, by ``component.variable``.
-    natives
-        Kinds of FMU, in the source's order.
-    parts
-        Parts of generators, in the source's order.
-    shares
-        Converters' shares; the one for all units comes first, so that those for one unit override it.
-    """
-
-    values: Mapping[str, Value]
-    natives: tuple[NativeChoice, ...]
-    parts: tuple[PartChoice, ...]
+    values: Mapping[str, Value]  # of the components' variables, by ``component.variable``
+    natives: tuple[NativeChoice, ...]  # kinds of FMU, in the source's order
+    parts: tuple[PartChoice, ...]  # parts of generators, in the source's order
+    # converters' shares; the one for all units comes first, so that those for one unit override it.
     shares: tuple[ShareChoice, ...]
     place: Place
     given: Mapping[str, Value]
@@ -118,12 +89,8 @@ class Layer:
 def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> Layer:
     """Part what a source gives into values and choices.
 
-    Parameters
-    ----------
-    given
-        By ``component.variable`` or a choice's key.
-    has_units
-        Whether the case has a table of units; without one, nothing has a share.
+    ``given``: By ``component.variable`` or a choice's key.
+    ``has_units``: Whether the case has a table of units; without one, nothing has a share.
     """
     values: dict[str, Value] = {}
     natives: list[NativeChoice] = []
@@ -131,6 +98,8 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
     shares: list[ShareChoice] = []
     for key, value in given.items():
         pattern, _, variable = key.partition(".")
+        if key == MODELS:
+            continue  # chosen before the components are known
         if has_units and (key == ALPHA or key.startswith(f"{ALPHA}.")):
             shares.append(ShareChoice(key.removeprefix(ALPHA).removeprefix("."), value, place(key)))
         elif variable == _NATIVE:

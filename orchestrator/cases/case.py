@@ -3,8 +3,9 @@
 import difflib
 import tomllib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -19,11 +20,12 @@ from orchestrator.cases.event_tables import other_scenarios
 from orchestrator.cases.idle_values import idle_everywhere
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.mentions import Named, unmatched
+from orchestrator.cases.model_kinds import kind_wanted, of_kind
 from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
-from orchestrator.cases.sharing import Dispatch
+from orchestrator.cases.sharing import Dispatch, SharingRule, in_words
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
@@ -64,20 +66,15 @@ class Case(CaseDefinition):
     ) -> list[PreparedScenario]:
         """Check everything and make the chosen scenarios ready to run.
 
-        Parameters
-        ----------
-        scenarios
-            Names; all of them where empty.
-        overrides
-            Values by ``component.variable`` that override the file's and the scenario's.
-        step_size, stop_time
-            [s]; the file's where None.
-        parameters
-            Parameter files. Their values have priority over the scenario's, and ``overrides`` have priority over
-            theirs.
-        dispatch
-            What the units fed before an outage that they share; None where each feeds its own ``P_0``.
+        ``scenarios``: Names; all of them where empty.
+        ``overrides``: Values by ``component.variable`` that override the file's and the scenario's.
+        ``step_size``, ``stop_time``: [s]; the file's where None.
+        ``parameters``: Parameter files. Their values have priority over the scenario's, and ``overrides`` have priority
+        over theirs.
+        ``dispatch``: What the units fed before an outage that they share; None where each feeds its own ``P_0``.
         """
+        if (other := self._of_kind(overrides, parameters)) is not self:
+            return other.prepare(scenarios, overrides, step_size, stop_time, parameters, dispatch)
         problems = list(self.problems)
         unknown = [name for name in scenarios if name not in self.scenarios]
         problems += [
@@ -93,8 +90,9 @@ class Case(CaseDefinition):
         prepared, questions, named = [], [], Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
-            preparer.draft.dispatch = dispatch
-            prepared.append(preparer.prepare(step_size, stop_time))
+            lost, shared = self._switched_off(name, overrides or {}, parameters) if dispatch is None else ((), dispatch)
+            preparer.draft.dispatch = shared
+            prepared.append(_told(preparer.prepare(step_size, stop_time), lost, shared))
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
             questions += [q for q in preparer.draft.questions if q not in questions]
@@ -125,6 +123,30 @@ class Case(CaseDefinition):
             return self.prepare([name], {**(overrides or {}), **(further or {})}, step_size, None, parameters)[0]
         return self.prepare([name], None, step_size)[0] if overrides or parameters else None
 
+    def _switched_off(
+        self, name: str, overrides: Mapping[str, Value], parameters: Sequence[ParameterFile]
+    ) -> tuple[Collection[str], Dispatch | None]:
+        """Units that values take out of service, and how others share their power; none where powers are given too."""
+        table = self.table.power_flow
+        on = {key: value for key, value in overrides.items() if value or not key.endswith(".connected")}
+        given = any(key.endswith(".P_0") for key in overrides)
+        if table is None or given or len(on) == len(overrides):
+            return (), None
+        before = self._preparer(name, on, parameters).prepare(None, None)
+        if before is None or before.power_flow is None:
+            return (), None
+        powers, plans = before.power_flow.powers, before.system.components
+        off = [key for key in overrides if key not in on]
+        lost = [
+            unit
+            for unit, power in powers.items()
+            if power
+            and any(fnmatchcase(f"{head}{unit}.connected", key) for key in off for head in ("", f"{table.grid}."))
+        ]
+        fed = sum(powers[unit].real * plans[unit].number("S_n") for unit in lost)
+        rule = self.sharing or SharingRule(table.sharing)
+        return lost, Dispatch(rule, powers, fed) if lost else None
+
     @cached_property
     def _mentions(self) -> list[Problem]:
         """Names in ``[analysis]`` and ``[[plots]]`` that match nothing in any scenario.
@@ -153,11 +175,18 @@ class Case(CaseDefinition):
     def placed(
         self, scenario: str, overrides: Mapping[str, Value] | None = None, parameters: Sequence[ParameterFile] = ()
     ) -> dict[str, tuple[ComponentTable, ComponentPlan]]:
-        preparer = self._preparer(scenario, overrides, parameters)
+        preparer = self._of_kind(overrides, parameters)._preparer(scenario, overrides, parameters)
         components = preparer.assemble().components
         if problems := [*self.problems, *preparer.problems]:
             raise CaseError(str(self.path), problems)
         return {name: (preparer.draft.tables[name], plan) for name, plan in components.items()}
+
+    def _of_kind(self, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]) -> "Case":
+        """The case with the kind of models that is wanted; itself where that is the file's own."""
+        kind = kind_wanted(overrides, parameters)
+        if kind is None or kind == self.table.models:
+            return self
+        return replace(self, table=of_kind(self.table, kind))
 
     def _preparer(
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
@@ -165,13 +194,22 @@ class Case(CaseDefinition):
         return Preparer(self, name, dict(overrides or {}), parameters)
 
 
+def _told(
+    prepared: PreparedScenario | None, lost: Collection[str], dispatch: Dispatch | None
+) -> PreparedScenario | None:
+    """The scenario, which says of units that values took out of service who feeds their power."""
+    if prepared is None or prepared.power_flow is None or dispatch is None or not lost:
+        return prepared
+    shared = in_words(dispatch, prepared.power_flow.powers, prepared.system.components, lost)
+    text = f"{shared}, by {dispatch.rule}; the rules are {', '.join(SharingRule)}"
+    return replace(prepared, questions=(*prepared.questions, Problem("[power_flow] sharing", text)))
+
+
 def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
     """Read a built-in case by name, or a case file or an SSP by path.
 
-    Parameters
-    ----------
-    trust_fmus
-        Whether foreign FMUs may run in this process, where the file says ``isolated = false``; else that is a problem.
+    ``trust_fmus``: Whether foreign FMUs may run in this process, where the file says ``isolated = false``; else that is
+    a problem.
     """
     path = Path(name_or_path)
     if str(name_or_path) in built_in_cases():
@@ -194,7 +232,13 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
             f'{key} = "{path.name}", and give that'
         )
     text, raw = read_toml(path, "the case file", "make it readable for you")
+    return case_of_text(text, raw, path, trust_fmus=trust_fmus)
+
+
+def case_of_text(text: str, raw: dict[str, Any], path: Path, *, trust_fmus: bool = False) -> Case:
+    """The case of a text that is, or is to be, in a file; ``raw`` is what TOML makes of it."""
     table, problems = _validate(raw, text, path)
+    table = table if table.models is None or problems else of_kind(table, table.models)
     return _case(table, text, path, problems, path.parent, trust_fmus=trust_fmus)
 
 
@@ -218,12 +262,8 @@ def _case(
 ) -> Case:
     """The case, with what its scenarios' parameter files say now and paths that outlast a change of the folder.
 
-    Parameters
-    ----------
-    table, text, path, problems, numbered, trust_fmus
-        As in `CaseDefinition`.
-    directory
-        Folder to which paths in the tables are relative.
+    ``table``, ``text``, ``path``, ``problems``, ``numbered``, ``trust_fmus``: As in `CaseDefinition`.
+    ``directory``: Folder to which paths in the tables are relative.
     """
     files: dict[str, ParameterFile | str] = {}
     for name in (name for scenario in table.scenarios.values() for name in scenario.parameters):

@@ -8,7 +8,7 @@ from fmus.toolchain.catalogue import model_names, needs_arguments, network_of
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import network_data
-from orchestrator.cases.schema import BusFaultTable, CaseTable, ComponentTable, ShuntReconnectionTable, ShuntTripTable
+from orchestrator.cases.schema import BusFaultTable, ComponentTable, ShuntReconnectionTable, ShuntTripTable
 from orchestrator.errors import InputError
 
 Tables = Mapping[str, ComponentTable]
@@ -64,9 +64,21 @@ def find_network(draft: Draft, everything: Tables) -> None:
     elif takes_network(grid):
         draft.network = _from_table(draft, grid, everything)
     elif grid.model in model_names():
-        draft.network = _with_switches(network_of(grid.model or ""), draft.case)
+        draft.network = _with_ports(draft, grid)
     elif grid.model is not None:
         draft.network_failed = True  # what is wrong with its model is said where it is added
+
+
+def _with_ports(draft: Draft, grid: ComponentTable) -> Network | None:
+    """The grid model's own network, with ports for what else stands at its buses."""
+    network: Network | None = network_of(grid.model or "")
+    if network is None:
+        return None
+    known = {port.name for port in network.ports}
+    further = [Port(n, t.bus) for n, t in draft.tables.items() if t.bus in network.buses and n not in known]
+    if further:
+        network = replace(network, ports=(*network.ports, *further))
+    return _with_switches(network, draft)
 
 
 def _check_buses_have_a_grid(draft: Draft) -> None:
@@ -76,8 +88,7 @@ def _check_buses_have_a_grid(draft: Draft) -> None:
             place = "units" if name in draft.origins else "components"
             where = draft.place(place) if place == "units" else draft.place(place, name, "bus")
             draft.note_network(
-                where,
-                "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]",
+                where, "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]"
             )
             return
 
@@ -109,21 +120,23 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
             name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B, (), data.transformers,
             phasors=grid.model == "phasor_grid",
         )  # fmt: skip
-        return _with_switches(network, draft.case)
+        return _with_switches(network, draft)
     except ValueError as error:
         draft.note_network(draft.place("network"), str(error))
         return None
 
 
-def _with_switches(network: Network | None, case: CaseTable) -> Network | None:
+def _with_switches(network: Network, draft: Draft) -> Network:
     """The network with the faults and switched shunts of all scenarios, which share one FMU.
 
     Unknown names are the events' matter.
     """
+    case = draft.case
+    network = replace(network, injections=network.buses) if draft.injections else network
     tables = [*case.events, *(event for scenario in case.scenarios.values() for event in scenario.events or ())]
     faults = {table.bus for table in tables if isinstance(table, BusFaultTable)}
     switched = {table.shunt for table in tables if isinstance(table, ShuntTripTable | ShuntReconnectionTable)}
-    if network is None or not (faults or switched):
+    if not (faults or switched):
         return network
     shunts = tuple(replace(shunt, switched=shunt.name in switched) for shunt in network.shunts)
     return replace(network, faults=tuple(bus for bus in network.buses if bus in faults), shunts=shunts)

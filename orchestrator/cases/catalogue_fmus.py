@@ -12,29 +12,21 @@ from fmus.toolchain.extras import require
 from fmus.toolchain.notes import known, noted
 from orchestrator.fmi.description import FmuDescription, parse_description, read_description
 
-_TO_COME = "not-built"
-"""Identity of an FMU that is not there."""
+_TO_COME = "not-built"  # identity of an FMU that is not there
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedFmu:
-    """An FMU of the catalogue that may have to be built.
-
-    Attributes
-    ----------
-    description
-        Its description; of one that is not there, as it will be, but for its identity and the dependencies of its
-        outputs, which need its equations.
-    is_there
-        Whether it is built already.
-    """
+    """An FMU of the catalogue that may have to be built."""
 
     model: str
     network: Network | None
     native: bool
     parts: tuple[tuple[str, str], ...]
+    # its description; of one that is not there, as it will be, but for its identity and the dependencies of its
+    # outputs, which need its equations
     description: FmuDescription
-    is_there: bool
+    is_there: bool  # whether it is built already
 
 
 @cache

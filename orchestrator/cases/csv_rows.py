@@ -11,21 +11,15 @@ from orchestrator.errors import InputError
 from orchestrator.units import LARGEST
 
 Row = dict[str, str]
-PLACE = "_place"
-"""Key of a row's file and line."""
-
-MOST_ROWS = 100_000
-"""Of one file: ten times the lines of the largest networks that operators study."""
+PLACE = "_place"  # key of a row's file and line
+MOST_ROWS = 100_000  # of one file: ten times the lines of the largest networks that operators study
 
 
 def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
     """All rows of a file that must have some columns.
 
-    Raises
-    ------
-    InputError
-        If the file or one of the columns is missing, a column stands twice, columns are separated by semicolons or
-        tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows.
+    Raises an `InputError` if the file or one of the columns is missing, a column stands twice, columns are separated by
+    semicolons or tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows.
     """
     path = seen_from_here(path)
     if not path.is_file():

@@ -7,43 +7,35 @@ from pathlib import Path
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import Problem
 
 
 @dataclass(frozen=True)
 class CaseDefinition:
-    """A case file, or the equivalent of an SSP.
+    """A case file, or the equivalent of an SSP."""
 
-    Attributes
-    ----------
-    table
-        Contents of the file. Entries of a wrong form are left out here and listed in ``problems``; the meaning of the
-        rest can still be checked.
-    directory
-        Folder to which paths in the tables are relative; it holds wherever the program works later.
-    numbered
-        Whether ``text`` is the user's own file, whose line numbers help in errors.
-    trust_fmus
-        Whether the user said that its FMUs may run in gfor's own process, where the file wants that.
-    home
-        Folder of the file itself; that of an SSP is another one than ``directory``.
-    parameter_files
-        The parameter files that its scenarios name, as they were read with the case; text says why one cannot be read.
-    exchanged
-        Devices that take the place of the file's own, by component. Of parameter files, scenarios and the command line
-        no value reaches them: those were meant for the device that was there.
-    """
-
+    # contents of the file. Entries of a wrong form are left out here and listed in ``problems``; the meaning of the
+    # rest can still be checked.
     table: CaseTable
     text: str
     path: Path
     problems: tuple[Problem, ...]
-    directory: Path
-    numbered: bool = True
+    directory: Path  # folder to which paths in the tables are relative; it holds wherever the program works later
+    numbered: bool = True  # whether ``text`` is the user's own file, whose line numbers help in errors
+    # whether the user said that its FMUs may run in gfor's own process, where the file wants that.
     trust_fmus: bool = False
+    # folder of the file itself; that of an SSP is another one than ``directory``.
     home: Path = field(default_factory=Path.cwd)
+    # the parameter files that its scenarios name, as they were read with the case; text says why one cannot be read.
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
+    # devices that take the place of the file's own, by component. Of parameter files, scenarios and the command line no
+    # value reaches them: those were meant for the device that was there.
     exchanged: Mapping[str, ComponentTable] = field(default_factory=dict)
+    # how units share what given values take out of service, such as ``sg5.connected = false``; as the file says where
+    # None.
+    sharing: SharingRule | None = None
+    injections: bool = False  # whether the grid takes a current besides at every bus; see `Network.injections`
 
     @property
     def name(self) -> str:

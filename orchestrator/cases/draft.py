@@ -19,90 +19,55 @@ COMMAND_LINE = "--set"
 
 @dataclass(frozen=True)
 class UnitOrigin:
-    """Origin of a component of the units table.
-
-    Attributes
-    ----------
-    row
-        Place of the row in the units' file, or the name of another source.
-    own
-        Parameters that the row itself gives.
-    common
-        Key of ``[units]`` with the common parameters of this kind of unit.
-    lines
-        Lines of the row's file by the parameter that they give, where there are several.
-    """
-
-    row: str
-    own: frozenset[str]
-    common: str
+    row: str  # place of the row in the units' file, or the name of another source
+    own: frozenset[str]  # parameters that the row itself gives
+    common: str  # key of ``[units]`` with the common parameters of this kind of unit
+    # lines of the row's file by the parameter that they give, where there are several.
     lines: Mapping[str, int] = field(default_factory=dict)
 
 
 @dataclass
 class Draft:
-    """Data that the steps of the preparation share.
+    """Data that the steps of the preparation share."""
 
-    Attributes
-    ----------
-    source
-        The case file, as errors name it.
-    place
-        Key path → its text with the line of the file.
-    layers
-        Values and choices from parameter files, the scenario and the command line; a later layer overrides an earlier
-        one.
-    from_outside
-        Variables, by ``component.variable``, that the command line or its parameter files set.
-    data
-        Elements of the network, and the source's data of units; None if the case has no network of its own.
-    network
-        The network behind the grid component.
-    known, tables
-        Names of all possible components, and the tables of the components in this scenario.
-    places
-        Place of the last assignment of each ``component.variable``.
-    reactive_limits
-        Least and most reactive power of the units at a bus together [Mvar], by bus.
-    active_limits
-        Least and most active power of a unit in sharing [MW], by component.
-    parameter_files
-        The parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
-    misfits
-        Components whose form the network cannot take, each with its model; what follows from that is not noted.
-    exchanged
-        Components whose device is another than the file's own, which no layer's value reaches.
-    whole
-        Whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
-    dispatch
-        What the units fed before an outage that they share; None without one.
-    """
-
-    source: str
+    source: str  # the case file, as errors name it
     case: CaseTable
     name: str
     scenario: ScenarioTable
     directory: Path
-    place: Locate
+    place: Locate  # key path → its text with the line of the file
+    # values and choices from parameter files, the scenario and the command line; a later layer overrides an earlier
+    # one.
     layers: list[Layer] = field(default_factory=list)
+    # variables, by ``component.variable``, that the command line or its parameter files set.
     from_outside: frozenset[str] = frozenset()
     problems: list[Problem] = field(default_factory=list)
+    # elements of the network, and the source's data of units; None if the case has no network of its own.
     data: NetworkData | None = None
-    network: Network | None = None
+    network: Network | None = None  # the network behind the grid component
+    # known, tables: names of all possible components, and the tables of the components in this scenario.
     known: set[str] = field(default_factory=set)
     tables: dict[str, ComponentTable] = field(default_factory=dict)
     system: System = field(default_factory=System)
     network_failed: bool = False
-    places: dict[str, str] = field(default_factory=dict)
+    places: dict[str, str] = field(default_factory=dict)  # place of the last assignment of each ``component.variable``
     origins: dict[str, UnitOrigin] = field(default_factory=dict)
+    # least and most reactive power of the units at a bus together [Mvar], by bus.
     reactive_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    # least and most active power of a unit in sharing [MW], by component.
     active_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     questions: list[Problem] = field(default_factory=list)
+    not_reached: list[float] = field(default_factory=list)
+    # the parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
     parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
+    # components whose form the network cannot take, each with its model; what follows from that is not noted.
     misfits: dict[str, str] = field(default_factory=dict)
+    # components whose device is another than the file's own, which no layer's value reaches.
     exchanged: frozenset[str] = frozenset()
+    # whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
     whole: bool = True
-    dispatch: Dispatch | None = None
+    dispatch: Dispatch | None = None  # what the units fed before an outage that they share; None without one
+    injections: bool = False  # as in `CaseDefinition`
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:

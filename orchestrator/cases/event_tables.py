@@ -15,6 +15,7 @@ from orchestrator.cases.schema import (
     BusFaultTable,
     ComponentFaultTable,
     EventTable,
+    ForcingTable,
     GridEventBase,
     LineReclosingTable,
     LineTripTable,
@@ -36,6 +37,7 @@ from orchestrator.coupling.events import (
     BusFault,
     Event,
     Fault,
+    Forcing,
     LineSwitching,
     LoadChange,
     LoadSwitching,
@@ -47,8 +49,9 @@ from orchestrator.coupling.events import (
 from orchestrator.coupling.system import ComponentPlan, Endpoint
 from orchestrator.errors import InputError, Problem
 
-_LONG_FAULT = 10.0
-"""Duration of a fault [s] above which one without a unit is questioned."""
+_POWERS = ("P_ref", "Pref")
+_FASTEST = 0.05  # product of the frequency of a forcing and the communication step up to which it is followed
+_LONG_FAULT = 10.0  # duration of a fault [s] above which one without a unit is questioned
 
 
 def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Event, ...]:
@@ -63,10 +66,12 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
     events: list[tuple[Event, str]] = []
     for index, table in enumerate(tables):
         where = draft.place("scenarios", draft.name, "events", index) if own else draft.place("events", index)
+        where = table.place if isinstance(table, ForcingTable) and table.place else where
         if not _is_point(draft, clock, table.time, "the event", where):
             continue
         if table.time >= stop:
             _note_late(draft, table.time, stop, where)
+            draft.not_reached.append(table.time)
         else:
             draft.questions += [Problem(where, text) for text in _endless(table, stop)]
         for event in _all_events_of(draft, table, clock, stop, where):
@@ -133,6 +138,8 @@ def _all_events_of(draft: Draft, table: EventTable, clock: Clock, stop: float, w
         return wire_events(draft, table, clock, stop, where)
     if isinstance(table, ComponentFaultTable):
         return component_events(draft, table, where)
+    if isinstance(table, ForcingTable):
+        return forcing_events(draft, table, clock, stop, where)
     return _events_of(draft, table, where)
 
 
@@ -153,6 +160,42 @@ def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event
     if isinstance(table, UnitTripTable | UnitReconnectionTable):
         return _unit_switching(draft, table, component)
     return _grid_or_reference_events(table, component)
+
+
+def forcing_events(draft: Draft, table: ForcingTable, clock: Clock, stop: float, where: str) -> list[Event]:
+    """A forcing of the table's reference, checked."""
+    plan = draft.system.components.get(table.component)
+    if plan is None:
+        if table.component not in draft.scenario.remove:
+            known = close_names(
+                table.component, list(draft.system.components), f"the case has: {', '.join(draft.tables)}"
+            )
+            draft.note(where, f"there is no component {table.component!r}; {known}")
+        return []
+    tunable = {_reference_of(v): v for v, info in plan.description.variables.items()
+               if info.variability == "tunable" and v.rpartition(".")[2].startswith("delta_")}  # fmt: skip
+    wanted = table.reference or next((r for r in tunable if r.rpartition(".")[2] in _POWERS), None)
+    if wanted not in tunable:
+        what = f"has no reference {wanted!r}" if wanted else "has no reference of its power; name another one"
+        draft.note(where, f"{table.component!r} {what}; it has: {', '.join(tunable) or 'none'}")
+        return []
+    if table.frequency * clock.step_size > _FASTEST:
+        draft.note(where, f"frequency = {table.frequency:g} Hz: a step of {clock.step_size:g} s does not show it; give "
+                   f"at most {_FASTEST / clock.step_size:g} Hz, or a shorter step")  # fmt: skip
+        return []
+    end = stop if table.end is None else table.end
+    if end <= table.time or not _is_point(draft, clock, end, "the end of the event", where):
+        if end <= table.time < stop:
+            draft.note(where, f"end = {end:g} s is not after time = {table.time:g} s; give a later end")
+        return []
+    return [Forcing(table.time, table.component, tunable[wanted], table.frequency, table.amplitude, table.shape,
+                    table.end)]  # fmt: skip
+
+
+def _reference_of(variable: str) -> str:
+    """``governor.delta_P_ref`` → ``governor.P_ref``."""
+    scope, _, name = variable.rpartition(".")
+    return f"{scope}.{name.removeprefix('delta_')}".removeprefix(".")
 
 
 def _unit_switching(draft: Draft, table: UnitTripTable | UnitReconnectionTable, grid: str) -> list[Event]:
@@ -223,8 +266,7 @@ def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where
             elif info.causality != "input" and info.variability != "tunable":
                 kind = f"{info.variability} {info.causality}"
                 draft.note(
-                    where,
-                    f"{component}.{variable} is a {kind}; only tunable parameters and open inputs can change",
+                    where, f"{component}.{variable} is a {kind}; only tunable parameters and open inputs can change"
                 )
             elif isinstance(event, LoadSwitching) and info.minimum is not None and event.scale < info.minimum:
                 draft.note(

@@ -7,41 +7,24 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.coupling.system import ComponentPlan
 
-SOURCES = ("raw", "matpower", "pandapower", "cgmes")
-"""Keys of ``[network]`` that name another program's data."""
-
+SOURCES = ("raw", "matpower", "pandapower", "cgmes")  # keys of ``[network]`` that name another program's data
 _NAMES = {zip_: name for name, zip_ in LAWS.items()}
 
 
 @dataclass(frozen=True)
 class Facts:
-    """The network of a scenario, with its power flow.
+    """The network of a scenario, with its power flow."""
 
-    Attributes
-    ----------
-    sources
-        Files, as the case names them.
-    frequency_hz
-        Rated; None where no component has one.
-    buses, machines, converters
-        How many; units out of service do not count.
-    load_mw
-        Active power of all loads, without what feeds in [MW].
-    slack
-        Units at the slack bus, with their power [MW] and their rating [MVA].
-    voltages_pu
-        Least and largest magnitude.
-    """
-
-    sources: tuple[str, ...]
-    frequency_hz: float | None
+    sources: tuple[str, ...]  # files, as the case names them
+    frequency_hz: float | None  # rated; None where no component has one
+    # buses, machines, converters: how many; units out of service do not count
     buses: int
     machines: int
     converters: int
-    load_mw: float
+    load_mw: float  # active power of all loads, without what feeds in [MW]
     load_model: str
-    slack: tuple[tuple[str, float, float], ...]
-    voltages_pu: tuple[float, float]
+    slack: tuple[tuple[str, float, float], ...]  # units at the slack bus, with their power [MW] and their rating [MVA]
+    voltages_pu: tuple[float, float]  # least and largest magnitude
 
     def sentence(self) -> str:
         """The line that answers begin with."""

@@ -17,6 +17,7 @@ from orchestrator.cases.schema import (
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import (
     Event,
+    Forcing,
     NotANumber,
     ParameterChange,
     Silence,
@@ -35,14 +36,9 @@ _BREAKER = "connected"
 def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, where: str) -> list[Event]:
     """What an imperfection that begins at a time, and may end, does to every connection that is meant.
 
-    Parameters
-    ----------
-    clock
-        Whose communication points the times must be.
-    stop
-        End of the run [s]; a delay that lasts beyond it is noted.
-    where
-        Place of the table in the file.
+    ``clock``: Whose communication points the times must be.
+    ``stop``: End of the run [s]; a delay that lasts beyond it is noted.
+    ``where``: Place of the table in the file.
     """
     end = table.end
     if end is not None:
@@ -147,6 +143,8 @@ def _set_by(event: Event) -> Iterator[str]:
             yield f"{_kind(event)} of {event.connection}"
         case WireRecovery():
             return
+        case Forcing():
+            yield f"{event.component}.{event.variable}"
         case NotANumber():
             yield f"the outputs of {event.component}"
         case _:

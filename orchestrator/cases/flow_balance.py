@@ -66,19 +66,12 @@ class FlowShunt:
 
 
 def nodal_powers(
-    voltages: Mapping[str, complex],
-    lines: Sequence[FlowLine],
-    loads: Sequence[FlowLoad],
-    shunts: Sequence[FlowShunt],
+    voltages: Mapping[str, complex], lines: Sequence[FlowLine], loads: Sequence[FlowLoad], shunts: Sequence[FlowShunt]
 ) -> dict[str, complex]:
     """P + jQ [pu, 100 MVA] that units must feed into every bus to give these voltages.
 
-    Parameters
-    ----------
-    voltages
-        Complex voltage of every bus [pu].
-    lines, loads, shunts
-        Elements that draw power; an open line draws only the power of its charging.
+    ``voltages``: complex voltage of every bus [pu].
+    ``lines`` and ``loads`` and ``shunts``: elements that draw power; an open line draws only the power of its charging.
     """
     needed = dict.fromkeys(voltages, 0j)
     for line in lines:

@@ -13,38 +13,22 @@ from scipy.sparse.linalg import spsolve
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 
-_SMALLEST_TURN = 1e-9
-"""Smallest reactance [pu, 100 MVA] that counts in the DC solution."""
+_SMALLEST_TURN = 1e-9  # smallest reactance [pu, 100 MVA] that counts in the DC solution
 
 
 @dataclass(frozen=True)
 class FlowEquations:
-    """Y·v = i with given powers, on 100 MVA.
+    """Y·v = i with given powers, on 100 MVA."""
 
-    Attributes
-    ----------
-    buses
-        Names, in the order of all arrays.
-    rows, columns, admittances
-        The admittance matrix [pu] as triplets; several for one place add up.
-    fed
-        P + jQ that is fed into every bus [pu]: what units feed, less the loads.
-    slack
-        The bus with a given voltage and angle zero.
-    held
-        Whether a bus has a voltage of given magnitude.
-    magnitudes
-        The given magnitudes [pu]; 1 elsewhere.
-    """
-
-    buses: tuple[str, ...]
+    buses: tuple[str, ...]  # names, in the order of all arrays
+    # rows, columns, admittances: the admittance matrix [pu] as triplets; several for one place add up
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]
     admittances: NDArray[np.complex128]
-    fed: NDArray[np.complex128]
-    slack: int
-    held: NDArray[np.bool_]
-    magnitudes: NDArray[np.float64]
+    fed: NDArray[np.complex128]  # P + jQ that is fed into every bus [pu]: what units feed, less the loads
+    slack: int  # the bus with a given voltage and angle zero
+    held: NDArray[np.bool_]  # whether a bus has a voltage of given magnitude
+    magnitudes: NDArray[np.float64]  # the given magnitudes [pu]; 1 elsewhere
     lines: tuple[FlowLine, ...]
 
     @classmethod
@@ -60,14 +44,9 @@ class FlowEquations:
     ) -> "FlowEquations":
         """The equations of a network.
 
-        Parameters
-        ----------
-        active
-            Active power that units feed, by bus [pu, 100 MVA].
-        held
-            Magnitudes of held voltages, by bus [pu].
-        slack_bus
-            The bus that balances the power.
+        ``active``: active power that units feed, by bus [pu, 100 MVA].
+        ``held``: magnitudes of held voltages, by bus [pu].
+        ``slack_bus``: the bus that balances the power.
         """
         position = {bus: k for k, bus in enumerate(buses)}
         triplets: list[tuple[int, int, complex]] = []

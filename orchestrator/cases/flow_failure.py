@@ -9,20 +9,14 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.flow_equations import FlowEquations
 from orchestrator.cases.flow_newton import CONVERGED, NewtonResult, grow, solve
 
-_SHARES = (0.9, 0.75, 0.5, 0.25, 0.0)
-"""Parts of the stray capacitance that are tried."""
-
-_SHOWN = 6
-"""Iterations whose mismatch is told."""
+_SHARES = (0.9, 0.75, 0.5, 0.25, 0.0)  # parts of the stray capacitance that are tried
+_SHOWN = 6  # iterations whose mismatch is told
 
 
 def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable[[float], FlowEquations] | None) -> str:
     """Sentences about a power flow without a solution.
 
-    Parameters
-    ----------
-    with_stray
-        The same power flow with a share of its stray capacitances; None where it has none.
+    ``with_stray``: the same power flow with a share of its stray capacitances; None where it has none.
     """
     mismatch, bus = failed.history[-1]
     told = [f"{size * SYSTEM_BASE_MVA:.3g}" for size, _ in failed.history]

@@ -13,31 +13,20 @@ from orchestrator.errors import PowerFlowError
 Limits = Mapping[str, tuple[float, float]]
 """Least and most reactive power of the units at a bus together [pu, 100 MVA], by bus."""
 
-_TOUCHED = 1e-6
-"""Reactive power [pu, 100 MVA] beyond a limit that does not count."""
+_TOUCHED = 1e-6  # reactive power [pu, 100 MVA] beyond a limit that does not count
 
 _ROUNDS = 40
-_RETURNS = 2
-"""So many times a bus may get its voltage back; then it stays at its limit."""
+_RETURNS = 2  # so many times a bus may get its voltage back; then it stays at its limit
 
 
 @dataclass(frozen=True, slots=True)
 class Excess:
-    """A bus whose units reach a limit of reactive power.
-
-    Attributes
-    ----------
-    q
-        Reactive power that holding the voltage takes [pu, 100 MVA]; the limit itself where it is kept.
-    limit
-        The limit [pu, 100 MVA].
-    wanted, voltage
-        Magnitude that the units would hold, and the one that it has [pu].
-    """
+    """A bus whose units reach a limit of reactive power."""
 
     bus: str
-    q: float
-    limit: float
+    q: float  # reactive power that holding the voltage takes [pu, 100 MVA]; the limit itself where it is kept
+    limit: float  # the limit [pu, 100 MVA]
+    # wanted, voltage: magnitude that the units would hold, and the one that it has [pu]
     wanted: float
     voltage: float
 
@@ -67,10 +56,7 @@ def solve_with_limits(equations: FlowEquations, limits: Limits) -> tuple[FlowEqu
     """Solve, and let every bus that exceeds a limit feed that limit instead of holding its voltage; the slack bus
     holds its own whatever it takes.
 
-    Returns
-    -------
-    tuple
-        The equations that were solved at last, their result, and the buses at their limit.
+    Returns the equations that were solved at last, their result, and the buses at their limit.
     """
     position = {bus: k for k, bus in enumerate(equations.buses)}
     at_limit: dict[str, float] = {}

@@ -11,8 +11,7 @@ from scipy.sparse.linalg import MatrixRankWarning, spsolve
 
 from orchestrator.cases.flow_equations import FlowEquations
 
-CONVERGED = 1e-9
-"""Largest mismatch of a bus [pu, 100 MVA] of a solution."""
+CONVERGED = 1e-9  # largest mismatch of a bus [pu, 100 MVA] of a solution
 
 _ITERATIONS = 30
 _HALVINGS = 8
@@ -24,26 +23,14 @@ LOWEST_VOLTAGE = 0.5
 """Magnitude [pu] of the lowest voltage of a solution. The equations have others, with collapsed voltages, at which no
 network is run: at the end of one line from a source of 1 pu the usual solution is never below 0.5 pu."""
 
-_LEAST_VOLTAGE = 0.01
-"""Magnitude [pu] below which no step goes."""
+_LEAST_VOLTAGE = 0.01  # magnitude [pu] below which no step goes
 
 
 @dataclass(frozen=True)
 class NewtonResult:
-    """What the iterations came to.
-
-    Attributes
-    ----------
-    voltages
-        Complex bus voltages [pu].
-    converged
-        Whether the mismatch is below `CONVERGED`, and no voltage below `LOWEST_VOLTAGE`.
-    history
-        Largest mismatch [pu, 100 MVA] before the first and after each iteration, and its bus.
-    """
-
-    voltages: NDArray[np.complex128]
-    converged: bool
+    voltages: NDArray[np.complex128]  # complex bus voltages [pu]
+    converged: bool  # whether the mismatch is below `CONVERGED`, and no voltage below `LOWEST_VOLTAGE`
+    # largest mismatch [pu, 100 MVA] before the first and after each iteration, and its bus
     history: tuple[tuple[float, str], ...]
 
 

@@ -7,8 +7,7 @@ from orchestrator.coupling.events import Event
 from orchestrator.coupling.system import System
 from orchestrator.errors import Problem
 
-DAMPING_CONTROLLERS = ("pod_p", "pod_q")
-"""Parts of converters that act by a gain ``K`` and have no effect at rest."""
+DAMPING_CONTROLLERS = ("pod_p", "pod_q")  # parts of converters that act by a gain ``K`` and have no effect at rest
 
 Idle = Mapping[str, Problem | None]
 """By ``component.variable``, all values that somebody gave; with a question where one cannot act."""

@@ -43,10 +43,7 @@ def sets_imperfection(key: str) -> bool:
 def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, float | bool]:
     """Give the connections what the case and the scenario say of them; the numbers that were given, by key.
 
-    Parameters
-    ----------
-    stop
-        End of the run [s]; a delay that lasts beyond it is noted.
+    ``stop``: end of the run [s]; a delay that lasts beyond it is noted.
     """
     given: dict[str, float | bool] = {}
     tables = {name: (table, draft.place(KEY, name)) for name, table in draft.case.imperfections.items()}
@@ -72,12 +69,8 @@ def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, fl
 def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None:
     """A delay after which nothing arrives before the run ends: a mistake, or worth a word if the run was cut short.
 
-    Parameters
-    ----------
-    delay, stop
-        How late a value is, and the end of the run [s].
-    where
-        Place in the file.
+    ``delay`` and ``stop``: how late a value is, and the end of the run [s].
+    ``where``: place in the file.
     """
     if delay < stop:
         return

@@ -12,8 +12,7 @@ from orchestrator.cases.draft import Draft
 from orchestrator.coupling.events import Event
 from orchestrator.errors import Problem
 
-_SHOWN = 5
-"""Buses that a question names; the others are counted."""
+_SHOWN = 5  # buses that a question names; the others are counted
 
 
 def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:

@@ -9,8 +9,7 @@ from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.schema import LoadLaw, LoadModelTable, NetworkTable
 from orchestrator.errors import InputError, Problem
 
-_LARGEST_SHARE = 100.0
-"""Of a part by the whole: above, the parts cancel, and the whole is none to take shares of."""
+_LARGEST_SHARE = 100.0  # of a part by the whole: above, the parts cancel, and the whole is none to take shares of
 
 _OPEN = (
     "the load model is open: the file's loads (constant powers in its power flow) are taken as constant impedances, as "
@@ -43,12 +42,8 @@ def with_laws(
 
     Without a key, a load is a constant impedance, and static generation (P < 0) a constant current.
 
-    Parameters
-    ----------
-    own
-        The load's own keys, which decide first.
-    parts
-        What of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest.
+    ``own``: the load's own keys, which decide first.
+    ``parts``: what of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest.
     """
     feeds = load.p_mw < 0
     models = [m for m in (own, table.generation_model if feeds else table.load_model) if m is not None]

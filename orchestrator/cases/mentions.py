@@ -15,22 +15,15 @@ from orchestrator.errors import InputError, Problem
 
 @dataclass
 class Named:
-    """Names that exist in the examined scenarios.
-
-    Attributes
-    ----------
-    foreign
-        Components that are FMU files. Such an FMU may lack outputs and states of the catalogue's model that it
-        replaces, and their names are not checked.
-    homes
-        Names that an area may contain: components and buses.
-    """
+    """Names that exist in the examined scenarios."""
 
     components: set[str] = field(default_factory=set)
     states: set[str] = field(default_factory=set)
+    # components that are FMU files. Such an FMU may lack outputs and states of the catalogue's model that it replaces,
+    # and their names are not checked.
     foreign: set[str] = field(default_factory=set)
     outputs: set[str] = field(default_factory=set)
-    homes: set[str] = field(default_factory=set)
+    homes: set[str] = field(default_factory=set)  # names that an area may contain: components and buses
 
     def add(self, draft: Draft) -> None:
         """Add the names of one assembled scenario."""
@@ -95,9 +88,10 @@ def _records(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
 def _signals(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     entries = [(place("analysis", "ring_down"), case.analysis.ring_down.signal)] if case.analysis.ring_down else []
     entries += [
-        (place("plots", k, "panels", n, "signal"), panel.signal)
+        (place("plots", k, "panels", n, "signal"), signal)
         for k, plot in enumerate(case.plots)
         for n, panel in enumerate(plot.panels)
+        for signal in (panel.signal, *panel.also)
     ]
     for where, expression in entries:
         yield from _signal(where, expression, named)

@@ -7,10 +7,8 @@ from collections.abc import Iterable
 
 from orchestrator.errors import InputError
 
-LONGEST = 200
-"""Bytes of a name that becomes a file's, in UTF-8: file systems take 255, and something is added to it."""
-
-_TWINS = {"current_limit": "current_demand", "current_demand": "current_limit"}
+LONGEST = 200  # bytes of a name that becomes a file's, in UTF-8: file systems take 255, and something is added to it
+TWINS = {"current_limit": "current_demand", "current_demand": "current_limit"}
 """Outputs of one meaning in EMT and phasor models."""
 
 _RESERVED = re.compile(r"(?:con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
@@ -43,7 +41,7 @@ def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
     """
     names = list(known)
     head, dot, last = wanted.rpartition(".")
-    twin = f"{head}{dot}{_TWINS.get(last, last)}"
+    twin = f"{head}{dot}{TWINS.get(last, last)}"
     if twin != wanted and fnmatch.filter(names, twin):
         return f"phasor and EMT models name it differently: here it is {twin}"
     close = [name for name in names if _parts(name) == _parts(wanted)]

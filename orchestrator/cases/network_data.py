@@ -28,52 +28,34 @@ class _Source:
 
 @dataclass(frozen=True)
 class NetworkData:
-    """Elements of a network, and further data of its source.
-
-    Attributes
-    ----------
-    generation
-        Power and voltage of the units at each bus.
-    slack
-        Reference bus of the source.
-    frequency
-        Rated frequency [Hz]; None leaves every model's own.
-    places
-        File and line of the lines that a file holds, by name.
-    machines, idle_machines
-        Machines in service, one by one, where the source is of PSS/E; bus and identifier of those out of service.
-    feeding, capacitors
-        By bus, as the source has them: loads below zero [MW] and capacitors [Mvar].
-    solved
-        Whether the source's voltages are no flat start.
-    """
+    """Elements of a network, and further data of its source."""
 
     buses: tuple[str, ...]
     lines: tuple[Line, ...]
     loads: tuple[Load, ...]
     shunts: tuple[Shunt, ...]
-    generation: dict[str, Generation] = field(default_factory=dict)
-    slack: str | None = None
-    frequency: float | None = None
+    generation: dict[str, Generation] = field(default_factory=dict)  # power and voltage of the units at each bus
+    slack: str | None = None  # reference bus of the source
+    frequency: float | None = None  # rated frequency [Hz]; None leaves every model's own
     stray_B: float = 0.0
-    places: dict[str, str] = field(default_factory=dict)
+    places: dict[str, str] = field(default_factory=dict)  # file and line of the lines that a file holds, by name
     transformers: tuple[ThreeWinding, ...] = ()
     changes: tuple[Problem, ...] = ()
+    # machines, idle_machines: machines in service, one by one, where the source is of PSS/E; bus and identifier of
+    # those out of service
     machines: tuple[Machine, ...] = ()
     idle_machines: frozenset[tuple[int, str]] = frozenset()
+    # feeding, capacitors: by bus, as the source has them: loads below zero [MW] and capacitors [Mvar]
     feeding: dict[str, float] = field(default_factory=dict)
     capacitors: dict[str, float] = field(default_factory=dict)
-    solved: bool = True
+    solved: bool = True  # whether the source's voltages are no flat start
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     """Buses, lines, loads and shunts of a network table, its files and its source included.
 
-    Raises
-    ------
-    InputError
-        If a file is missing, lacks a column, holds something that is not a number, or a source holds something
-        that the grid model does not have.
+    Raises an `InputError` if a file is missing, lacks a column, holds something that is not a number, or a source holds
+    something that the grid model does not have.
     """
     found = _source(table, directory)
     source = found.network

@@ -11,11 +11,8 @@ from orchestrator.cases.schema import UnitReconnectionTable
 from orchestrator.cases.start_values import is_connected, start_from_power_flow
 from orchestrator.errors import ErrorKind, InputError, Problem
 
-_USUAL_VOLTAGES = (0.8, 1.2)
-"""Magnitudes [pu] of bus voltages that are not questioned."""
-
-_SHOWN = 5
-"""Buses that a question names; the others are counted."""
+_USUAL_VOLTAGES = (0.8, 1.2)  # magnitudes [pu] of bus voltages that are not questioned
+_SHOWN = 5  # buses that a question names; the others are counted
 
 
 def power_flow_of(draft: Draft) -> PowerFlow | None:

@@ -16,17 +16,9 @@ _EXAMPLE = '[set]\n"gfor.pod_p.K" = 200.0'
 
 @dataclass(frozen=True)
 class ParameterFile:
-    """The values of a parameter file.
-
-    Attributes
-    ----------
-    values
-        By ``component.variable``; the component may be a pattern such as ``gfor*``.
-    """
-
     path: Path
     text: str
-    values: dict[str, Value]
+    values: dict[str, Value]  # by ``component.variable``; the component may be a pattern such as ``gfor*``
 
     def place(self, key: str) -> str:
         return _place(self.path, self.text, key)
@@ -35,12 +27,8 @@ class ParameterFile:
 def read_parameter_file(path: Path) -> ParameterFile:
     """Read a file whose one table ``[set]`` holds values by ``component.variable``.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it is not TOML, or it has no table ``[set]``.
-    CaseError
-        With every key and value that is not valid.
+    Raises an `InputError` if there is no such file, it is not TOML, or it has no table ``[set]``.
+    Raises a `CaseError` with every key and value that is not valid.
     """
     text, raw = read_toml(path, "the parameter file", "`gfor design` writes one")
     table = raw.get(_TABLE)

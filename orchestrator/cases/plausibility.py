@@ -20,11 +20,8 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import Problem
 from orchestrator.fmi.port import BoundDescription
 
-_FULL = 1.05
-"""Apparent power [pu of the rating] above which a converter's operating point is questioned."""
-
-_SHOWN = 3
-"""Largest number of components that a question names; the others are counted."""
+_FULL = 1.05  # apparent power [pu of the rating] above which a converter's operating point is questioned
+_SHOWN = 3  # largest number of components that a question names; the others are counted
 
 
 def check_plausibility(draft: Draft) -> None:

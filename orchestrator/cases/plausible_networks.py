@@ -11,8 +11,7 @@ from orchestrator.cases.plausible_ranges import COMPENSATION, LINE_B, LINE_RATIO
 from orchestrator.cases.plausible_values import UnusualValue, outside, value_of
 from orchestrator.coupling.system import ComponentPlan
 
-_SHOWN = 3
-"""Equivalents that are named."""
+_SHOWN = 3  # equivalents that are named
 
 
 def network_doubts(draft: Draft) -> Iterator[UnusualValue]:

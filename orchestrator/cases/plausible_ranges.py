@@ -8,24 +8,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Plausible:
-    """A range, both ends included.
-
-    Attributes
-    ----------
-    unit
-        Unit of the variable. The range does not apply to a variable of the same name in another unit.
-    or_zero
-        Whether 0 is usual as well, because it switches a part off.
-    slip
-        The likely mistake behind a value outside; found from the value where empty.
-    """
+    """A range, both ends included."""
 
     low: float
     high: float
-    unit: str
+    unit: str  # Unit of the variable. The range does not apply to a variable of the same name in another unit.
     why: str
-    or_zero: bool = False
-    slip: str = ""
+    or_zero: bool = False  # whether 0 is usual as well, because it switches a part off
+    slip: str = ""  # the likely mistake behind a value outside; found from the value where empty
 
     def fits(self, value: float) -> bool:
         return self.low <= value <= self.high or (self.or_zero and value == 0)
@@ -168,9 +158,5 @@ LINE_B = Plausible(0, 10, "pu", _LINE)
 LINE_RATIO = Plausible(0.6, 1.6, "1", "tap changers and off-nominal ratios")
 COMPENSATION = Plausible(0.05, 0.9, "1", "series capacitors take 20 to 80 % of a line's reactance, widened")
 STRAY_B = Plausible(0, 1, "pu", "a stray capacitance is small")
-
-MOST_R_OVER_X = 5.0
-"""Largest usual R/X of a line; low-voltage cables come near it."""
-
-SMALLEST_SHARE = 1e-3
-"""Smallest usual rating of a unit, as a part of the largest unit's rating in the same network."""
+MOST_R_OVER_X = 5.0  # largest usual R/X of a line; low-voltage cables come near it
+SMALLEST_SHARE = 1e-3  # smallest usual rating of a unit, as a part of the largest unit's rating in the same network

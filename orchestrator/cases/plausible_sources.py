@@ -6,12 +6,8 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_values import UnusualValue, value_of
 from orchestrator.coupling.system import ComponentPlan
 
-SOLVED = "solved"
-"""Of the grid, in ``meant``: the source's voltages are a flat start on purpose."""
-
-_STEP_UP = (0.03, 0.35)
-"""Usual reactances of step-up transformers on the machine's rating [pu], widened."""
-
+SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
+_STEP_UP = (0.03, 0.35)  # usual reactances of step-up transformers on the machine's rating [pu], widened
 _FAR = 20.0
 """A capacitor that is smaller than the next one by this factor is questioned where 100 times as much is usual."""
 

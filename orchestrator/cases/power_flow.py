@@ -13,8 +13,7 @@ from orchestrator.errors import InputError, PowerFlowError
 
 __all__ = ["FlowLine", "FlowLoad", "FlowShunt", "FlowUnit", "PowerFlow", "solve_power_flow"]
 
-_TOLERANCE = 1e-9
-"""Largest power mismatch of a bus that is accepted [pu, 100 MVA]."""
+_TOLERANCE = 1e-9  # largest power mismatch of a bus that is accepted [pu, 100 MVA]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,33 +38,14 @@ class FlowUnit:
 
 @dataclass(frozen=True)
 class PowerFlow:
-    """A solved power flow.
-
-    Attributes
-    ----------
-    voltages
-        Complex bus voltages [pu].
-    powers
-        P + jQ of every unit on its own rating [pu, S_n].
-    residual
-        Largest power mismatch of a bus [pu, 100 MVA], recomputed from the voltages.
-    at_limits
-        Buses that feed a limit of reactive power instead of holding their voltage.
-    beyond_limits
-        Buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack.
-    lines
-        What it was solved with; a transformer of three windings is three of them.
-    slack
-        Bus that feeds what is left.
-    """
-
-    voltages: dict[str, complex]
-    powers: dict[str, complex]
-    residual: float
-    at_limits: tuple[Excess, ...] = ()
+    voltages: dict[str, complex]  # complex bus voltages [pu]
+    powers: dict[str, complex]  # P + jQ of every unit on its own rating [pu, S_n]
+    residual: float  # largest power mismatch of a bus [pu, 100 MVA], recomputed from the voltages
+    at_limits: tuple[Excess, ...] = ()  # buses that feed a limit of reactive power instead of holding their voltage
+    # buses that hold their voltage beyond a limit, because the limits are not kept or the bus is the slack
     beyond_limits: tuple[Excess, ...] = ()
-    lines: tuple[FlowLine, ...] = ()
-    slack: str = ""
+    lines: tuple[FlowLine, ...] = ()  # what it was solved with; a transformer of three windings is three of them
+    slack: str = ""  # bus that feeds what is left
 
 
 def solve_power_flow(
@@ -85,20 +65,12 @@ def solve_power_flow(
     slack bus they share the remaining active power in the same way. Units with a given reactive power feed it and their
     active power, at any bus.
 
-    Parameters
-    ----------
-    lines, loads, shunts
-        Elements of the network [pu, 100 MVA; loads in MW and Mvar].
-    slack_bus
-        The bus whose units feed the remaining power; its angle is zero.
-    keep_limits
-        Whether a bus gives its voltage up at a limit; otherwise the limits that are exceeded are only named.
-
-    Raises
-    ------
-    InputError
-        If the units at a bus disagree about its voltage, no unit is connected at the slack bus, buses have no way
-        to it, or no solution is found.
+    ``lines`` and ``loads`` and ``shunts``: elements of the network [pu, 100 MVA; loads in MW and Mvar].
+    ``slack_bus``: the bus whose units feed the remaining power; its angle is zero.
+    ``keep_limits``: whether a bus gives its voltage up at a limit; otherwise the limits that are exceeded are only
+    named.
+    Raises an `InputError` if the units at a bus disagree about its voltage, no unit is connected at the slack bus,
+    buses have no way to it, or no solution is found.
     """
     at_bus: dict[str, list[FlowUnit]] = {}
     fixed: dict[str, complex] = {}

@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from fmus.grid.network import Network
-from fmus.toolchain.catalogue import model_names, parts_of
+from fmus.toolchain.catalogue import model_names, network_of, parts_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import assign_values
-from orchestrator.cases.build_choices import PARTS
+from orchestrator.cases.build_choices import MODELS, PARTS
 from orchestrator.cases.case_network import check_network_is_used, find_network, read_network, takes_network
 from orchestrator.cases.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.contradictions import doubts
@@ -28,11 +28,7 @@ from orchestrator.cases.recording import record_every, recorded
 from orchestrator.cases.references import references_of
 from orchestrator.cases.run_plan import check_length, checked_schedule, clock_of
 from orchestrator.cases.scheduling import schedule_in, told_again
-from orchestrator.cases.schema import (
-    ComponentTable,
-    ReferenceModeTable,
-    Value,
-)
+from orchestrator.cases.schema import ComponentTable, ReferenceModeTable, Value
 from orchestrator.cases.unit_tables import unit_components
 from orchestrator.cases.wiring import check_inputs, connect
 from orchestrator.coupling.events import Event
@@ -46,42 +42,7 @@ from orchestrator.fmi.instance import is_ours
 
 @dataclass(frozen=True)
 class PreparedScenario:
-    """A scenario that is ready to run.
-
-    Attributes
-    ----------
-    record
-        Names ``component.variable`` of the signals that are recorded every ``record_every`` communication steps.
-    about_rows
-        Questions about the interval of the recording, which only a run asks.
-    record_filtered
-        Whether the recorded signals go through a low-pass filter before.
-    power_flow
-        The power flow that gives the components' start values; None if the case has no network.
-    values
-        Every value that was set, by ``component.variable``.
-    questions
-        Data that are most unusual, each with its place: see `plausibility`.
-    references
-        Published modes of the scenario by name, where the conditions of ``[reference]`` hold.
-    places
-        File and line of every component.
-    of_units
-        Components that come from the units table.
-    told
-        Components that are told the communication step.
-    network
-        Behind the grid component of the power flow; None if there is none.
-    source_slack
-        Reference bus of the network's source.
-    beside
-        Prepares another scenario of the case with the same values, or with those of its file alone where that is asked
-        for; None where nothing but the file gave values.
-    given
-        What the scenario, parameter files and the command line give, as it is written; a later source goes first.
-    idle
-        What came from outside of the file, and where that cannot act; see `idle_everywhere`.
-    """
+    """A scenario that is ready to run."""
 
     case: CaseDefinition
     name: str
@@ -90,23 +51,36 @@ class PreparedScenario:
     schedule: Schedule
     step_size: float
     stop_time: float
+    # names ``component.variable`` of the signals that are recorded every ``record_every`` communication steps.
     record: tuple[str, ...]
     record_every: int
     events: tuple[Event, ...]
+    # the power flow that gives the components' start values; None if the case has no network.
     power_flow: PowerFlow | None
-    values: dict[str, float | bool]
-    questions: tuple[Problem, ...] = ()
-    record_filtered: bool = False
-    about_rows: tuple[Problem, ...] = ()
+    values: dict[str, float | bool]  # every value that was set, by ``component.variable``
+    questions: tuple[Problem, ...] = ()  # data that are most unusual, each with its place: see `plausibility`
+    record_filtered: bool = False  # whether the recorded signals go through a low-pass filter before
+    about_rows: tuple[Problem, ...] = ()  # questions about the interval of the recording, which only a run asks
+    # published modes of the scenario by name, where the conditions of ``[reference]`` hold.
     references: Mapping[str, ReferenceModeTable] = field(default_factory=dict)
-    places: Mapping[str, str] = field(default_factory=dict)
-    of_units: frozenset[str] = frozenset()
-    told: frozenset[str] = frozenset()
-    network: Network | None = None
-    source_slack: str | None = None
+    places: Mapping[str, str] = field(default_factory=dict)  # file and line of every component
+    of_units: frozenset[str] = frozenset()  # components that come from the units table
+    told: frozenset[str] = frozenset()  # components that are told the communication step
+    network: Network | None = None  # behind the grid component of the power flow; None if there is none
+    source_slack: str | None = None  # reference bus of the network's source
+    # prepares another scenario of the case with the same values, or with those of its file alone where that is asked
+    # for; None where nothing but the file gave values.
     beside: "Callable[..., PreparedScenario | None] | None" = field(default=None, repr=False, compare=False)
+    # what the scenario, parameter files and the command line give, as it is written; a later source goes first.
     given: Mapping[str, Value] = field(default_factory=dict, repr=False)
+    # what came from outside of the file, and where that cannot act; see `idle_everywhere`.
     idle: Idle = field(default_factory=dict, repr=False)
+    not_reached: tuple[float, ...] = ()  # times of events for which the run stops too early [s]
+
+    @property
+    def grid(self) -> str:
+        """The component that is the network; "" without one."""
+        return self.case.table.power_flow.grid if self.case.table.power_flow else ""
 
     def rescheduled(self, name: ScheduleName) -> "PreparedScenario":
         """The same scenario with another schedule; components that know the communication step are told what fits."""
@@ -126,11 +100,7 @@ class Preparer:
     """Prepares one scenario; ``problems`` collects the mistakes."""
 
     def __init__(
-        self,
-        case: CaseDefinition,
-        name: str,
-        overrides: dict[str, Value],
-        parameters: Sequence[ParameterFile] = (),
+        self, case: CaseDefinition, name: str, overrides: dict[str, Value], parameters: Sequence[ParameterFile] = ()
     ) -> None:
         scenario = case.scenarios[name]
         self._case = case
@@ -138,7 +108,8 @@ class Preparer:
         self.draft = draft = Draft(str(case.path), case.table, name, scenario, case.directory, case.place)
         draft.parameter_files, draft.whole = case.parameter_files, case.numbered
         draft.layers = value_layers(draft, parameters, overrides)
-        draft.from_outside = frozenset(overrides).union(*(file.values for file in parameters))
+        draft.injections = case.injections
+        draft.from_outside = frozenset(overrides).union(*(file.values for file in parameters)) - {MODELS}
         read_network(draft)
         self._everything = dict(case.table.components) | unit_components(draft)
         draft.known |= set(self._everything)
@@ -203,6 +174,7 @@ class Preparer:
             record_every=every,
             record_filtered=draft.case.solver.record_filter == "low-pass",
             events=events,
+            not_reached=tuple(sorted(draft.not_reached)),
             power_flow=flow,
             values={f"{n}.{v}": x for n, p in draft.system.components.items() for v, x in p.parameters.items()}
             | imperfections,
@@ -305,9 +277,9 @@ class Preparer:
             directory = self.draft.directory
             return bound_fmu(directory / table.file, directory / table.binding if table.binding else None)
         own = takes_network(table)
-        faulted = self.draft.network is not None and bool(self.draft.network.faults)
-        if faulted and table is self.draft.tables.get(self.draft.grid or ""):
-            own = True  # a model with a network of its own is built anew, with that network's faults
+        if not own and self.draft.network is not None and table is self.draft.tables.get(self.draft.grid or ""):
+            # A model with a network of its own is built anew, with the faults and ports that this one has besides.
+            own = self.draft.network != network_of(table.model or "")
         if own and self.draft.network is None:
             raise InputError(
                 f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"

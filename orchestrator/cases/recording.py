@@ -4,20 +4,20 @@ import fnmatch
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import variables_of
+from orchestrator.cases.schema import ForcingTable
 from orchestrator.coupling.clock import Clock
 from orchestrator.errors import InputError, Problem
 
-_EQUAL = 1e-6
-"""An interval is a multiple of the step if it is one to this part of a step."""
+NEEDED_FOR_SOURCES = ("*.i_re", "*.i_im", "*.v_re", "*.v_im", "*.p", "*.q")
+"""Recorded besides where something is forced: what tells where an oscillation comes from."""
+
+_EQUAL = 1e-6  # an interval is a multiple of the step if it is one to this part of a step
 
 
 def record_every(draft: Draft, clock: Clock, stop_time: float) -> tuple[int, tuple[Problem, ...]]:
     """Communication steps between two rows, and the questions that a run asks about the interval that the case states.
 
-    Parameters
-    ----------
-    stop_time
-        Of the run [s].
+    ``stop_time``: Of the run [s].
     """
     solver = draft.case.solver
     steps = solver.record_interval / clock.step_size
@@ -40,16 +40,20 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
     questions: list[Problem] = []
     plans = {name: plan.description for name, plan in draft.system.components.items()}
     outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
-    wanted = {name for pattern in draft.case.solver.record for name in fnmatch.filter(outputs, pattern)}
+    events = draft.case.events if draft.scenario.events is None else draft.scenario.events
+    forced = any(isinstance(event, ForcingTable) for event in events)
+    patterns = [*draft.case.solver.record, *(NEEDED_FOR_SOURCES if forced else ())]
+    wanted = {name for pattern in patterns for name in fnmatch.filter(outputs, pattern)}
     if outputs and not wanted and draft.case.solver.record:
         text = f"nothing is recorded in scenario {draft.name!r}: none of its outputs fits a pattern"
         questions.append(Problem(draft.place("solver", "record"), text))
     ring = draft.case.analysis.ring_down
     shown = [(draft.place("analysis", "ring_down"), ring.signal)] if ring else []
     shown += [
-        (draft.place("plots", k, "panels", n, "signal"), panel.signal)
+        (draft.place("plots", k, "panels", n, "signal"), signal)
         for k, plot in enumerate(draft.case.plots)
         for n, panel in enumerate(plot.panels)
+        for signal in (panel.signal, *panel.also)
     ]
     for place, expression in shown:
         if missing := [name for name in _variables(expression) if name in outputs and name not in wanted]:

@@ -10,11 +10,8 @@ from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import InputError
 
-MOST_STEPS = 1e11
-"""Communication steps of a run: a month and more."""
-
-_STEPS_A_SECOND = 30_000
-"""Of the two-area system on one core, about."""
+MOST_STEPS = 1e11  # communication steps of a run: a month and more
+_STEPS_A_SECOND = 30_000  # of the two-area system on one core, about
 
 
 def clock_of(draft: Draft, step_size: float | None) -> Clock | None:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
 from orchestrator.cases.names import file_name
+from orchestrator.coupling.events import ForcingShape
 from orchestrator.coupling.schedule import TOLERANCES, ScheduleName
 from orchestrator.toml_files import Table
 from orchestrator.units import to_unit
@@ -27,6 +28,13 @@ def _in(unit: str) -> Callable[[Any], Any]:
     return convert
 
 
+def _share(value: Any) -> Any:
+    """``"2 %"`` as 0.02; else per unit."""
+    if isinstance(value, str) and value.rstrip().endswith("%"):
+        return to_unit(value.rstrip().removesuffix("%"), "pu") / 100
+    return _in("pu")(value)
+
+
 Number = Annotated[float, BeforeValidator(_no_truth_value)]
 
 Seconds = Annotated[float, BeforeValidator(_in("s")), Field(allow_inf_nan=False)]
@@ -39,8 +47,7 @@ Bus = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int
 FileName = Annotated[str, AfterValidator(file_name)]
 Radian = Annotated[float, BeforeValidator(_in("rad")), Field(allow_inf_nan=False)]
 
-LONGEST_STEP = 0.1
-"""Between two communication points [s]."""
+LONGEST_STEP = 0.1  # between two communication points [s]
 
 
 class SolverTable(Table):
@@ -434,6 +441,28 @@ class ParameterChangeTable(EventBase):
     value: Value
 
 
+class ForcingTable(EventBase):
+    """A reference swings: by a share of its base, or in per unit; without a reference it is the unit's power."""
+
+    type: Literal["forcing"]
+    component: str
+    reference: str | None = None
+    frequency: Hertz = Field(gt=0)
+    amplitude: Annotated[float, BeforeValidator(_share), Field(gt=0, allow_inf_nan=False)]
+    shape: ForcingShape = "sine"
+    end: Seconds | None = None
+    _text: str = PrivateAttr(default="")
+
+    @property
+    def place(self) -> str:
+        """Where it was asked for, if not in the file."""
+        return f"--force {self._text!r}" if self._text else ""
+
+    def asked_as(self, text: str) -> Self:
+        self._text = text
+        return self
+
+
 SettingEventTable = (
     LoadChangeTable
     | LoadTripTable
@@ -456,10 +485,11 @@ WireEventTable = (
 )
 """Faults of connections."""
 
-ComponentFaultTable = ComponentTripTable | NanOutputTable | TimeOutTable
-"""Faults of whole components."""
+ComponentFaultTable = ComponentTripTable | NanOutputTable | TimeOutTable  # faults of whole components
 
-EventTable = Annotated[SettingEventTable | WireEventTable | ComponentFaultTable, Field(discriminator="type")]
+EventTable = Annotated[
+    SettingEventTable | WireEventTable | ComponentFaultTable | ForcingTable, Field(discriminator="type")
+]
 
 
 class ScenarioTable(Table):
@@ -516,9 +546,10 @@ class ReferenceTable(Table):
 
 
 class PanelTable(Table):
-    """One axis of a plot."""
+    """One axis of a plot; ``also`` are further signals on the same axis."""
 
     signal: str
+    also: list[str] = []
     label: str
     scale: Number = 1.0
 
@@ -531,6 +562,13 @@ class PlotTable(Table):
     panels: list[PanelTable]
 
 
+class KindTable(Table):
+    """What one kind of models takes in place of the case's own values."""
+
+    step_size: Seconds | None = Field(default=None, gt=0, le=LONGEST_STEP)
+    stray_B: PerUnit | None = None
+
+
 class CaseTable(Table):
     """A whole case file; ``meant`` names values ``component.variable`` that are unusual on purpose."""
 
@@ -538,6 +576,9 @@ class CaseTable(Table):
     title: str = ""
     source: str = ""
     meant: list[str] = []
+    models: Literal["emt", "phasor"] | None = None
+    emt: KindTable = KindTable()
+    phasor: KindTable = KindTable()
     solver: SolverTable = SolverTable()
     components: dict[str, ComponentTable] = Field(min_length=1)
     network: NetworkTable | None = None

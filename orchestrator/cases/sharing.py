@@ -1,7 +1,7 @@
 """Who feeds what an outage takes away: units by their governors or by their ratings, or the slack alone."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -9,15 +9,14 @@ from orchestrator.cases.power_flow import FlowUnit, PowerFlow
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import ErrorKind, InputError
 
-_CLOSE = 1e-6
-"""Power [MW] that may be left to the units at the slack bus beside their share."""
+_CLOSE = 1e-6  # power [MW] that may be left to the units at the slack bus beside their share
 
 _ROUNDS = 30
-_ROOM = 1e-3
-"""So much of its rating stays between a unit and its limit: at the limit itself no model starts."""
+_ROOM = 1e-3  # so much of its rating stays between a unit and its limit: at the limit itself no model starts
 
-_ISOCHRONOUS = 1e6
-"""Gain of a droop of 0 [pu]: such a unit feeds all that it can."""
+_LEAST_SHARE, _SHOWN = 0.01, 4  # shares below this [MW] are not told; so many are
+
+_ISOCHRONOUS = 1e6  # gain of a droop of 0 [pu]: such a unit feeds all that it can
 
 
 class SharingRule(StrEnum):
@@ -48,6 +47,22 @@ class Reserve:
     most: float
 
 
+def in_words(
+    dispatch: Dispatch,
+    after: Mapping[str, complex],
+    plans: Mapping[str, ComponentPlan],
+    lost: Collection[str],
+    also: Sequence[str] = (),
+) -> str:
+    """What the lost units fed, what else was lost, and who feeds it now, by the units' powers afterwards [pu, S_n]."""
+    rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}
+    fed = [f"{name} is lost, which fed {dispatch.powers[name].real * rating[name]:.4g} MW" for name in sorted(lost)]
+    more = {n: (after[n] - dispatch.powers[n]).real * rating[n] for n in rating if n not in lost}
+    most = sorted(more, key=lambda name: -abs(more[name]))[:_SHOWN]
+    shared = ", ".join(f"{name} {more[name]:+.4g} MW" for name in most if abs(more[name]) >= _LEAST_SHARE)
+    return "; ".join([*fed, *also, *([f"shared: {shared}"] if shared else [])])
+
+
 def _number(plan: ComponentPlan, name: str) -> float | None:
     return plan.number(name) if name in plan.description.variables else None
 
@@ -75,10 +90,7 @@ def droop_gain(plan: ComponentPlan) -> float:
 def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, float]:
     """Least and most active power from which a unit starts [pu, S_n]; infinite where its model has no limit.
 
-    Parameters
-    ----------
-    reactive
-        Reactive power that it feeds [pu, S_n]: the current that is left is active.
+    ``reactive``: Reactive power that it feeds [pu, S_n]: the current that is left is active.
     """
     low, high = [-math.inf], [math.inf]
 
@@ -110,10 +122,7 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
 def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
     """Power of each unit [MW] after a change of the units' whole power; a unit at its limit leaves the rest to others.
 
-    Parameters
-    ----------
-    change
-        What they have to feed beside what they fed [MW].
+    ``change``: What they have to feed beside what they fed [MW].
     """
     found = {one.name: one.before for one in reserves}
     free = [one for one in reserves if one.gain > 0]
@@ -159,18 +168,11 @@ def shared_flow(
 ) -> PowerFlow:
     """The power flow in which the units share what the dispatch before lacks now, with the change of the losses.
 
-    Parameters
-    ----------
-    solve
-        Solves the power flow of units that feed their ``P_0``; those at the slack bus feed what is left.
-    units, plans
-        As they are after the outage, and their values.
-    slack_bus
-        As in `orchestrator.cases.power_flow.solve_power_flow`.
-    dispatch
-        What they fed before.
-    active
-        Least and most active power that data give units [MW], by name.
+    ``solve``: Solves the power flow of units that feed their ``P_0``; those at the slack bus feed what is left.
+    ``units``, ``plans``: As they are after the outage, and their values.
+    ``slack_bus``: As in `orchestrator.cases.power_flow.solve_power_flow`.
+    ``dispatch``: What they fed before.
+    ``active``: Least and most active power that data give units [MW], by name.
     """
     left = [replace(one, P_0=dispatch.powers[one.name].real) if one.connected else one for one in units]
     if dispatch.rule is SharingRule.SLACK:

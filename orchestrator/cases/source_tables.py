@@ -10,28 +10,18 @@ from orchestrator.arrays import Matrix
 
 @dataclass(frozen=True)
 class SourceTables:
-    """MATPOWER's tables of a network, its columns in MATPOWER's order.
-
-    Attributes
-    ----------
-    branch_to_earth
-        Conductance and susceptance to earth at both ends of every branch [pu]: g + jb behind the ratio at the from
-        side, and at the to side.
-    labels
-        Number of a bus → what people call it.
-    frequency
-        Rated frequency [Hz], where the source knows it.
-    load_parts
-        Number of a bus → what its loads draw as constant impedance and as constant current [MW, Mvar], where the source
-        tells them apart; the rest of the bus' load is as the case says.
-    """
+    """MATPOWER's tables of a network, its columns in MATPOWER's order."""
 
     name: str
     base_mva: float
     bus: Matrix
     branch: Matrix
     gen: Matrix
+    # conductance and susceptance to earth at both ends of every branch [pu]: g + jb behind the ratio at the from side,
+    # and at the to side
     branch_to_earth: NDArray[np.complex128]
-    labels: dict[int, str]
-    frequency: float | None = None
+    labels: dict[int, str]  # number of a bus → what people call it
+    frequency: float | None = None  # rated frequency [Hz], where the source knows it
+    # number of a bus → what its loads draw as constant impedance and as constant current [MW, Mvar], where the source
+    # tells them apart; the rest of the bus' load is as the case says
     load_parts: dict[int, tuple[complex, complex]] = field(default_factory=dict)

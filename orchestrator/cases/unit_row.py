@@ -7,52 +7,35 @@ from typing import Any
 
 from orchestrator.errors import InputError
 
-_MOST_VOLTAGE = 2.0
-"""Largest voltage [pu] that a unit can hold."""
+_MOST_VOLTAGE = 2.0  # largest voltage [pu] that a unit can hold
 
 
 @dataclass(frozen=True, slots=True)
 class UnitRow:
     """One generating unit.
 
-    Attributes
-    ----------
-    rating_mva, p_mw, v_pu
-        Rating [MVA], active power [MW] and voltage [pu].
-    alpha
-        Share of the converter, if the row gives it; otherwise None.
-    place
-        File and line of the row; empty where the unit comes from the network's source.
-    partial
-        Whether a record of it was left out, for which the case says what stands there.
-    q_min_mvar, q_max_mvar, p_min_mw, p_max_mw
-        Limits of reactive and of active power; infinite without.
-    converter
-        Model of the converter that the whole unit is by its record.
-    doubts
-        Questions about the generator's data: parameter, place and text.
-    replaced
-        Lines of records for which the converter's model stands, each with what it leaves out.
-    lines
-        Lines of the records that give parameters, by parameter.
+    ``q_min_mvar``, ``q_max_mvar``, ``p_min_mw``, ``p_max_mw``: Limits of reactive and of active power; infinite
+    without.
     """
 
     label: str
     bus: str
+    # rating_mva, p_mw, v_pu: rating [MVA], active power [MW] and voltage [pu].
     rating_mva: float
     p_mw: float
     v_pu: float
-    alpha: float | None = None
+    alpha: float | None = None  # share of the converter, if the row gives it; otherwise None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    place: str = ""
+    place: str = ""  # file and line of the row; empty where the unit comes from the network's source
     parts: Mapping[str, str] = field(default_factory=dict)
-    partial: bool = False
+    partial: bool = False  # whether a record of it was left out, for which the case says what stands there
     q_min_mvar: float = -math.inf
     q_max_mvar: float = math.inf
-    converter: str | None = None
-    doubts: tuple[tuple[str, str, str], ...] = ()
+    converter: str | None = None  # model of the converter that the whole unit is by its record
+    doubts: tuple[tuple[str, str, str], ...] = ()  # questions about the generator's data: parameter, place and text
+    # lines of records for which the converter's model stands, each with what it leaves out.
     replaced: tuple[tuple[int, str], ...] = ()
-    lines: Mapping[str, int] = field(default_factory=dict)
+    lines: Mapping[str, int] = field(default_factory=dict)  # lines of the records that give parameters, by parameter
     p_min_mw: float = -math.inf
     p_max_mw: float = math.inf
 

@@ -25,9 +25,7 @@ from orchestrator.cases.source_changes import Changes
 from orchestrator.cases.unit_row import UnitRow, checked
 from orchestrator.errors import InputError
 
-UNIT_KINDS = ("sg", "gfor")
-"""First parts of the names of a unit's generator and converter."""
-
+UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
 _LIMITS = ("q_min_mvar", "q_max_mvar")
 _REMARKS = ("q_mvar", "name", "comment", "source")
 """Columns that say more to a reader; the power flow computes the reactive power."""

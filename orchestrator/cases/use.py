@@ -17,14 +17,9 @@ def use_in_case(
 ) -> tuple[Use, Path | None]:
     """Step, operating point and values that a case gives an FMU, and the file of its binding.
 
-    Parameters
-    ----------
-    component
-        Name of the component; None for the component that has this file.
-    step_size
-        Communication step [s]; the case's where None.
-    scenario
-        Name of the scenario; None for the first one with the component.
+    ``component``: name of the component; None for the component that has this file.
+    ``step_size``: communication step [s]; the case's where None.
+    ``scenario``: name of the scenario; None for the first one with the component.
     """
     loaded = load_case(case, trust_fmus=True)  # of which nothing runs here
     name = _component(loaded, component, fmu)

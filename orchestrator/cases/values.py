@@ -12,17 +12,13 @@ from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.units import to_unit
 
-_CHOICES = re.compile(r"\b0: .*\b1: ")
-"""In the description of a variable that chooses: what its numbers mean."""
+_CHOICES = re.compile(r"\b0: .*\b1: ")  # in the description of a variable that chooses: what its numbers mean
 
 
 def convert(info: VariableInfo, value: Value) -> float | bool:
     """Return the value in the variable's own unit.
 
-    Raises
-    ------
-    ValueError
-        If type, unit or range do not fit; the message names the variable, the value and the rule.
+    Raises a `ValueError` if type, unit or range do not fit; the message names the variable, the value and the rule.
     """
     if info.type == "Boolean":
         if isinstance(value, bool):

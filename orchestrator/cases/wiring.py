@@ -4,8 +4,7 @@ from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
 from orchestrator.errors import InputError, Problem
 
-_PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")
-"""What a device gives to a network of phasors."""
+_PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a network of phasors
 
 
 def connect(draft: Draft) -> None:
@@ -108,8 +107,7 @@ def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None
         return
     if draft.grid is None or draft.network is None:
         draft.note(
-            where,
-            "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]",
+            where, "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]"
         )
         return
     if not any(port.name == name and port.bus == bus for port in draft.network.ports):

@@ -10,19 +10,12 @@ from typing import Any
 from orchestrator.errors import InputError
 from orchestrator.safe_files import file_hash, write_text
 
-KEPT = "check.json"
-"""Name of the report's file in a certificate's folder."""
+KEPT = "check.json"  # name of the report's file in a certificate's folder
 
 
 @dataclass(frozen=True)
 class Acceptance:
-    """The result of the acceptance tests.
-
-    Attributes
-    ----------
-    report
-        The whole report, as `gfor check --json` prints it.
-    """
+    """The result of the acceptance tests."""
 
     trusted: bool
     faults: tuple[str, ...]
@@ -56,10 +49,8 @@ def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
 def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
     """Read a report of ``gfor check --json``.
 
-    Raises
-    ------
-    InputError
-        If the file is not a report, belongs to another FMU, binding or version, or does not hold all checks.
+    Raises `InputError` if the file is not a report, belongs to another FMU, binding or version, or does not hold all
+    checks.
     """
     remedy = "write it with `gfor check FILE.fmu --json`, or leave --check away to have the tests run"
     try:

@@ -18,9 +18,7 @@ BASE = BUILT_IN / "norm631" / "case.toml"
 """Case file of the study with our converter, from which a certificate's case is made."""
 
 WITHOUT, WITH = "without", "with"
-
-FMU, BINDING, CASE = "converter.fmu", "vendor.toml", "case.toml"
-"""Names of files in a certificate's folder."""
+FMU, BINDING, CASE = "converter.fmu", "vendor.toml", "case.toml"  # names of files in a certificate's folder
 
 _HEAD = """\
 # Damping test of {fmu}{binding}, written by `gfor certify`.
@@ -31,17 +29,10 @@ _HEAD = """\
 
 def write_case(request: CertificationRequest, switches: Mapping[str, bool], folder: Path) -> Case:
     """Write ``case.toml`` into a folder, and copy the FMU and its binding beside it. The folder then needs no other
-    files.
-
-    Parameters
-    ----------
-    switches
-        Values of the converter's variables that follow from ``--pod``.
+    files. ``switches`` are what ``--pod`` sets in the converter.
     """
     request.check()
-    _lay(request.fmu, folder / FMU)
-    if request.binding:
-        _lay(request.binding, folder / BINDING)
+    lay_files(request, folder)
     tables = _tables(request)
     path = folder / CASE
     behind = f" behind {_in_comment(request.binding)}" if request.binding else ""
@@ -62,9 +53,12 @@ def _in_comment(file: Path) -> str:
     return file.name if file.name.isprintable() else ascii(file.name)
 
 
-def _lay(file: Path, target: Path) -> None:
-    if not (target.exists() and target.samefile(file)):
-        shutil.copyfile(file, target)
+def lay_files(request: CertificationRequest, folder: Path) -> None:
+    """Copy the FMU and its binding into a certificate's folder."""
+    for file, name in ((request.fmu, FMU), (request.binding, BINDING)):
+        target = folder / name
+        if file is not None and not (target.exists() and target.samefile(file)):
+            shutil.copyfile(file, target)
 
 
 def _check(case: Case, request: CertificationRequest, own: Mapping[str, Value]) -> None:

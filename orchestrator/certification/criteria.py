@@ -1,6 +1,6 @@
 """The criteria of the norm on modes: of the linear model, and of a recorded signal."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,36 +13,22 @@ from orchestrator.analysis.modes import ZERO, damping_ratio
 from orchestrator.analysis.threads import one_thread
 from orchestrator.errors import AnalysisError
 
-FREQUENCIES = (0.1, 1.5)
-"""Range of frequencies of the judged modes [Hz], both ends included."""
-
-PAIRED = (0.08, 1.875)
-"""Range of frequencies in which a judged mode may lie in the other system [Hz]."""
-
-LEAST_DAMPING = 0.05
-"""Damping ratio that a judged mode needs."""
-
+FREQUENCIES = (0.1, 1.5)  # range of frequencies of the judged modes [Hz], both ends included
+PAIRED = (0.08, 1.875)  # range of frequencies in which a judged mode may lie in the other system [Hz]
+LEAST_DAMPING = 0.05  # damping ratio that a judged mode needs
 LEAST_AMPLITUDE = 0.01
 """Components below this fraction of a signal's largest oscillation are ignored: they fit its remainder."""
 
 
 @dataclass(frozen=True, slots=True)
 class ModeVerdict:
-    """A mode with the converter, and the same mode without the converter.
-
-    Attributes
-    ----------
-    eigenvalue
-        [rad/s]
-    before
-        Eigenvalue of the same mode without the converter; None where the converter introduces the mode.
-    similarity
-        Similarity of the two modes, from 0 to 1, by their shapes over the states that both systems have. If the
-        converter introduces the mode, the similarity of the best candidate that is not matched with another mode.
-    """
+    """A mode with the converter, and the same mode without the converter."""
 
     eigenvalue: complex
+    # eigenvalue of the same mode without the converter; None where the converter introduces the mode.
     before: complex | None
+    # similarity of the two modes, from 0 to 1, by their shapes over the states that both systems have. If the converter
+    # introduces the mode, the similarity of the best candidate that is not matched with another mode.
     similarity: float
     accepted: bool
     reason: str
@@ -90,32 +76,22 @@ def critical_mode(modes: ModeSet) -> complex | None:
     return min(judged, key=damping_ratio, default=None)
 
 
-def eigenvalue_test(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> list[ModeVerdict]:
-    """Judge every mode of the system with the converter, least damped first.
+def judged_modes(matched: Iterable[ModeVerdict]) -> list[ModeVerdict]:
+    """Those of the judged range, least damped first.
 
     A mode below 5 % is accepted only where the same mode had less than 5 % without the converter already: the norm
     asks that the converter introduces none and takes none below.
-
-    Parameters
-    ----------
-    having, lacking
-        Modes of the system with and without the converter; those a little outside the judged range are useful,
-        since a mode may enter it.
-    components
-        The components that take part in each mode of ``having``.
     """
-    found = [m for m in _matched(having, lacking, components) if is_judged(m.frequency_hz)]
-    return sorted(found, key=lambda v: v.damping_percent)
+    return sorted((m for m in matched if is_judged(m.frequency_hz)), key=lambda v: v.damping_percent)
 
 
-def neighbouring_modes(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> list[ModeVerdict]:
+def neighbouring_modes(matched: Iterable[ModeVerdict]) -> list[ModeVerdict]:
     """Known modes outside the judged range, by frequency. They are listed only, without a judgement."""
-    found = [m for m in _matched(having, lacking, components) if not is_judged(m.frequency_hz)]
-    reason = "outside the judged range"
-    return [replace(m, accepted=True, reason=reason) for m in sorted(found, key=lambda m: m.frequency_hz)]
+    found = sorted((m for m in matched if not is_judged(m.frequency_hz)), key=lambda m: m.frequency_hz)
+    return [replace(m, accepted=True, reason="outside the judged range") for m in found]
 
 
-def _matched(having: ModeSet, lacking: ModeSet, components: list[str] | None) -> Iterator[ModeVerdict]:
+def matched_modes(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> Iterator[ModeVerdict]:
     """Every mode with the converter, with the same mode without it."""
     alike = np.zeros((len(having.eigenvalues), len(lacking.eigenvalues)))
     if alike.size:
@@ -174,13 +150,6 @@ def stability_fault(
 ) -> str | None:
     """The fault of a converter that makes the system unstable at any frequency, or whose stability is not known; None
     without such a fault. A system that was unstable without the converter excuses it.
-
-    Parameters
-    ----------
-    growth_with, growth_without
-        Largest real part of all eigenvalues with the converter and without it [1/s].
-    with_converter, without
-        The verdicts over the whole spectrum, as `Stability.as_json` has them.
     """
     if not np.isfinite(growth_with):
         return "the largest growth rate with the converter is not a number, so that nothing shows that it is stable"

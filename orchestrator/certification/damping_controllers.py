@@ -21,27 +21,14 @@ _AS_DECLARED = " as declared by the applicant"
 
 @dataclass(frozen=True)
 class DampingControllers:
-    """Active damping controllers of the converter.
-
-    Attributes
-    ----------
-    pod
-        One of `PODS`.
-    source
-        The source of ``pod``, in words.
-    settings
-        Values to be set for these controllers, by the FMU's variable.
-    declared
-        Letters of the controllers, active or not, that only the applicant declares.
-    unseen
-        Letters of active controllers with a switch but without an output that shows their effect.
-    """
+    """Active damping controllers of the converter."""
 
     pod: str
     source: str
+    # values to be set for these controllers, by the FMU's variable.
     settings: Mapping[str, bool] = field(default_factory=dict)
-    declared: str = ""
-    unseen: str = ""
+    declared: str = ""  # letters of the controllers, active or not, that only the applicant declares
+    unseen: str = ""  # letters of active controllers with a switch but without an output that shows their effect
 
     def in_words(self) -> str:
         """The active controllers for a headline, with a note on each one that is not certain."""
@@ -58,10 +45,7 @@ class DampingControllers:
 def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
     """The damping controllers that a request sets or declares for an FMU.
 
-    Raises
-    ------
-    InputError
-        If ``--pod`` contradicts ``--set`` or the binding.
+    Raises `InputError` if ``--pod`` contradicts ``--set`` or the binding.
     """
     known = {letter: _state(description, request, letter) for letter in "pq"}
     if request.pod is None:

@@ -1,7 +1,6 @@
 """Details of a test, from a file of the user: client, laboratory, date and place."""
 
 import datetime
-from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import ConfigDict, ValidationError
@@ -32,7 +31,9 @@ _LABELS = {
 }
 
 
-class _Table(Table):
+class Details(Table):
+    """The details of a file. An empty text becomes a line to be filled in by hand."""
+
     model_config = ConfigDict(strict=True)
 
     number: str = ""
@@ -42,31 +43,20 @@ class _Table(Table):
     place: str = ""
     date: datetime.date | None = None
 
-
-@dataclass(frozen=True)
-class Details:
-    """The details of a file. An empty text becomes a line to be filled in by hand."""
-
-    number: str = ""
-    applicant: str = ""
-    operator: str = ""
-    tester: str = ""
-    place: str = ""
-    date: str = ""
+    def texts(self) -> dict[str, str]:
+        return {name: str(value or "").strip() for name, value in self if name in _LABELS}
 
     def rows(self) -> list[tuple[str, str]]:
-        return [(label, getattr(self, name)) for name, label in _LABELS.items()]
+        return [(_LABELS[name], text) for name, text in self.texts().items()]
 
 
 def read_details(path: Path) -> Details:
     text, raw = read_toml(path, "it", "`gfor certify --details-template` prints one", "--details")
     try:
-        table = _Table.model_validate(raw)
+        return Details.model_validate(raw)
     except ValidationError as error:
         problems = [_problem(text, detail["loc"][0], detail["type"], detail.get("input")) for detail in error.errors()]
         raise CaseError(f"--details {path}", problems) from error
-    given = {name: value.strip() for name in _LABELS if isinstance(value := getattr(table, name), str)}
-    return Details(**given, date="" if table.date is None else table.date.isoformat())
 
 
 def _problem(text: str, key: int | str, kind: str, seen: object) -> Problem:

@@ -9,22 +9,12 @@ from pathlib import Path
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
 
-_NAME = re.compile(r"[\w+-][\w.+-]*")
-"""What a device may be called: its name is that of a folder."""
+_NAME = re.compile(r"[\w+-][\w.+-]*")  # what a device may be called: its name is that of a folder
 
 
 @dataclass(frozen=True)
 class Device:
-    """One device.
-
-    Attributes
-    ----------
-    name
-        By which reports and folders call it; no two devices of a command share one, whatever the case of its letters.
-    file
-        An FMU, a vendor's DLL or a device's file.
-    """
-
+    # by which reports and folders call it; no two devices of a command share one, whatever the case of its letters.
     name: str
     file: Path
     binding: Path | None = None
@@ -36,21 +26,14 @@ def devices_of(
 ) -> list[Device]:
     """What a command line says of its devices.
 
-    Parameters
-    ----------
-    files
-        ``FILE`` or ``NAME=FILE``. Without a name a device is called by its file, and where several files have one
-        name by their folders as well.
-    bindings
-        ``FILE`` of the only device, or ``NAME=FILE``.
-    settings
-        ``VARIABLE`` or ``NAME:VARIABLE`` with a value. The last one counts; a device's own counts before one of all.
+    ``files``: ``FILE`` or ``NAME=FILE``. Without a name a device is called by its file, and where several files have
+    one name by their folders as well.
+    ``bindings``: ``FILE`` of the only device, or ``NAME=FILE``.
+    ``settings``: ``VARIABLE`` or ``NAME:VARIABLE`` with a value. The last one counts; a device's own counts before one
+    of all.
 
-    Raises
-    ------
-    InputError
-        If two devices have one name, a binding does not say whose it is, a device has two, or a value is of a device
-        that is not there.
+    Raises `InputError` if two devices have one name, a binding does not say whose it is, a device has two, or a value
+    is of a device that is not there.
     """
     named = [_split(text) for text in files]
     names = _names(named)

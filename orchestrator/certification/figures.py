@@ -5,27 +5,28 @@ from dataclasses import asdict
 from importlib.metadata import version
 from typing import Any
 
+import numpy as np
+import xarray as xr
+
 from orchestrator.analysis.modes import damping_ratio
-from orchestrator.certification.case_file import WITH, WITHOUT
+from orchestrator.certification.case_file import CASE, WITH, WITHOUT
 from orchestrator.certification.criteria import ModeVerdict
 from orchestrator.certification.environment import environment
+from orchestrator.certification.form import NORM
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.parameters import parameter_rows
-from orchestrator.certification.point import CONVERTER, PointResult
-from orchestrator.certification.recompute import commands
+from orchestrator.certification.point import COMPUTED, CONVERTER, PointResult
 from orchestrator.certification.request import REACTANCES
 from orchestrator.certification.study import Certification
 from orchestrator.certification.swings import RecordedSwing, SwingTest
 from orchestrator.fmi.origin import read_origin
 from orchestrator.results.mode_json import eigenvalue_json
 
-FORMAT = 2
-
 
 def certification_json(c: Certification) -> dict[str, Any]:
     """All verdicts with their figures, and the description of the test."""
     return {
-        "format": FORMAT,
+        "format": NORM,
         "norm": "Norma técnica de supervisión 631 v2.0 (2020), section 5.10",
         "tool": f"gfor-cosim {version('gfor-cosim')}",
         "verdict": c.verdict,
@@ -34,7 +35,7 @@ def certification_json(c: Certification) -> dict[str, Any]:
         "judged": f"{len(REACTANCES) - len(c.missing)} of {len(REACTANCES)}",
         "missing": list(c.missing),
         "departures": list(c.request.departures),
-        "details": asdict(c.details),
+        "details": c.details.texts(),
         "fmu": {"file": c.request.fmu.name, "model": c.description.model_name, "guid": c.description.guid}
         | asdict(read_origin(c.description.path)),
         "binding": c.request.binding.name if c.request.binding else None,
@@ -79,6 +80,16 @@ def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
         "time_without": None if v.base_time is None else time_json(v.base_time),
         "again": {n: commands(v.X_L, n, identified=having.identified is not None) for n in points},
     }
+
+
+def commands(X_L: float, scenario: str, *, identified: bool) -> dict[str, str]:
+    """Commands for the modes and the response of a point, to be given in the certificate's folder."""
+    which = f"{CASE} --scenario {scenario} --set grid.X_L={X_L!r}"
+    low, high = COMPUTED
+    modes = f"gfor modes {which} --range {low:g}:{high:g} --json"
+    if identified and scenario == WITH:
+        modes = f"gfor black-box {which} --component {CONVERTER} --json"
+    return {"modes": modes, "response": f"gfor run {which} --out again"}
 
 
 def number(value: float) -> float | None:
@@ -137,3 +148,26 @@ def _swings_json(test: SwingTest) -> dict[str, Any]:
 def _swing_json(s: RecordedSwing) -> dict[str, Any]:
     points = {"P": s.before, "M": s.minimum, "P_next": s.after}
     return {"k": s.number, "line": s.line, "depth": s.depth} | {n: [p.time, p.value] for n, p in points.items()}
+
+
+def responses_dataset(c: Certification) -> xr.Dataset:
+    """Recorded signals over scenario, X_L and time; NaN where a run ended early."""
+    whole = max(c.points.values(), key=lambda p: len(p.times))
+    names = dict.fromkeys(name for point in c.points.values() for name in point.signals)
+    reactances, scenarios = list(c.request.reactances), [WITHOUT, WITH]
+    data = {}
+    for name in names:
+        values = np.full((2, len(reactances), len(whole.times)), np.nan)
+        for i, scenario in enumerate(scenarios):
+            for k, X_L in enumerate(reactances):
+                signal = c.points[scenario, X_L].signals.get(name, np.empty(0))
+                values[i, k, : len(signal)] = signal
+        unit = next(p.units[name] for p in c.points.values() if name in p.units)
+        data[name] = (
+            ("scenario", "X_L", "time"),
+            values.astype(np.float32 if name != c.signal else float),
+            {"units": unit},
+        )
+    coordinates = {"scenario": scenarios, "X_L": ("X_L", reactances, {"units": "pu"}),
+                   "time": ("time", whole.times, {"units": "s"})}  # fmt: skip
+    return xr.Dataset(data, coords=coordinates, attrs={"source": "gfor certify"})

@@ -1,18 +1,21 @@
-"""Files of a damping test: the page, the figures as JSON, the responses as NetCDF, and the hashes of all files."""
+"""Files of a certificate: the page, the figures as JSON, the responses as NetCDF, and the hashes of all files."""
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from orchestrator.certification.acceptance import KEPT
-from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT
-from orchestrator.certification.figures import certification_json
+from orchestrator.certification.case_file import BINDING, CASE, FMU
+from orchestrator.certification.certificate import Certificate, Judged
+from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.record import code_json, code_page, code_responses
+from orchestrator.certification.figures import certification_json, responses_dataset
 from orchestrator.certification.report import page
 from orchestrator.certification.study import Certification
 from orchestrator.report.pdf import print_pdf
@@ -21,25 +24,47 @@ from orchestrator.safe_files import file_hash, write_text
 
 HTML, JSON, RESPONSES, PDF = "certificate.html", "certificate.json", "responses.nc", "certificate.pdf"
 
+_FIGURES = f"{JSON}, its figures"
 
-def save(certification: Certification, folder: Path, *, pdf: bool = False) -> list[Path]:
+
+@dataclass(frozen=True)
+class _Form:
+    figures: Callable[[Any], dict[str, Any]]
+    responses: Callable[[Any], xr.Dataset]
+    page: Callable[[Any, Mapping[str, str | None], datetime], str]
+    cases: Callable[[Any], list[str]]
+
+
+def _form_of(certificate: Certificate[Judged]) -> _Form:
+    if isinstance(certificate, Certification):
+        return _Form(certification_json, responses_dataset, page, lambda _: [CASE])
+    return _Form(code_json, code_responses, lambda c, hashes, made: code_page(c, made, str(hashes[_FIGURES])),
+                 lambda c: [case_name(row.name) for row in c.code.rows if row.name in c.results])  # fmt: skip
+
+
+def figures_of(certificate: Certificate[Judged]) -> dict[str, Any]:
+    """All figures as JSON's types."""
+    return _form_of(certificate).figures(certificate)
+
+
+def names_of(certificate: Certificate[Judged]) -> list[str]:
+    """Names of the files that a certificate states hashes of, beside its page."""
+    names = [FMU, *([BINDING] if certificate.request.binding else []), *_form_of(certificate).cases(certificate)]
+    return [*names, RESPONSES, *([KEPT] if certificate.acceptance else [])]
+
+
+def save(certificate: Certificate[Judged], folder: Path, *, pdf: bool = False) -> list[Path]:
     """Write ``certificate.html``, ``certificate.json`` and ``responses.nc``, on request ``certificate.pdf``."""
-    html, target = folder / HTML, folder / JSON
+    html, target, form = folder / HTML, folder / JSON, _form_of(certificate)
     made = datetime.now(UTC).replace(microsecond=0)
-    save_netcdf(responses_dataset(certification), folder / RESPONSES)
-    hashes = _hashes(certification, folder)
-    content = {"made": made.isoformat(), **certification_json(certification)}
-    stated = hashes | {f"{JSON}, its figures": figures_hash(content)}
-    write_text(html, page(certification, stated, made))
+    save_netcdf(form.responses(certificate), folder / RESPONSES)
+    hashes = {name: file_hash(folder / name) for name in names_of(certificate)}
+    content = {"made": made.isoformat(), **form.figures(certificate)}
+    write_text(html, form.page(certificate, hashes | {_FIGURES: figures_hash(content)}, made))
     printed = [print_pdf(html, folder / PDF)] if pdf else []
     content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
     write_sealed(content, target)
     return [html, target, folder / RESPONSES, *printed]
-
-
-def _hashes(c: Certification, folder: Path) -> dict[str, str | None]:
-    names = [FMU, *([BINDING] if c.request.binding else []), CASE, RESPONSES, *([KEPT] if c.acceptance else [])]
-    return {name: file_hash(folder / name) for name in names}
 
 
 def write_sealed(content: Mapping[str, Any], path: Path) -> None:
@@ -76,26 +101,3 @@ def figures_hash(content: Mapping[str, Any]) -> str:
 def _hash_without(content: Mapping[str, Any], *names: str) -> str:
     rest = {key: value for key, value in content.items() if key not in names}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, ensure_ascii=False).encode()).hexdigest()
-
-
-def responses_dataset(c: Certification) -> xr.Dataset:
-    """Recorded signals over scenario, X_L and time; NaN where a run ended early."""
-    whole = max(c.points.values(), key=lambda p: len(p.times))
-    names = dict.fromkeys(name for point in c.points.values() for name in point.signals)
-    reactances, scenarios = list(c.request.reactances), [WITHOUT, WITH]
-    data = {}
-    for name in names:
-        values = np.full((2, len(reactances), len(whole.times)), np.nan)
-        for i, scenario in enumerate(scenarios):
-            for k, X_L in enumerate(reactances):
-                signal = c.points[scenario, X_L].signals.get(name, np.empty(0))
-                values[i, k, : len(signal)] = signal
-        unit = next(p.units[name] for p in c.points.values() if name in p.units)
-        data[name] = (
-            ("scenario", "X_L", "time"),
-            values.astype(np.float32 if name != c.signal else float),
-            {"units": unit},
-        )
-    coordinates = {"scenario": scenarios, "X_L": ("X_L", reactances, {"units": "pu"}),
-                   "time": ("time", whole.times, {"units": "s"})}  # fmt: skip
-    return xr.Dataset(data, coords=coordinates, attrs={"source": "gfor certify"})

@@ -1,15 +1,15 @@
-"""The form of a certificate's JSON: the entries that a verification reads, and their types."""
+"""The form of a certificate's JSON: the entries that a verification reads; all others it compares."""
 
 import json
 from pathlib import Path
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES
 from orchestrator.errors import InputError
 
-_SHOWN = 60
-"""Characters of a wrong value that are shown."""
+_SHOWN = 60  # characters of a wrong value that are shown
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -18,82 +18,34 @@ class _Table(BaseModel):
     model_config = ConfigDict(strict=True)
 
 
-class _Eigenvalue(_Table):
+class _Mode(_Table):
     real: Finite
     imag: Finite
-    frequency_hz: Finite
     damping_percent: Finite
 
 
-class _Mode(_Eigenvalue):
-    without: _Eigenvalue | None
-    accepted: bool
-
-
-class _Swings(_Table):
-    accepted: bool
-    reason: str
-    ratio: float | None
-    swings: list[dict[str, Any]]
-
-
-class _Modal(_Table):
-    accepted: bool
-    modes: list[_Eigenvalue]
-
-
-class _Time(_Table):
-    accepted: bool
-    swings: _Swings
-    swings_with_first_extremum: _Swings
-    modal: _Modal
-
-
-class _Stability(_Table):
-    stable: bool | None
-    sentence: str
-
-
-T = TypeVar("T")
-
-
-class _Both(_Table, Generic[T]):
-    without: T
-    having: Annotated[T, Field(alias="with")]
-
-
-class _Model(_Table):
-    source: str | None
-    order: int | None
-    fit_error: float | None
-
-
-class _Lowered(_Table):
-    frequency_hz: Finite
-    from_percent: Finite
-    to_percent: Finite
+class _ModeWith(_Mode):
+    without: _Mode | None
+    likeness: Finite
+    components: str
 
 
 class _Point(_Table):
     X_L: Finite
-    accepted: bool
-    judged: bool
     faults: list[str]
     unknown: str
-    modes: list[_Mode]
-    modes_beside: list[_Mode]
-    modes_without: list[_Eigenvalue]
-    lowered: list[_Lowered]
-    growth: _Both[float | None]
-    stability: _Both[_Stability | None]
+    modes: list[_ModeWith]
+    modes_beside: list[_ModeWith]
+    modes_without: list[_Mode]
+    growth: dict[str, Finite | None]
+    stability: dict[str, dict[str, Any] | None]
     power: Finite | None
-    converter_model: _Model
-    time: _Time | None
-    time_without: _Time | None
+    converter_model: dict[str, str | float | None]
+    time: dict[str, Any] | None
+    time_without: dict[str, Any] | None
 
 
 class _Check(_Table):
-    check: str
     verdict: str
     fault: str
 
@@ -103,37 +55,72 @@ class _Acceptance(_Table):
     checks: list[_Check]
 
 
-class _Certificate(_Table):
+class _Certified(_Table):
     verdict: str
-    passed: bool
     sentence: str
-    judged: str
-    missing: list[Finite]
-    departures: list[str]
-    fmu: dict[str, str]
-    binding: str | None
     values: dict[str, Any]
+    binding: str | None
+    acceptance: _Acceptance | None
+    files: dict[str, str | None]
+
+
+class _Certificate(_Certified):
+    judged: str
     study_values: dict[str, Any]
     black_box: bool
     pod: str
     pod_source: str
     pod_values: dict[str, bool]
-    parameters: list[dict[str, Any]]
-    acceptance: _Acceptance | None
     signal: str
     event_time: Finite
     linearised: dict[str, str]
-    fit_errors: dict[str, float]
-    files: dict[str, str | None]
     points: Annotated[list[_Point], Field(min_length=1)]
 
 
-def check_form(file: Path, content: dict[str, Any]) -> None:
+class _Criterion(_Table):
+    margin: float | None
+
+
+class _Row(_Table):
+    row: str
+    accepted: bool | None
+    unknown: str
+    criteria: list[_Criterion]
+    findings: list[dict[str, Any]]
+
+
+class _CodeCertificate(_Certified):
+    code: str
+    f_n: Finite
+    declared: dict[str, Finite]
+    rows: list[_Row]
+
+    @field_validator("code")
+    @classmethod
+    def _known(cls, code: str) -> str:
+        if code not in {*CODES, *BY_DECLARATION}:
+            raise ValueError(code)
+        return code
+
+
+NORM, CODE = 2, "code-2"  # forms of the JSON: of the damping test, and of a code on the test bench
+
+_FORMS: dict[object, type[_Table]] = {NORM: _Certificate, CODE: _CodeCertificate}
+
+
+def check_form(file: Path, content: Any) -> None:
     """Refuse a certificate with a missing entry, or with an entry of another type."""
     remedy = "the certificate is damaged: take the file that `gfor certify` wrote, or make it anew"
+    kind = content.get("format") if isinstance(content, dict) else None
+    form = _FORMS.get(kind) if isinstance(kind, int | str) else None
+    if form is None:
+        raise InputError(
+            f"{file}: it is no certificate of format {NORM} or {CODE} (found: {kind}); older ones hold too little to "
+            "be verified, make it anew with `gfor certify`"
+        )
     try:
         json.dumps(content, ensure_ascii=False).encode()
-        _Certificate.model_validate(content)
+        form.model_validate(content)
     except UnicodeEncodeError as error:
         raise InputError(f"{file}: a text in it holds half a character, which is no Unicode; {remedy}") from error
     except ValidationError as error:

@@ -1,5 +1,6 @@
 """All criteria at one reactance, from the two systems' modes and responses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,32 +8,26 @@ import numpy as np
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.arrays import Numbers
 from orchestrator.certification.criteria import (
+    LEAST_DAMPING,
     ModalTest,
     ModeVerdict,
     critical_mode,
-    eigenvalue_test,
+    judged_modes,
+    matched_modes,
     modal_test,
     neighbouring_modes,
     stability_fault,
 )
+from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.motion import motion_faults, not_judged
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
-from orchestrator.certification.swings import SwingTest, slow_part, swing_test
+from orchestrator.certification.swings import LARGEST_RATIO, SwingTest, slow_part, swing_test
 
-SETTLING = 0.5
-"""Time after the event [s] from which the signal counts as a free response and is decomposed into modes."""
-
-RATED_POWER = 1350.0
-"""Active power of the converter in the norm's study [MW]."""
-
-_SAME_POWER = 0.01
-"""Largest relative difference of the power at the start."""
-
-_LEAST_MOVEMENT = 1e-6
-"""Least movement of an active damping controller's output [pu]."""
-
-LOWERED = 2.0
-"""A mode gets a remark if the converter lowers its damping by more than this [percentage points]."""
+SETTLING = 0.5  # time after the event [s] from which the signal counts as a free response and is decomposed into modes
+RATED_POWER = 1350.0  # active power of the converter in the norm's study [MW]
+_SAME_POWER = 0.01  # largest relative difference of the power at the start
+_LEAST_MOVEMENT = 1e-6  # least movement of an active damping controller's output [pu]
+LOWERED = 2.0  # A mode gets a remark if the converter lowers its damping by more than this [percentage points]
 
 
 @dataclass(frozen=True)
@@ -48,32 +43,31 @@ class TimeVerdict:
     def accepted(self) -> bool:
         return self.swings.accepted or self.modal.accepted
 
+    @property
+    def margin(self) -> float | None:
+        """The better of the two ways, since either is enough; None where the better one has no figure."""
+        ratio, least = self.swings.ratio, min((m.damping_percent for m in self.modal.modes), default=None)
+        ways = [
+            (self.swings.accepted, None if ratio is None else 1 - abs(ratio) / LARGEST_RATIO),
+            (self.modal.accepted, None if least is None else least / (100 * LEAST_DAMPING) - 1),
+        ]
+        if any(accepted and margin is None for accepted, margin in ways):
+            return None
+        return max((m for accepted, m in ways if m is not None and accepted == self.accepted), default=None)
+
 
 @dataclass(frozen=True)
 class PointVerdict:
-    """The judgement of the norm on one reactance.
-
-    Attributes
-    ----------
-    neighbours
-        Modes just outside the judged range, which are listed but not judged.
-    base_time
-        The time-domain criterion on the system without the converter, for comparison only.
-    faults
-        Why the point is not accepted; empty where it is.
-    unknown
-        Why the point could not be judged at all; empty where it was.
-    base_critical
-        The least damped judged mode without the converter [rad/s]; None where there is none.
-    """
+    """The judgement of the norm on one reactance."""
 
     X_L: float
     modes: tuple[ModeVerdict, ...]
     time: TimeVerdict | None
-    base_time: TimeVerdict | None
-    faults: tuple[str, ...]
+    base_time: TimeVerdict | None  # the time-domain criterion on the system without the converter, for comparison only
+    faults: tuple[str, ...]  # why the point is not accepted; empty where it is
     neighbours: tuple[ModeVerdict, ...] = ()
-    unknown: str = ""
+    unknown: str = ""  # why the point could not be judged at all; empty where it was
+    # the least damped judged mode without the converter [rad/s]; None where there is none.
     base_critical: complex | None = None
 
     @property
@@ -97,6 +91,21 @@ class PointVerdict:
             m for m in every if m.before_percent is not None and m.before_percent - m.damping_percent > LOWERED
         )
 
+    def margins(self) -> list[CriterionMargin]:
+        """Every mode that the norm asks 5 % of, the response, and whatever else the point is not accepted for."""
+        place = f"X_L = {self.X_L:g} pu"
+        found = [
+            CriterionMargin(place, f"damping at {m.frequency_hz:.3f} Hz", margin, m.accepted, m.reason)
+            for m in self.modes
+            if (margin := damping_ratio(m.eigenvalue) / LEAST_DAMPING - 1) >= 0 or not m.accepted
+        ]  # a mode below 5 % that is accepted was below without the converter
+        if self.time is not None:
+            reasons = f"{self.time.swings.reason}; {self.time.modal.reason}"
+            found.append(CriterionMargin(place, "response", self.time.margin, self.time.accepted, reasons))
+        if self.faults and all(margin.accepted for margin in found):
+            found.append(CriterionMargin(place, "stable", None, False, "; ".join(self.faults)))
+        return found
+
     def of_base_critical(self) -> str:
         """The effect of the converter on the least damped mode, in words; empty if there was no such mode."""
         if self.base_critical is None:
@@ -117,17 +126,12 @@ def watched(pod: str) -> str:
     return FREQUENCY if "p" in pod.removeprefix("none") else POWER
 
 
-def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float) -> PointVerdict:
-    """All criteria at one reactance.
+def judge(
+    having: PointResult, lacking: PointResult, pod: str, event_time: float, known: Sequence[ModeVerdict] | None = None
+) -> PointVerdict:
+    """All criteria at one reactance, from the system with and without the converter.
 
-    Parameters
-    ----------
-    having, lacking
-        The system with and without the converter.
-    pod
-        Which damping controllers are active, as one of `PODS`.
-    event_time
-        [s]
+    ``known``: Which mode is which without the converter; None where the modes' shapes are to tell it.
     """
     if lacking.failure:
         unknown = f"the study failed without the converter: {lacking.failure}"
@@ -139,8 +143,8 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
     beside: tuple[ModeVerdict, ...] = ()
     critical = None if lacking.modes is None else critical_mode(lacking.modes)
     if having.modes is not None and lacking.modes is not None:
-        modes = tuple(eigenvalue_test(having.modes, lacking.modes, having.components))
-        beside = tuple(neighbouring_modes(having.modes, lacking.modes, having.components))
+        matched = list(matched_modes(having.modes, lacking.modes, having.components) if known is None else known)
+        modes, beside = tuple(judged_modes(matched)), tuple(neighbouring_modes(matched))
         faults += [f"{m.frequency_hz:.3f} Hz: {m.reason}" for m in modes if not m.accepted]
         fault = stability_fault(having.growth, lacking.growth, having.stability, lacking.stability)
         faults += [fault] if fault else []
@@ -200,17 +204,7 @@ def _judge_response(point: PointResult, signal: str, event_time: float) -> TimeV
 
 
 def judge_response(times: Numbers, y: Numbers, signal: str, event_time: float) -> TimeVerdict:
-    """Both ways of the time-domain criterion on a recorded signal.
-
-    Parameters
-    ----------
-    times
-        [s], shape (n,).
-    y
-        The signal, shape (n,).
-    event_time
-        When the system was disturbed [s].
-    """
+    """Both ways of the time-domain criterion on a recorded signal."""
     y = slow_part(times, y)
     return TimeVerdict(
         signal,

@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from orchestrator.certification.codes.certificate import CodeCertificate
-from orchestrator.certification.margins import CriterionMargin, margins_of, narrowest
-from orchestrator.certification.study import Certification
+from orchestrator.certification.certificate import Certificate, Judged
+from orchestrator.certification.margins import CriterionMargin, narrowest
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, NOT_TRUSTED, PASSES, exit_code
 from orchestrator.errors import InputError
 from orchestrator.points.failure import Failure
@@ -16,26 +15,6 @@ NOT_TESTED, FIGURES = "not tested", "no verdict"
 
 @dataclass
 class MatrixCell:
-    """One device under one code.
-
-    Attributes
-    ----------
-    failure
-        Why the device could not be tested; None where there is a certificate.
-    margins
-        Of all criteria that count towards the verdict.
-    judged
-        Number of rows or reactances that were judged.
-    missing
-        Number of parts of the code that were not tested.
-    refused
-        Whether an acceptance test of the FMU failed.
-    has_needs
-        Whether what the failed criteria would take lies beside the certificate.
-    figures
-        What a code without a verdict gives, in words; None of a code with one. Whatever it is, it decides nothing.
-    """
-
     device: str
     code: str
     folder: str
@@ -44,14 +23,15 @@ class MatrixCell:
     sentence: str = ""
     margins: Sequence[CriterionMargin] = ()
     judged: int = 0
-    missing: int = 0
+    missing: int = 0  # number of parts of the code that were not tested
     refused: bool = False
-    has_needs: bool = False
+    has_needs: bool = False  # whether what the failed criteria would take lies beside the certificate
+    # what a code without a verdict gives, in words; None of a code with one. Whatever it is, it decides nothing.
     figures: Sequence[str] | None = None
 
-    def take(self, found: Certification | CodeCertificate) -> None:
+    def take(self, found: Certificate[Judged]) -> None:
         self.verdict, self.sentence, self.refused = found.verdict, found.sentence(), found.refused
-        self.margins, self.missing = margins_of(found), len(found.missing)
+        self.margins, self.missing = found.margins, len(found.missing)
         self.judged = sum(1 for v in found.verdicts if v.judged)
 
     @property

@@ -22,9 +22,7 @@ from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import table
 from orchestrator.safe_files import write_text
 
-FORMAT = "matrix-1"
-"""Form of the JSON."""
-
+FORMAT = "matrix-1"  # form of the JSON
 MATRIX_HTML, MATRIX_JSON = "matrix.html", "matrix.json"
 
 READING = (
@@ -81,13 +79,6 @@ def in_words(cell: MatrixCell) -> list[str]:
 
 
 def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: datetime) -> str:
-    """The page.
-
-    Parameters
-    ----------
-    made
-        When [UTC].
-    """
     whole = [[escape(code.upper()), *(_cell_html(matrix.cells[name, code]) for name in matrix.devices)]
              for code in matrix.codes]  # fmt: skip
     tried = [[escape(text) for text in _given(device)] for device in devices]

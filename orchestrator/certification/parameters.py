@@ -15,16 +15,6 @@ _STUDY = ("S_n", "P_0", "v_0")
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """One parameter of the FMU, by its own name.
-
-    Attributes
-    ----------
-    start, used
-        Values in the file and in the study; None if the file gives no value.
-    changed_by
-        Origin of the change; empty for an unchanged value.
-    """
-
     name: str
     unit: str
     start: Scalar | None

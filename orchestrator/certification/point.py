@@ -36,17 +36,7 @@ POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
 
 @dataclass(frozen=True)
 class CertificatePointTask:
-    """A scenario of the study's case file at one reactance.
-
-    Attributes
-    ----------
-    case, fingerprint
-        Path of the case file, and its fingerprint as in `SweepPointTask`.
-    key
-        Name of the point's file: a hash of everything that the result depends on.
-    black_box
-        Identify the converter even if it shows its states.
-    """
+    """A scenario of the study's case file at one reactance."""
 
     case: str
     fingerprint: str
@@ -58,50 +48,29 @@ class CertificatePointTask:
 
 @dataclass
 class PointResult:
-    """Modes and response.
-
-    Attributes
-    ----------
-    modes
-        From 0.05 to 3 Hz, least damped first.
-    growth
-        Largest real part of any eigenvalue [1/s], zeros left out.
-    stability
-        The verdict over the whole spectrum, as `Stability.as_json` has it.
-    identified
-        Order of the identified model that replaces the converter in the modes; None if the converter's own states are
-        used.
-    linearised
-        How the linear model of every component was found: perturbed, directional, packed or identified.
-    fit_errors
-        Largest relative difference between the fitted model and the measured response, for each identified component.
-    power
-        Active power of the converter at the start, from its current [MW]; None without the converter.
-    signals
-        Signals by name, each of the shape of ``times``.
-    findings
-        Findings of the watch on the run, in the form of `Finding.as_json`.
-    failure
-        Why there are no modes, or why the response is incomplete.
-    """
-
     X_L: float
     scenario: str
     modes: ModeSet | None = None
     components: list[str] = field(default_factory=list)
-    growth: float = float("nan")
-    stability: dict[str, Any] | None = None
+    growth: float = float("nan")  # largest real part of any eigenvalue [1/s], zeros left out
+    stability: dict[str, Any] | None = None  # the verdict over the whole spectrum, as `Stability.as_json` has it
     residual: float = float("nan")
+    # order of the identified model that replaces the converter in the modes; None if the converter's own states are
+    # used.
     identified: int | None = None
+    # how the linear model of every component was found: perturbed, directional, packed or identified.
     linearised: dict[str, str] = field(default_factory=dict)
+    # largest relative difference between the fitted model and the measured response, for each identified component.
     fit_errors: dict[str, float] = field(default_factory=dict)
+    # active power of the converter at the start, from its current [MW]; None without the converter.
     power: float | None = None
     times: Numbers = field(default_factory=lambda: np.empty(0))
     signals: dict[str, Numbers] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    # findings of the watch on the run, in the form of `Finding.as_json`.
     findings: list[dict[str, Any]] = field(default_factory=list)
-    failure: Failure | None = None
+    failure: Failure | None = None  # why there are no modes, or why the response is incomplete
 
     @property
     def lasting(self) -> bool:

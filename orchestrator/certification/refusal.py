@@ -1,7 +1,10 @@
 """Why a request is refused, with places in what the user gave: the case file that was made of it is deleted."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from orchestrator.cases.schema import Value
 from orchestrator.certification.case_file import BINDING, FMU
@@ -13,7 +16,18 @@ _OWN = re.compile(rf'^(?:components\.{CONVERTER}\.parameters\.|--set {CONVERTER}
 """Place of a value of the converter, in a case file or among changes."""
 
 
-def refused(request: CertificationRequest, error: CaseError, trial: str | Path, where: str) -> CaseError:
+@contextmanager
+def refusing(request: CertificationRequest, folder: Path, where: str) -> Iterator[Path]:
+    """A folder for a trial, so that a request that is refused leaves the files of a certificate as they are."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=folder, prefix=".request_") as trial:
+        try:
+            yield Path(trial)
+        except CaseError as error:
+            raise _refused(request, error, trial, where) from error
+
+
+def _refused(request: CertificationRequest, error: CaseError, trial: str, where: str) -> CaseError:
     """The same problems, each at the option or in the file of the user that it comes from."""
     own = {f"{trial}/{FMU}": str(request.fmu), f"{trial}/{BINDING}": str(request.binding)}
 

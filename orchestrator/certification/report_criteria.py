@@ -14,8 +14,7 @@ from orchestrator.certification.study import Certification
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, table
 
-_SHOWN = 30.0
-"""Length of the drawn part of the response, from the event on [s]. The whole response is judged."""
+_SHOWN = 30.0  # length of the drawn part of the response, from the event on [s]. The whole response is judged.
 
 
 def before(value: complex | None) -> str:

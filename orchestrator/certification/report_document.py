@@ -9,9 +9,9 @@ from orchestrator.binding.binding import read_table
 from orchestrator.certification import texts
 from orchestrator.certification.case_file import BINDING, FMU, WITH
 from orchestrator.certification.environment import environment
+from orchestrator.certification.figures import commands
 from orchestrator.certification.parameters import parameter_rows
 from orchestrator.certification.point import FREQUENCY
-from orchestrator.certification.recompute import commands
 from orchestrator.certification.request import shown
 from orchestrator.certification.study import Certification
 from orchestrator.fmi.origin import read_origin
@@ -20,8 +20,7 @@ from orchestrator.fmi.values import Scalar
 from orchestrator.report.html.elements import table
 from orchestrator.report.linearised import exceptions_in_words
 
-_LINE = '<span class="blank"></span>'
-"""A line to be filled in by hand."""
+_LINE = '<span class="blank"></span>'  # A line to be filled in by hand
 
 Hashes = Mapping[str, str | None]
 

@@ -8,44 +8,27 @@ from pathlib import Path
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
 
-REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))
-"""Values of X_L in the norm [pu, 100 MVA]."""
-
+REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))  # values of X_L in the norm [pu, 100 MVA]
 PODS = ("none", "p", "q", "pq")
-
-STUDY = ("sg1", "sg2", "grid")
-"""Components of the study that are not the converter."""
-
+STUDY = ("sg1", "sg2", "grid")  # components of the study that are not the converter
 GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
 """Values of the converter that a study gives it: that of the norm, and the bench of the other codes."""
 
 
 @dataclass(frozen=True)
 class CertificationRequest:
-    """The request for a certificate.
-
-    Attributes
-    ----------
-    fmu, binding
-        The converter, and how its variables are mapped to our port.
-    values
-        Values of the converter's own variables, by name.
-    pod
-        The active damping controllers, as one of `PODS`; None to read them from ``pod_p.enabled`` and
-        ``pod_q.enabled``.
-    study_values
-        Values of the study's other components, by ``component.variable``.
-    black_box
-        Identify the converter for the modes even if it shows its states. A converter that hides them is always
-        identified.
-    """
+    """The request for a certificate."""
 
     fmu: Path
     binding: Path | None = None
     values: Mapping[str, Value] = field(default_factory=dict)
+    # the active damping controllers, as one of `PODS`; None to read them from ``pod_p.enabled`` and ``pod_q.enabled``.
     pod: str | None = None
     reactances: Sequence[float] = REACTANCES
+    # values of the study's other components, by ``component.variable``.
     study_values: Mapping[str, Value] = field(default_factory=dict)
+    # identify the converter for the modes even if it shows its states. A converter that hides them is always
+    # identified.
     black_box: bool = False
 
     def check(self) -> None:

@@ -1,59 +1,35 @@
 """The norm's study of one converter: a case file of its own, all points, and the verdict on each."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.certification.acceptance import Acceptance
 from orchestrator.certification.case_file import BASE, WITH, WITHOUT, write_case
+from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
-from orchestrator.certification.details import Details
 from orchestrator.certification.judgement import PointVerdict, judge, watched
 from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult, compute_point
-from orchestrator.certification.refusal import refused
+from orchestrator.certification.refusal import refusing
 from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
-from orchestrator.errors import CaseError
-from orchestrator.fmi.description import FmuDescription
 from orchestrator.points.executor import Executor
 from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import CountReport, kept_or_computed
-from orchestrator.points.store import POINTS, PointStore
+from orchestrator.points.points import CountReport, all_points
 
 
 @dataclass
-class Certification:
-    """The results of the study.
+class Certification(Certificate[PointVerdict]):
+    """The damping test of NTS 631, whose rows are line reactances."""
 
-    Attributes
-    ----------
-    values
-        Every value of the system with the converter at the first reactance, by ``component.variable``.
-    points
-        By scenario and X_L.
-    stored
-        Number of points that were stored by an earlier start.
-    details
-        Details of the test, such as client and laboratory.
-    acceptance
-        The result of the FMU's acceptance tests; None if they were not run.
-    """
-
-    request: CertificationRequest
-    description: FmuDescription
     controllers: DampingControllers
     event_time: float
     case: Path
+    # every value of the system with the converter at the first reactance, by ``component.variable``.
     values: Mapping[str, float | bool]
-    points: dict[tuple[str, float], PointResult]
-    verdicts: list[PointVerdict]
-    stored: int = 0
-    details: Details = field(default_factory=Details)
-    acceptance: Acceptance | None = None
+    points: Mapping[tuple[str, float], PointResult]
 
     @property
     def pod(self) -> str:
@@ -86,28 +62,12 @@ class Certification:
         return missing_reactances(v.X_L for v in self.verdicts if v.judged)
 
     @property
-    def verdict(self) -> str:
-        """In one word: ``passes``, ``fails`` or ``incomplete``."""
-        if any(v.judged and not v.accepted for v in self.verdicts):
-            return FAILS
-        return INCOMPLETE if self.missing or self.request.departures else PASSES
+    def departures(self) -> tuple[str, ...]:
+        return self.request.departures
 
-    @property
-    def passed(self) -> bool:
-        return self.verdict == PASSES
-
-    @property
-    def refused(self) -> bool:
-        """Whether an acceptance test failed."""
-        return self.acceptance is not None and not self.acceptance.trusted
-
-    def sentence(self) -> str:
-        """The result as a sentence, with the reactances concerned."""
+    def result(self) -> str:
         subject = f"The converter {self.description.model_name!r} {self.controllers.in_words()}"
-        said = {PASSES: self._passes, FAILS: self._fails, INCOMPLETE: self._incomplete}[self.verdict](subject)
-        if self.acceptance is not None and self.refused:
-            said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
-        return said
+        return {PASSES: self._passes, FAILS: self._fails, INCOMPLETE: self._incomplete}[self.verdict](subject)
 
     def _passes(self, subject: str) -> str:
         return f"{subject} passes the damping test at all {len(REACTANCES)} line reactances, by both criteria."
@@ -116,11 +76,11 @@ class Certification:
         failed = [v for v in self.verdicts if v.judged and not v.accepted]
         places, first = ", ".join(f"{v.X_L:g}" for v in failed), failed[0]
         text = f"{subject} fails the damping test at X_L = {places} pu. At {first.X_L:g} pu: {'; '.join(first.faults)}."
-        reasons = incomplete_because(self.missing, self.request.departures)
+        reasons = incomplete_because(self.missing, self.departures)
         return f"{text} The test is incomplete as well: {reasons}." if reasons else text
 
     def _incomplete(self, subject: str) -> str:
-        reasons = incomplete_because(self.missing, self.request.departures)
+        reasons = incomplete_because(self.missing, self.departures)
         text = f"The damping test is incomplete: {reasons}. {subject} is accepted where it was judged"
         unknown = [v for v in self.verdicts if not v.judged]
         if not any(v.judged for v in self.verdicts):
@@ -129,66 +89,38 @@ class Certification:
 
 
 def certify(
-    request: CertificationRequest,
-    executor: Executor,
-    folder: Path,
-    report: CountReport = lambda done, total: None,
+    request: CertificationRequest, executor: Executor, folder: Path, report: CountReport = lambda done, total: None
 ) -> Certification:
     """Compute all points and judge them."""
     request.check()
-    controllers = damping_controllers(bound_fmu(request.fmu, request.binding), request)
-    prepared = _laid_case(request, controllers, folder)
-    description = prepared[WITH].system.components[CONVERTER].description
-    tasks = tasks_of(prepared, request, controllers)
-    points: dict[tuple[str, float], PointResult] = {}
-    stored = 0
-    store = PointStore(folder / POINTS)
-    for index, point, was_stored in kept_or_computed(PointResult, compute_point, tasks, executor, store, report):
-        points[tasks[index].scenario, tasks[index].X_L] = point
-        stored += was_stored
-    event = prepared[WITH].events[0].time
-    verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
-    values = prepared[WITH].values
-    return Certification(
-        request, description, controllers, event, prepared[WITH].case.path, values, points, verdicts, stored
-    )
-
-
-def _laid_case(
-    request: CertificationRequest, controllers: DampingControllers, folder: Path
-) -> dict[str, PreparedScenario]:
-    """Write the study's case into the folder, and prepare its two scenarios.
-
-    If the request is refused, existing files are kept.
-    """
+    description = bound_fmu(request.fmu, request.binding)
+    controllers = damping_controllers(description, request)
     first = {"grid.X_L": request.reactances[0]}
 
-    def prepared(place: Path) -> dict[str, PreparedScenario]:
+    def laid(place: Path) -> dict[str, PreparedScenario]:
         case = write_case(request, controllers.settings, place)
         return {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
 
-    folder.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=folder, prefix=".request_") as trial:
-        try:
-            prepared(Path(trial))
-        except CaseError as error:
-            raise refused(
-                request, error, trial, "in the study's case that `gfor certify` makes from the request"
-            ) from error
-    return prepared(folder)
+    with refusing(request, folder, "in the study's case that `gfor certify` makes from the request") as trial:
+        laid(trial)
+    prepared = laid(folder)
+    tasks = tasks_of(prepared, request, controllers)
+    found, stored = all_points(PointResult, compute_point, tasks, executor, folder, report)
+    points = {(task.scenario, task.X_L): point for task, point in zip(tasks, found, strict=True)}
+    event, having = prepared[WITH].events[0].time, prepared[WITH]
+    verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
+    description = having.system.components[CONVERTER].description
+    return Certification(
+        request, description, verdicts, controllers, event, having.case.path, having.values, points, stored=stored
+    )
 
 
 def tasks_of(
-    prepared: Mapping[str, PreparedScenario],
-    request: CertificationRequest,
-    controllers: DampingControllers,
+    prepared: Mapping[str, PreparedScenario], request: CertificationRequest, controllers: DampingControllers
 ) -> list[CertificatePointTask]:
     """Both scenarios at all reactances, the one without the converter first."""
     own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **controllers.settings}.items()}
-    settings: dict[str, dict[str, Value]] = {
-        WITHOUT: dict(request.study_values),
-        WITH: {**request.study_values, **own},
-    }
+    settings: dict[str, dict[str, Value]] = {WITHOUT: dict(request.study_values), WITH: {**request.study_values, **own}}
     without = _tasks(prepared[WITHOUT], settings[WITHOUT], request.reactances, black_box=False)
     having = _tasks(prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box)
     return [task for pair in zip(without, having, strict=True) for task in pair]

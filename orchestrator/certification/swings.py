@@ -11,9 +11,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 
-LARGEST_RATIO = 0.25
-"""ΔP5M5 over ΔP1M1 must be less than this."""
-
+LARGEST_RATIO = 0.25  # ΔP5M5 over ΔP1M1 must be less than this
 JUDGED_SWING = 5
 
 RESOLUTION = 1e-3
@@ -60,18 +58,11 @@ class RecordedSwing:
 
 @dataclass(frozen=True)
 class SwingTest:
-    """The criterion applied to one signal.
-
-    Attributes
-    ----------
-    dropped
-        The first extremum, towards which the oscillation starts; None if no extremum was dropped.
-    ratio
-        ΔP5M5/ΔP1M1. It is 0 if the oscillation has died out before, and None if the record is too short.
-    """
+    """The criterion applied to one signal."""
 
     dropped: Extremum | None
     swings: tuple[RecordedSwing, ...]
+    # ΔP5M5/ΔP1M1. It is 0 if the oscillation has died out before, and None if the record is too short.
     ratio: float | None
     accepted: bool
     reason: str
@@ -94,14 +85,7 @@ def slow_part(times: Numbers, signal: Numbers) -> Numbers:
 def extrema(times: Numbers, signal: Numbers, start: float, resolution: float = RESOLUTION) -> list[Extremum]:
     """Turning points after a time, maxima and minima in turn.
 
-    Parameters
-    ----------
-    times, signal
-        Shape (n,); [s] and any unit.
-    start
-        Time of the event [s].
-    resolution
-        Smallest movement that counts, as a part of the range of the signal after the event.
+    ``resolution``: Smallest movement that counts, as a part of the range of the signal after the event.
     """
     after = times >= start - 1e-9
     t, y = times[after], signal[after]
@@ -133,17 +117,7 @@ def swings_of(points: list[Extremum]) -> tuple[RecordedSwing, ...]:
 
 
 def swing_test(times: Numbers, signal: Numbers, start: float, *, drop_first: bool = True) -> SwingTest:
-    """Apply the criterion.
-
-    Parameters
-    ----------
-    times, signal
-        Shape (n,); a record that ends well after the oscillation or its fifth swing.
-    start
-        Time of the event [s].
-    drop_first
-        Leave out the extremum towards which the oscillation starts.
-    """
+    """Apply the criterion after an event [s], without the extremum to which the oscillation starts or with it."""
     if not np.isfinite(signal).all():
         return SwingTest(None, (), None, False, "the signal is not finite")
     points = extrema(times, signal, start)

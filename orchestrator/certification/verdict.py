@@ -7,12 +7,15 @@ from orchestrator.certification.request import REACTANCES
 PASSES, FAILS, INCOMPLETE = "passes", "fails", "incomplete"
 
 EXIT_CODES = {PASSES: 0, FAILS: 1, INCOMPLETE: 3}
+NOT_TRUSTED = 4  # exit code if the damping test is passed but an acceptance test of the FMU failed
+DOES_NOT_HOLD = 5  # exit code for a certificate with a contradiction, whose verdict is worthless
 
-NOT_TRUSTED = 4
-"""Exit code if the damping test is passed but an acceptance test of the FMU failed."""
 
-DOES_NOT_HOLD = 5
-"""Exit code for a certificate with a contradiction, whose verdict is worthless."""
+def verdict_of(accepted: Sequence[bool], missing: int) -> str:
+    """The verdict from the judged rows and the number of parts that are missing."""
+    if not all(accepted):
+        return FAILS
+    return INCOMPLETE if missing or not accepted else PASSES
 
 
 def exit_code(verdict: str, *, refused: bool) -> int:

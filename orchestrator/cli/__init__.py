@@ -2,6 +2,7 @@
 
 import argparse
 import codecs
+import shlex
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -12,10 +13,12 @@ from fmus.toolchain.extras import SetupError
 from orchestrator.cli.interrupted import ending, is_interrupt
 from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
+from orchestrator.results import origin
 
 _ESCAPE = "gfor_escape"
 
 COMMANDS = {
+    "new": "write a case file from a network's files, such as RAW and DYR",
     "run": "steady state, modes and time response of a case's scenarios",
     "federate": "one component of a case as a federate at HELICS, for a run elsewhere",
     "modes": "steady state and eigenvalues of a case's scenarios",
@@ -24,15 +27,19 @@ COMMANDS = {
     "export-comtrade": "write a run's signals as a COMTRADE recording for other tools",
     "export-dll": "write a converter's control as IEEE/CIGRE DLL for EMT programs",
     "steps": "the largest communication step within a given error, for each schedule",
+    "scr": "short-circuit power of every bus, and SCR of the converters",
     "sweep": "modes over a grid of parameters, followed from point to point",
     "sensitivities": "how each parameter of each FMU moves a mode",
     "interactions": "modes that several vendors' converters share, and the pair that does not agree",
+    "site": "where a converter helps: the shift of each mode by support at each bus",
     "screen": "critical modes of many operating points and outages",
     "compare": "two recorded runs: differences, and what each rings with",
+    "source": "where the oscillations of a run or recording come from: which unit drives them",
     "identify": "the modes in a recorded signal (matrix pencil)",
-    "report": "one self-contained HTML page from the folder of a run",
+    "report": "one self-contained HTML page from results of any study",
     "design": "design a POD controller by eigenvalue sensitivity",
     "admittance": "measure a device's admittance, and fit a model to it",
+    "nyquist": "whether a device is stable at a network, from scans, FMUs and cases",
     "black-box": "modes of a case with a component known by its port alone",
     "certify": "the grid code's damping test on a converter FMU",
     "verify": "whether a certificate still holds: hashes, verdict, points computed anew",
@@ -46,6 +53,7 @@ COMMANDS = {
 
 EXAMPLES = """\
 examples:
+  gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml
   gfor run two_area                              the paper's first case study, into results/two_area
   gfor run two_area --scenario pod_p --stop 5    one scenario, five seconds
   gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
@@ -53,8 +61,11 @@ examples:
   gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
   gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
+  gfor sweep two_area --vary grid.X_L=0.1:3 --until unstable   how far it may grow
+  gfor scr my_case.toml                          how weak the grid is at each bus
   gfor sensitivities two_area --scenario pod_p   which parameters move the mode, and how far
   gfor screen ieee39 --points year.csv --outages lines   critical modes hour by hour, outage by outage
+  gfor site ieee39 --device pod_p --outages lines        at which bus a converter helps most
   gfor interactions my_case.toml                 which vendors' converters do not agree with each other
   gfor design two_area --controller pod_p        POD-P for its electromechanical mode
   gfor steps two_area --error 0.001:0.1          the largest step for 1 mHz and 0.1 points of damping
@@ -66,6 +77,7 @@ examples:
   gfor federate two_area --component gfor --broker tcp://host:23405
   gfor which-master --build probes               two FMUs that tell which schedule a tool runs
   gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
+  gfor nyquist plant.txt network.txt --compensation "32 %"    is a scanned plant stable there?
   gfor black-box two_area --scenario gfor --component gfor
   gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
   gfor certify one.fmu two.fmu --code all        several converters under all codes, as one matrix
@@ -91,6 +103,7 @@ What makes it better or worse?
   gfor sensitivities two_area --scenario pod_p        which parameter moves the mode, and how far
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9       modes along a parameter
   gfor screen ieee39 --points year.csv --outages n-1  hour by hour, outage by outage
+  gfor site ieee39 --device pod_p                     where to put a converter
 
 Can this converter's FMU be trusted, and does it meet the grid code?
   gfor info vendor.fmu                                what it declares
@@ -102,13 +115,14 @@ Can this converter's FMU be trusted, and does it meet the grid code?
 What does a recording say?
   gfor identify results/two_area/gfor "sg1.omega - sg2.omega"   the modes in a signal
   gfor compare results/two_area/gfor results/two_area/pod_p     two runs beside each other
+  gfor source results/two_area/gfor                   which unit drives an oscillation
 
 How do I take the models elsewhere?
   gfor build gfor --dest fmus                         an FMU for any FMI tool
   gfor export-dll gfor --dest dlls                    a DLL for EMT programs
   gfor linearize two_area --scenario gfor             A, B, C, D
 
-A case of your own: a file such as my_case.toml in the place of two_area; network data in RAW and DYR or CGMES.
+A case of your own: `gfor new own.raw own.dyr --out case.toml` writes one, for the place of two_area; also from CGMES.
 `gfor COMMAND --help` has a command's options, `gfor --help` all commands.
 """
 """What ``gfor`` alone prints."""
@@ -145,11 +159,18 @@ def _done(words: Sequence[str]) -> int:
         with calls:  # libraries take an interrupt in their import for an error of their own
             parser = _parser(next((word for word in words if not word.startswith("-")), None))
         options = parser.parse_args(words)
+        origin.said[:] = [lambda: _origin(words)]
         return int(options.command(options))
     except (CosimError, SetupError, OSError) as error:
         if is_interrupt(error):
             raise
         return _failed(error)
+
+
+def _origin(words: Sequence[str]) -> dict[str, str]:
+    from orchestrator.points.key import code_hash  # noqa: PLC0415 - only where results are written
+
+    return {"command": shlex.join(["gfor", *words]), "code": code_hash()}
 
 
 def _failed(error: CosimError | SetupError | OSError) -> int:
@@ -231,12 +252,26 @@ class _Parser(argparse.ArgumentParser):
         return f"{EXAMPLES}\n{super().format_help()}"
 
 
+class _Command(argparse.ArgumentParser):
+    """A command's parser; it says what a reader of an option says is wrong."""
+
+    def _get_value(self, action: argparse.Action, text: str) -> Any:
+        try:
+            return super()._get_value(action, text)
+        except InputError as error:
+            raise argparse.ArgumentError(action, str(error)) from error
+        except argparse.ArgumentError as error:
+            if isinstance(error.__context__, ValueError) and not isinstance(action.type, type):
+                raise argparse.ArgumentError(action, str(error.__context__)) from error
+            raise
+
+
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
     """The parser, with the arguments of the one command that was chosen: the others' imports would take seconds."""
     parser = _Parser(prog="gfor", description="Co-simulation of grid-forming converters: run, linearise, build FMUs.")
     parser.set_defaults(command=lambda _: _first_page())
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
-    commands = parser.add_subparsers(metavar="COMMAND", parser_class=argparse.ArgumentParser)
+    commands = parser.add_subparsers(metavar="COMMAND", parser_class=_Command)
     for name, words in COMMANDS.items():
         command = commands.add_parser(name, help=words)
         if name == chosen:

@@ -2,12 +2,57 @@
 
 import argparse
 import math
+from collections.abc import Callable
 from typing import Any
 
-from orchestrator.cores import MOST_THREADS
+from orchestrator.asked import as_number, asked_of
 from orchestrator.coupling.schedule import check_tolerance
-from orchestrator.errors import InputError
 from orchestrator.units import read_value, to_unit
+
+
+def switch(parser: argparse._ActionsContainer, name: str, text: str) -> None:
+    """An option without a value, such as ``--native``."""
+    parser.add_argument(name, action="store_true", help=text)
+
+
+def option(
+    parser: argparse._ActionsContainer,
+    name: str,
+    metavar: str,
+    text: str,
+    *,
+    read: Callable[[str], Any] = str,
+    default: Any = None,
+) -> None:
+    """An option with one value, which ``read`` makes of the text."""
+    parser.add_argument(name, metavar=metavar, help=text, type=read, default=default)
+
+
+def repeatable(
+    parser: argparse._ActionsContainer, name: str, metavar: str, text: str, *, read: Callable[[str], Any] = str
+) -> None:
+    """An option that may be given several times; its values are a list."""
+    parser.add_argument(name, metavar=metavar, help=text, type=read, action="append", default=[])
+
+
+def add_json_argument(parser: argparse.ArgumentParser) -> None:
+    switch(parser, "--json", "print JSON")
+
+
+def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> None:
+    """An option for each field of a request that has one and that the parser lacks; None where it is not given."""
+    for name, one in asked_of(request).items():
+        if one.option is None or one.option in parser._option_string_actions:
+            continue
+        how: dict[str, Any] = {"action": "append"} if one.kind.several else {"type": one.kind.read}
+        how = {"action": "store_true"} if one.kind.read is None else {"metavar": one.metavar, **how}
+        parser.add_argument(one.option, dest=name, help=one.help, **how)
+
+
+def asked_by(options: argparse.Namespace, request: type) -> dict[str, Any]:
+    found = {name: getattr(options, name, None) for name in asked_of(request)}
+    given = {name: value for name, value in found.items() if value is not None and value is not False and value != []}
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
 
 
 class Joined(argparse.Action):
@@ -21,8 +66,8 @@ class Joined(argparse.Action):
 def assignment(text: str) -> tuple[str, bool | float | str]:
     """``component.parameter=value`` of a case."""
     key, equals, given = text.partition("=")
-    if not equals or "." not in key or not given:
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form component.parameter=value, such as grid.X_L=0.2")
+    if not equals or ("." not in key and key.strip() != "models") or not given:
+        raise ValueError(f"{text!r} is not of the form component.parameter=value, such as grid.X_L=0.2")
     return key.strip(), read_value(given.strip())
 
 
@@ -30,7 +75,7 @@ def setting(text: str) -> tuple[str, bool | float | str]:
     """``variable=value`` of one FMU."""
     name, equals, given = text.partition("=")
     if not equals or not name or not given:
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form variable=value, such as pod_p.enabled=true")
+        raise ValueError(f"{text!r} is not of the form variable=value, such as pod_p.enabled=true")
     return name.strip(), read_value(given.strip())
 
 
@@ -38,7 +83,7 @@ def seconds(text: str) -> float:
     """A time above 0 [s], as a number or with a unit."""
     time = _time(text)
     if not (time > 0 and math.isfinite(time)):
-        raise argparse.ArgumentTypeError(f"{text!r} must exceed 0 and be finite")
+        raise ValueError(f"{text!r} must exceed 0 and be finite")
     return time
 
 
@@ -46,7 +91,7 @@ def seconds_or_none(text: str) -> float:
     """A time [s], as `seconds`, or 0."""
     time = _time(text)
     if not (time >= 0 and math.isfinite(time)):
-        raise argparse.ArgumentTypeError(f"{text!r} must be 0 or above and finite")
+        raise ValueError(f"{text!r} must be 0 or above and finite")
     return time
 
 
@@ -54,86 +99,25 @@ def _time(text: str) -> float:
     """Any time [s], as a number or with a unit."""
     value = read_value(text)
     if isinstance(value, bool):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a time; write it like 0.5 or '500 ms'")
-    try:
-        return to_unit(value, "s")
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+        raise ValueError(f"{text!r} is not a time; write it like 0.5 or '500 ms'")
+    return to_unit(value, "s")
 
 
-def positive(text: str) -> float:
-    """A finite number above 0."""
-    number = _number(text)
-    if not (number > 0 and math.isfinite(number)):
-        raise argparse.ArgumentTypeError(f"{text!r} must be a number above 0")
-    return number
+def quantity(unit: str) -> Callable[[str], float]:
+    """Reads a number with or without a unit, in a declared one."""
+    return lambda text: to_unit(text, unit)
 
 
 def tolerance(text: str) -> float:
     """Of the error of a step, such as 1e-4."""
-    value = _number(text)
-    try:
-        check_tolerance(value)
-    except InputError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    value = as_number(text)
+    check_tolerance(value)
     return value
-
-
-def count(text: str) -> int:
-    """A whole number from 1 to 1000."""
-    if not text.isdigit() or not 1 <= int(text) <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 1000")
-    return int(text)
-
-
-def whole_from_zero(text: str) -> int:
-    """A whole number from 0 to 1000."""
-    if not text.isdigit() or not int(text) <= 1000:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 to 1000")
-    return int(text)
-
-
-def threads(text: str) -> int:
-    """A whole number from 1 to the most threads that step."""
-    if not text.isdigit() or not 1 <= int(text) <= MOST_THREADS:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to {MOST_THREADS}")
-    return int(text)
-
-
-def percent(text: str) -> float:
-    """Damping [%], as ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
-    number = _number(text.removesuffix("%"))
-    if not 0 < number <= 90:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a damping in percent between 0 and 90, such as 20")
-    if number < 1 and not text.endswith("%"):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is read in percent; write {100 * number:g} for a damping ratio of {number:g}, or {text}% if so "
-            "little is meant"
-        )
-    return number / 100
-
-
-def frequency_range(text: str) -> tuple[float, float]:
-    """``LO:HI`` [Hz]."""
-    low, colon, high = text.partition(":")
-    limits = _number(low), _number(high)
-    if not colon or not 0 <= limits[0] < limits[1]:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as 0.1:2")
-    return limits
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
 
 
 def reactances(text: str) -> tuple[float, ...]:
     """Different reactances of a line [pu], separated by commas."""
-    values = tuple(_number(part) for part in text.split(","))
+    values = tuple(as_number(part) for part in text.split(","))
     if not all(1e-3 <= value <= 10 for value in values) or len(set(values)) < len(values):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3"
-        )
+        raise ValueError(f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3")
     return values

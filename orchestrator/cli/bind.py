@@ -5,6 +5,7 @@ from pathlib import Path
 
 from orchestrator.binding.draft import draft_binding
 from orchestrator.binding.tables import REQUIRED
+from orchestrator.cli.arguments import option, switch
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.devices import NO_BUS, is_controller_alone
@@ -13,8 +14,8 @@ from orchestrator.safe_files import write_text
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="binding file (default: FILE.toml, here)")
-    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
+    option(parser, "--out", "FILE.toml", "binding file (default: FILE.toml, here)", read=Path)
+    switch(parser, "--force", "overwrite an existing file")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,7 +1,6 @@
 """``gfor black-box``: modes of a system with a device that is known only through FMI."""
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +9,16 @@ from rich.table import Table
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
 from orchestrator.analysis.stability import Stability, judge
-from orchestrator.black_box.coupled_modes import (
-    BoxedSystem,
-    component_participation,
-    is_black_box,
-    linearize_with_box,
-)
+from orchestrator.black_box.coupled_modes import BoxedSystem, component_participation, is_black_box, linearize_with_box
 from orchestrator.black_box.files import identification_json, save_identification
 from orchestrator.black_box.passivity import passivity
+from orchestrator.cli.arguments import option, switch
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
-from orchestrator.cli.terminal import make_console, make_errors, said_stages
+from orchestrator.cli.terminal import make_console, print_json, said_stages, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
 from orchestrator.errors import InputError
-from orchestrator.report.tables import PlainTable
+from orchestrator.report.tables import make_table
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
@@ -33,9 +28,9 @@ from orchestrator.study.modes import modes_of, running
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
     parser.add_argument("--component", required=True, metavar="NAME", help="the component to take for a black box")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_black_box)")
+    option(parser, "--out", "DIR", "folder (default: results/<case>_black_box)", read=Path)
     add_excitation_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--json", "print JSON")
     add_verdict_argument(parser)
 
 
@@ -59,19 +54,18 @@ def run(options: argparse.Namespace) -> int:
             )
             box = is_black_box(master.components[options.component])
             white = [] if box else modes_of(prepared, master, ELECTROMECHANICAL_HZ).modes
-        verdicts[prepared.title] = judge(system.model)
+        verdicts[prepared.title] = judge(system.model).doubted(system.misfits)
         passive = passivity(system.response)
         with staged(folder / prepared.name, run_id) as staging:
             save_identification(system.response, system.identified, passive, staging)
-        for text in system.warnings:
-            make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(f'scenario {prepared.name!r}: {text}')}")
+        warn(prepared.name, system.warnings)
         if options.json:
             output.append(_system_json(prepared.name, system, verdicts[prepared.title], passive, white))
         else:
             print_stability(console, {prepared.title: verdicts[prepared.title]})
             console.print(_modes_table(prepared.title, system, white), "")
     if options.json:
-        print(json.dumps(output, indent=1))
+        print_json(output)
     else:
         console.print(escape(f"Admittances and models in {folder}"), soft_wrap=True, highlight=False)
     return exit_code(options, list(verdicts.values()))
@@ -83,12 +77,9 @@ def _nearest(mode: Mode, others: list[Mode]) -> Mode | None:
 
 def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
     fitted = f"order {len(system.identified.A)}, fit {system.identified.error:.1e}"
-    name = f"{title}: {system.component} as a black box, {fitted}"
-    table = PlainTable(title=escape(name), title_justify="left", header_style="bold")
     columns = ["f [Hz]", "Damping [%]", "the box takes part [%]"]
     columns += ["with its states: f [Hz]", "Damping [%]", "takes part [%]"] if white else []
-    for column in columns:
-        table.add_column(escape(column), justify="right")
+    table = make_table(f"{title}: {system.component} as a black box, {fitted}", *columns, left=0)
     for mode in system.modes():
         row = [f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.3f}", f"{100 * system.participation(mode):.2f}"]
         other = _nearest(mode, white)

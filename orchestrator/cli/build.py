@@ -10,6 +10,7 @@ from orchestrator.api.dll import build_from_dll
 from orchestrator.api.models import build, catalogue_model
 from orchestrator.cases.build_choices import PARTS
 from orchestrator.cli import linear_model
+from orchestrator.cli.arguments import option, repeatable, switch
 from orchestrator.cli.terminal import said_stages
 from orchestrator.errors import InputError
 
@@ -18,8 +19,8 @@ _SUCH_AS = {"machine": "genrou", "exciter": "sexs", "governor": "tgov1", "stabil
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
-    parser.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
-    parser.add_argument("--native", action="store_true", help="compiled FMUs with no Python in them")
+    option(parser, "--dest", "DIR", "folder (default: here)", read=Path, default=Path())
+    switch(parser, "--native", "compiled FMUs with no Python in them")
     parser.add_argument("--fmi", choices=("2.0", "3.0"), default="2.0", help="version of FMI (3.0: native only)")
     parser.add_argument(
         "--platform",
@@ -31,16 +32,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{part}", metavar="PART", help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}"
         )
-    parser.add_argument(
-        "--from-dll", type=Path, metavar="FILE", help="a vendor's controller, delivered as IEEE/CIGRE DLL, as an FMU"
-    )
-    parser.add_argument(
-        "--text", action="append", metavar="NAME=VALUE", default=[], help="text parameter of that DLL (repeatable)"
-    )
-    parser.add_argument(
-        "--reference", action="store_true", help="add a smoke test with reference results (layered standard LS-REF)"
-    )
-    parser.add_argument("--sources", action="store_true", help="add the C source, for tools that compile (native only)")
+    option(parser, "--from-dll", "FILE", "a vendor's controller, delivered as IEEE/CIGRE DLL, as an FMU", read=Path)
+    repeatable(parser, "--text", "NAME=VALUE", "text parameter of that DLL (repeatable)")
+    switch(parser, "--reference", "add a smoke test with reference results (layered standard LS-REF)")
+    switch(parser, "--sources", "add the C source, for tools that compile (native only)")
     linear_model.add_arguments(parser)
 
 

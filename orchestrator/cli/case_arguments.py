@@ -2,48 +2,50 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.scenario import Scenario, choose
-from orchestrator.cases.case import load_case
+from orchestrator.asked import read_range
+from orchestrator.cases.case import Case, load_case
+from orchestrator.cases.forcing import forced
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.cli.arguments import assignment, seconds
+from orchestrator.cases.sharing import SharingRule
+from orchestrator.cli.arguments import assignment, option, repeatable, seconds, switch
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
+from orchestrator.errors import InputError
 
 
-def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False) -> None:
-    """The case, which may be left out where ``optional``, and what is changed of it; its schedule where asked for."""
+def add_case_arguments(
+    parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False, several: bool = True
+) -> None:
+    """The case, which may be left out where ``optional``, ``several`` scenarios or one, what is changed; its schedule
+    where asked for.
+    """
     parser.add_argument(
         "case",
         metavar="CASE",
         nargs="?" if optional else None,
         help="a built-in case (two_area), or the path of a case file or an .ssp",
     )
-    parser.add_argument(
-        "--scenario", action="append", default=[], metavar="NAME", help="only this scenario (repeatable)"
-    )
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        type=assignment,
-        metavar="COMPONENT.PARAMETER=VALUE",
-        help="override a value (repeatable)",
-    )
-    parser.add_argument(
-        "--parameters",
-        action="append",
-        default=[],
-        type=Path,
-        metavar="FILE",
-        help="values from a parameter file, as `gfor design` writes it (repeatable; --set overrides it)",
-    )
+    text = f"only this scenario{' (repeatable)' if several else ''}"
+    repeatable(parser, "--scenario", "NAME", text)
+    repeatable(parser, "--set", "COMPONENT.PARAMETER=VALUE", "override a value (repeatable)", read=assignment)
+    repeatable(parser, "--parameters", "FILE", "values from a parameter file, as `gfor design` writes it (repeatable; "
+               "--set overrides it)", read=Path)  # fmt: skip
     add_trust_argument(parser)
-    parser.add_argument("--step", type=seconds, metavar="H", help="communication step [s], e.g. 1e-4 or '200 us'")
+    option(parser, "--step", "H", "communication step [s], e.g. 1e-4 or '200 us'", read=seconds)
     if schedule:
         add_schedule_argument(parser)
+        parser.add_argument(
+            "--sharing",
+            choices=[str(rule) for rule in SharingRule],
+            help="how the other units feed what units fed that --set takes out of service (default: as the case says, "
+            "which is by droop)",
+        )
     parser.add_argument(
         "--native",
         dest="set",
@@ -51,6 +53,10 @@ def add_case_arguments(parser: argparse.ArgumentParser, *, optional: bool = Fals
         const=("*.native", True),
         help="run native FMUs instead of Python-backed ones; short for --set '*.native=true'",
     )
+
+
+def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies [Hz] (0.1:2)") -> None:
+    option(parser, "--range", "LO:HI", text, read=read_range, default=ELECTROMECHANICAL_HZ)
 
 
 def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
@@ -65,19 +71,20 @@ def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
 
 def add_trust_argument(parser: argparse.ArgumentParser) -> None:
     """The user's own word on foreign FMUs."""
-    parser.add_argument(
-        "--trust-fmus",
-        action="store_true",
-        help="let FMUs of others run in gfor's own process where the case says isolated = false; they can do there "
-        "whatever you can",
-    )
+    switch(parser, "--trust-fmus", "let FMUs of others run in gfor's own process where the case says isolated = false; "
+           "they can do there whatever you can")  # fmt: skip
+
+
+def case_of(options: argparse.Namespace) -> Case:
+    return load_case(options.case, trust_fmus=options.trust_fmus)
 
 
 def chosen(options: argparse.Namespace) -> list[Scenario]:
-    file, stop = load_case(options.case, trust_fmus=options.trust_fmus), getattr(options, "stop", None)
+    file, stop = forced(case_of(options), getattr(options, "force", ())), getattr(options, "stop", None)
     scenarios = choose(
         file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters,
         schedule=getattr(options, "schedule", None), tolerance=getattr(options, "tolerance", None),
+        sharing=getattr(options, "sharing", None),
     )  # fmt: skip
     print_questions([scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True))
     return scenarios
@@ -93,6 +100,14 @@ def values_set(options: argparse.Namespace) -> dict[str, Value]:
         values.pop(key, None)
         values[key] = value
     return values
+
+
+def of_one_scenario(options: argparse.Namespace, rule: str) -> dict[str, Any]:
+    """Scenario, values, step and parameter files for a study of one scenario; ``rule`` says that it is of one."""
+    if len(options.scenario) > 1:
+        raise InputError(f"--scenario: {rule}, not for {' and '.join(options.scenario)}; start it once for each")
+    return {"scenario": next(iter(options.scenario), None), "overrides": values_set(options),
+            "step_size": options.step, "parameters": parameters(options)}  # fmt: skip
 
 
 def prepare(options: argparse.Namespace) -> list[PreparedScenario]:

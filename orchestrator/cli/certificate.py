@@ -1,46 +1,123 @@
-"""What the certificates of the norm and of every code have in common on the command line."""
+"""``gfor certify --code``: one converter under one code."""
 
 import argparse
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 
 from orchestrator.certification.acceptance import read_checks, run_checks
-from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.certificate import Certificate, Judged
+from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
+from orchestrator.certification.codes.bench_case import rated_frequency
+from orchestrator.certification.codes.certificate import CodeCertificate, certify_code
+from orchestrator.certification.codes.declared import checked
+from orchestrator.certification.codes.frequency_domain import (
+    figures_of_stiffness,
+    measure_stiffness,
+    save_stiffness,
+    stiffness_in_words,
+)
 from orchestrator.certification.details import Details, read_details
-from orchestrator.certification.request import CertificationRequest
-from orchestrator.certification.study import Certification
+from orchestrator.certification.devices import Device
+from orchestrator.certification.files import JSON, save
+from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
+from orchestrator.certification.study import certify
+from orchestrator.certification.verdict import exit_code
+from orchestrator.cli.certificate_screen import show
+from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.executors import choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_errors
+from orchestrator.cli.terminal import make_console, make_errors, said_stages
+from orchestrator.errors import InputError
+from orchestrator.fmi.devices import as_device
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
-Found = TypeVar("Found", Certification, CodeCertificate)
+NTS631, GB, ALL = "nts631", "gb", "all"
+CODE_NAMES = (NTS631, *CODES, *BY_DECLARATION, GB, ALL)  # what ``--code`` takes
+
+
+def codes_of(asked: str) -> tuple[str, ...]:
+    """The codes with a verdict that an option ``--code`` asks for."""
+    return (NTS631, *CODES, *BY_DECLARATION) if asked == ALL else (asked,)
+
+
+def run_one(options: argparse.Namespace, device: Device) -> int:
+    """Test one device by one code, write the certificate and print it."""
+    key = options.code
+    if key != NTS631:
+        check_code_options(options, [device])
+    elif options.declare:
+        raise InputError(f"--declare {options.declare[0][0]}: the damping test takes no declared value; leave it out, "
+                         f"or choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
+    folder = options.out or Path("results") / f"certify_{device.name}{'' if key == NTS631 else f'_{key}'}"
+    console = make_console(stderr=options.json)
+    found, files = certified(options, device, key, folder, console)
+    if not options.json:
+        show(found, files, folder, console)
+    beside: dict[str, Any] = {}
+    if options.sensitivities and isinstance(found, CodeCertificate):
+        beside = {"sensitivities": find_needs(options, found, folder, console)}
+    if options.json:
+        content = json.loads((folder / JSON).read_text(encoding="utf-8"))
+        print(json.dumps(content | beside, indent=1, ensure_ascii=False))
+    return exit_code(found.verdict, refused=found.refused)
+
+
+def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
+    """Refuse what only the norm's damping test has."""
+    reactances = options.reactances != REACTANCES
+    asked = {"--pod": options.pod, "--black-box": options.black_box, "--reactances": reactances}
+    if other := [name for name, value in asked.items() if value]:
+        raise InputError(
+            f"{', '.join(other)}: only --code {NTS631} has it; leave it out, and set a damping controller by --set"
+        )
+    if study := [name for device in devices for name in device.values if name.split(".")[0] in STUDY]:
+        raise InputError(f"--set {study[0]}: the test bench has no such component; give values of the converter only")
+
+
+def bench_request(device: Device) -> CertificationRequest:
+    """A checked request for a device on the test bench."""
+    request = CertificationRequest(as_device(device.file, device.binding), device.binding, device.values)
+    request.check()
+    return request
+
+
+def _norm_request(options: argparse.Namespace, device: Device) -> CertificationRequest:
+    study = {name: value for name, value in device.values.items() if name.split(".")[0] in STUDY}
+    own = {name: value for name, value in device.values.items() if name not in study}
+    fmu = as_device(device.file, device.binding)
+    request = CertificationRequest(fmu, device.binding, own, options.pod, options.reactances, study, options.black_box)
+    request.check()
+    return request
 
 
 def certified(
-    options: argparse.Namespace,
-    request: CertificationRequest,
-    folder: Path,
-    module: str,
-    study: Callable[[Executor, CountReport], Found],
-    save: Callable[[Found, Path], list[Path]],
-    console: Console,
-    told: tuple[str, str],
-) -> tuple[Found, list[Path]]:
+    options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
+) -> tuple[Certificate[Judged], list[Path]]:
     """Compute a certificate with its acceptance tests, and write its files; points are kept as they come."""
+    study: Callable[[Executor, CountReport], Certificate[Judged]]
+    if key == NTS631:
+        request, module, what = _norm_request(options, device), "point", "points"
+        study = lambda executor, report: certify(request, executor, folder, report)  # noqa: E731
+    else:
+        code = code_for(key, dict(options.declare))
+        request, module, what = bench_request(device), "codes.bench_point", "rows"
+        study = lambda executor, report: certify_code(request, code, executor, folder, report=report)  # noqa: E731
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     made_folder(folder, "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        executor = choose_executor(options, [module])
+        executor = choose_executor(options, [f"orchestrator.certification.{module}"])
+        told = (f"{device.name}, {key}: computing", what)
         found = progress.compute(lambda report: study(executor, report), executor, console, told)
         if acceptance is not None:
             acceptance.keep(folder)
@@ -50,4 +127,37 @@ def certified(
             with console.status("Acceptance tests of the FMU"):
                 acceptance = run_checks(request.fmu, request.binding, folder)
         found.details, found.acceptance = details, acceptance
-        return found, save(found, folder)
+        return found, save(found, folder, pdf=options.pdf)
+
+
+def run_stiffness(options: argparse.Namespace, device: Device) -> int:
+    """Measure a converter by ``--code gb``; there is no verdict, so that it neither passes nor fails."""
+    asked = {"--pdf": options.pdf, "--details": options.details, "--check": options.check}
+    if other := [name for name, value in asked.items() if value]:
+        raise InputError(f"{', '.join(other)}: --code {GB} gives figures and no certificate; leave it out")
+    checked((), dict(options.declare), GB)
+    check_code_options(options, [device])
+    folder = options.out or Path("results") / f"certify_{device.name}_{GB}"
+    console = make_console(stderr=options.json)
+    with held(folder):
+        figures, files = measured_figures(device, folder)
+    if options.json:
+        print(json.dumps(figures, indent=1, ensure_ascii=False))
+        return 0
+    for line in stiffness_in_words(figures):
+        console.print(escape(line), highlight=False)
+    console.print(escape(figures["phase_jump"]["sentence"]), soft_wrap=True, highlight=False)
+    console.print(escape(figures["sentence"][:1].upper() + figures["sentence"][1:]), soft_wrap=True)
+    console.print(escape(f"Files in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
+    return 0
+
+
+def measured_figures(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
+    """Measure a converter and write its files; says on standard error what is being done."""
+    request = bench_request(device)
+    made_folder(folder, "--out")
+    with said_stages() as report:
+        f_n = rated_frequency(request, 50.0)
+        found = measure_stiffness(request, f_n, report)
+    files = save_stiffness(found, request.fmu.stem, f_n, folder)
+    return figures_of_stiffness(found, request.fmu.stem, f_n), files

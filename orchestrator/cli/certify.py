@@ -7,11 +7,9 @@ from orchestrator.certification.details import TEMPLATE
 from orchestrator.certification.devices import devices_of
 from orchestrator.certification.request import PODS, REACTANCES
 from orchestrator.cli.arguments import reactances, setting
-from orchestrator.cli.certify_codes import ALL, CODE_NAMES, GB, NTS631, codes_of, run_code
+from orchestrator.cli.certificate import ALL, CODE_NAMES, GB, NTS631, codes_of, run_one, run_stiffness
 from orchestrator.cli.certify_matrix import run_matrix
-from orchestrator.cli.certify_norm import run_norm
 from orchestrator.cli.certify_sensitivities import add_sensitivity_arguments, check_sensitivity_options
-from orchestrator.cli.certify_stiffness import run_stiffness
 from orchestrator.cli.executors import add_executor_arguments
 from orchestrator.errors import INTERRUPTED, InputError
 
@@ -96,4 +94,4 @@ def run(options: argparse.Namespace) -> int:
         return run_stiffness(options, devices[0])
     if len(devices) > 1 or options.code == ALL:
         return run_matrix(options, devices)
-    return run_norm(options, devices[0]) if options.code == NTS631 else run_code(options, devices[0])
+    return run_one(options, devices[0])

@@ -17,10 +17,9 @@ from orchestrator.certification.codes.frequency_domain import stiffness_in_words
 from orchestrator.certification.devices import Device
 from orchestrator.certification.matrix import FIGURES, NOT_TESTED, CertificateMatrix, MatrixCell
 from orchestrator.certification.matrix_record import READING, in_words, matrix_json, save_matrix
-from orchestrator.cli.certify_codes import ALL, GB, NTS631, certified_code, check_code_options, codes_of, show_code
-from orchestrator.cli.certify_norm import certified_norm, show_norm
+from orchestrator.cli.certificate import ALL, GB, NTS631, certified, check_code_options, codes_of, measured_figures
+from orchestrator.cli.certificate_screen import show
 from orchestrator.cli.certify_sensitivities import find_needs
-from orchestrator.cli.certify_stiffness import measured_figures
 from orchestrator.cli.terminal import make_console, make_errors
 from orchestrator.errors import InputError
 from orchestrator.points.failure import Failure, failure_kept
@@ -87,17 +86,12 @@ def _tested(
             cell.verdict, cell.figures = FIGURES, ()  # it decides nothing, also where it cannot be measured
             figures, _ = measured_figures(device, own)
             cell.figures = [*stiffness_in_words(figures), figures["phase_jump"]["sentence"]]
-        elif key == NTS631:
-            result, files = certified_norm(options, device, own, console)
-            cell.take(result)
-            if not (options.json or several):
-                show_norm(result, files, own, console)
         else:
-            found, files = certified_code(options, device, key, own, console)
+            found, files = certified(options, device, key, own, console)
             cell.take(found)
             if not (options.json or several):
-                show_code(found, files, own, console)
-            if options.sensitivities:
+                show(found, files, own, console)
+            if options.sensitivities and isinstance(found, CodeCertificate):
                 _take_needs(options, found, cell, own, console)
         if not options.no_check and key != GB:
             options.check = own / KEPT

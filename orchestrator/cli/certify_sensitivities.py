@@ -18,12 +18,7 @@ from orchestrator.certification.codes.needs_record import (
     remarks_of,
     save_needs,
 )
-from orchestrator.certification.codes.what_it_takes import (
-    CHANGE,
-    confirm_changes,
-    plan_changes,
-    run_changes,
-)
+from orchestrator.certification.codes.what_it_takes import CHANGE, confirm_changes, plan_changes, run_changes
 from orchestrator.cli.executors import choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing

@@ -11,7 +11,8 @@ from rich.markup import escape
 from orchestrator.acceptance.checks.base import CheckResult, Verdict
 from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.api.acceptance import check
-from orchestrator.cli.arguments import positive
+from orchestrator.asked import read_positive
+from orchestrator.cli.arguments import option, repeatable, switch
 from orchestrator.errors import InputError
 from orchestrator.fmi.protection import missing
 from orchestrator.units import read_value
@@ -23,25 +24,22 @@ _COLOURS = {
     Verdict.NOT_APPLICABLE: "dim",
     Verdict.NOT_SUPPORTED: "bold yellow",
 }
-NOT_SUPPORTED = 2
-"""Exit code where nothing failed, but the FMU could not be run here."""
+NOT_SUPPORTED = 2  # exit code where nothing failed, but the FMU could not be run here
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    parser.add_argument("--binding", type=Path, metavar="FILE.toml", help="what its variables mean (`gfor bind`)")
-    parser.add_argument("--step", type=positive, metavar="H", help="communication step of use [s]")
-    parser.add_argument("--case", metavar="CASE", help="with a case's step, operating point, values and binding")
-    parser.add_argument("--component", metavar="NAME", help="which of the case's components it is")
-    parser.add_argument("--scenario", metavar="NAME", help="which of the case's scenarios (default: the first with it)")
-    parser.add_argument("--frequency", type=positive, metavar="HZ", help="of the network (default: the FMU's f_n)")
-    parser.add_argument("--only", action="append", default=[], metavar="CHECK", help="only this check (repeatable)")
-    parser.add_argument(
-        "--seed", type=int, metavar="N", help="of the random dips, jumps and points (default: of the file's bytes)"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
-    parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="write the results for a CI server")
-    parser.add_argument("--time-limit", type=positive, default=30.0, metavar="S", help="for one call [s] (default: 30)")
+    option(parser, "--binding", "FILE.toml", "what its variables mean (`gfor bind`)", read=Path)
+    option(parser, "--step", "H", "communication step of use [s]", read=read_positive)
+    option(parser, "--case", "CASE", "with a case's step, operating point, values and binding")
+    option(parser, "--component", "NAME", "which of the case's components it is")
+    option(parser, "--scenario", "NAME", "which of the case's scenarios (default: the first with it)")
+    option(parser, "--frequency", "HZ", "of the network (default: the FMU's f_n)", read=read_positive)
+    repeatable(parser, "--only", "CHECK", "only this check (repeatable)")
+    option(parser, "--seed", "N", "of the random dips, jumps and points (default: of the file's bytes)", read=int)
+    switch(parser, "--json", "print JSON")
+    option(parser, "--junit", "FILE.xml", "write the results for a CI server", read=Path)
+    option(parser, "--time-limit", "S", "for one call [s] (default: 30)", read=read_positive, default=30.0)
     parser.add_argument(
         "--memory-limit",
         type=read_value,

@@ -19,18 +19,7 @@ from orchestrator.study.checkpoints import CASE, Checkpoints, not_kept
 
 
 class StudyCheckpoints:
-    """The checkpoints of all scenarios of a command.
-
-    Parameters
-    ----------
-    options
-        As `with_request` gave them.
-
-    Raises
-    ------
-    InputError
-        If the run to be resumed is made of something else now, or an FMU cannot be kept where that is required.
-    """
+    """The checkpoints of all scenarios of a command, whose options are as `with_request` gave them."""
 
     def __init__(self, scenarios: Sequence[PreparedScenario], folder: Path, options: argparse.Namespace) -> None:
         self._results, self._folder, self._every = folder, folder / CHECKPOINTS, options.checkpoint

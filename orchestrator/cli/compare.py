@@ -1,16 +1,15 @@
 """``gfor compare``: two recorded runs side by side."""
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.markup import escape
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.api.comparison import compare
-from orchestrator.cli.arguments import seconds_or_none
-from orchestrator.cli.terminal import make_console, make_errors, saying_warnings
-from orchestrator.report.tables import PlainTable
+from orchestrator.cli.arguments import option, seconds_or_none, switch
+from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
+from orchestrator.report.tables import make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,25 +18,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("second", type=Path, metavar="B", help="the other one")
     parser.add_argument("--signal", action="append", metavar="SIGNAL",
                         help="'a.b' or 'a.b - c.d' (repeatable; default: those that differ most)")  # fmt: skip
-    parser.add_argument("--start", type=seconds_or_none, metavar="T", help="oscillations are read from here [s] (2)")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    option(parser, "--start", "T", "oscillations are read from here [s] (2)", read=seconds_or_none)
+    switch(parser, "--json", "print JSON")
 
 
 def run(options: argparse.Namespace) -> int:
     with saying_warnings():
         found = compare(options.first, options.second, options.signal or (), options.start)
     if options.json:
-        print(json.dumps(found.as_json(), indent=1))
+        print_json(found.as_json())
         for text in found.remarks:
             make_errors().print(text, markup=False, soft_wrap=True, highlight=False)
         return 0
-    title = escape(f"A: {options.first}\nB: {options.second}")
-    table = PlainTable(title=title, title_justify="left", header_style="bold")
-    for column in ("Signal", "Deviation A", "Deviation B", "Largest difference", "at [s]", "RMS", "A rings", "B rings"):
-        table.add_column(column, justify="left" if column == "Signal" else "right")
-    for c in found:
-        table.add_row(f"{c.expression} [{c.unit}]", f"{c.deviations[0]:.4g}", f"{c.deviations[1]:.4g}",
-                      f"{c.largest:.4g}", f"{c.at:.3f}", f"{c.rms:.4g}", *map(_mode_text, c.modes))  # fmt: skip
+    columns = ("Signal", "Deviation A", "Deviation B", "Largest difference", "at [s]", "RMS", "A rings", "B rings")
+    rows = [
+        (f"{c.expression} [{c.unit}]", f"{c.deviations[0]:.4g}", f"{c.deviations[1]:.4g}", f"{c.largest:.4g}",
+         f"{c.at:.3f}", f"{c.rms:.4g}", *map(_mode_text, c.modes))
+        for c in found
+    ]  # fmt: skip
+    table = make_table(f"A: {options.first}\nB: {options.second}", *columns, rows=rows)
     console = make_console()
     console.print(table)
     for text in found.remarks:

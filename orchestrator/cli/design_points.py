@@ -1,44 +1,35 @@
 """``gfor design --points``: one setting for many operating points and outages."""
 
 import argparse
-import json
 import shlex
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
+from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.coordinated_design import WORKERS_IMPORT, compute
-from orchestrator.cases.case import load_case
-from orchestrator.cli.arguments import Joined, whole_from_zero
-from orchestrator.cli.case_arguments import parameters, values_set
-from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_console, make_errors, print_questions
+from orchestrator.api.coordinated_design import STUDY
+from orchestrator.cli.arguments import Joined, add_request_arguments, asked_by, option
+from orchestrator.cli.case_arguments import case_of, of_one_scenario
+from orchestrator.cli.executors import add_executor_arguments
+from orchestrator.cli.study import present, working_in
 from orchestrator.cli.verdict import NOT_MET
 from orchestrator.coordinated_design import words
-from orchestrator.coordinated_design.study import ALL, PointsDesignRequest, plan_points_design
+from orchestrator.coordinated_design.study import ALL, PointsDesign, PointsDesignRequest, plan_points_design
 from orchestrator.coordinated_design.verdict import PointsVerdict
-from orchestrator.errors import InputError
-from orchestrator.results.lock import held
-from orchestrator.safe_files import made_folder
 from orchestrator.screening.record import Status
 
-GAIN_BOUNDS = (0.0, 400.0)
+A_DESIGN = "a design is made for one scenario"
 
 
 def add_points_arguments(parser: argparse.ArgumentParser) -> None:
     """Options that a design over operating points has beside those of a design for one."""
     group = parser.add_argument_group("over operating points")
-    group.add_argument(
-        "--points", type=Path, metavar="FILE", help="operating points: a CSV file, as gfor screen has it"
-    )
+    option(group, "--points", "FILE", "operating points: a CSV file, as gfor screen has it", read=Path)
     group.add_argument("--outages", action=Joined, metavar="WHICH",
                        help="n-1, lines, units, or names, each at every point (repeatable)")  # fmt: skip
-    group.add_argument(
-        "--rank", type=whole_from_zero, default=3, metavar="N",
-        help="converters for which a controller alone is designed to rank them (default: 3)",
-    )  # fmt: skip
+    add_request_arguments(group, PointsDesignRequest)
     add_executor_arguments(group)
 
 
@@ -50,51 +41,31 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
     0; 1 where no point has modes, gfor-cosim itself failed somewhere, or ``--fail-unstable`` asks for it; 3 where a
     damping that was asked for is not reached everywhere, or that is not known.
     """
-    if len(options.scenario) > 1:
-        raise InputError(f"--scenario: a design is made for one scenario, not for {' and '.join(options.scenario)}")
-    modes = tuple(name for name in options.mode if name != ALL)
+    several = {"controllers": tuple(options.controller), "components": tuple(options.component),
+               "modes": () if ALL in options.mode else tuple(options.mode)}  # fmt: skip
     request = PointsDesignRequest(
-        controllers=tuple(options.controller),
-        components=tuple(options.component),
-        scenario=next(iter(options.scenario), None),
-        modes=() if ALL in options.mode else modes,
-        damping=options.damping,
-        gain_bounds=options.gain_bounds or GAIN_BOUNDS,
-        stages=options.stages,
-        least_damping=options.min_damping,
-        ranked=options.rank,
-        overrides=values_set(options),
-        parameters=parameters(options),
-        step_size=options.step,
+        **asked_by(options, PointsDesignRequest) | several | of_one_scenario(options, A_DESIGN)
     )
-    executor = choose_executor(options, WORKERS_IMPORT)
-    case, console = load_case(options.case, trust_fmus=options.trust_fmus), make_console(stderr=options.json)
+    case = case_of(options)
     path = out or Path(f"{case.name}_{'_'.join(options.controller)}_points.toml")
-    planned = plan_points_design(case, request, options.points, options.outages)
-    print_questions([planned.prepared], as_json=options.json)
-    folder = made_folder(path.with_suffix(".points"), "--out")
-    progress = Progressing(folder)
-    with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        design = progress.compute(lambda report: compute(planned, executor, folder, report), executor, console)
-        written = design.save(path, _command_line(options))
+    folder = path.with_suffix(".points")
+    plan = partial(plan_points_design, case, request, options.points, options.outages)
+    with working_in(options, folder, STUDY, plan) as (_, compute):
+        design = compute()
+        written = design.save(path, _command_line(options, request))
     verdict = design.result.verdict
-    if options.json:
-        print(json.dumps(design.as_json(), indent=1, ensure_ascii=False))
-    else:
-        console.print(words.verdict_of(verdict).markup(), soft_wrap=True, highlight=False)
-        for table in (words.points_table(verdict), words.settings_table(design.result)):
-            console.print("", table)
-        if options.rank:
-            console.print("", words.ranking_table(design.result))
-        console.print("")
-        console.print(escape(words.what_it_rests_on(design.result)), soft_wrap=True, highlight=False)
-    for text in words.remarks(verdict):
-        make_errors().print(escape(text), soft_wrap=True)
-    if not options.json:
-        files = ", ".join(one.name for one in written[1:])
-        text = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
-        console.print(escape(text), soft_wrap=True, highlight=False)
+    files = ", ".join(one.name for one in written[1:])
+    end = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
+    present(options, design.as_json, _parts(design.result), words.remarks(verdict), end)
     return _exit_code(verdict, fail_unstable=options.fail_unstable)
+
+
+def _parts(design: PointsDesign) -> Iterator[RenderableType]:
+    yield words.verdict_of(design.verdict).markup()
+    yield from ("", words.points_table(design.verdict), "", words.settings_table(design))
+    if design.plan.request.ranked:
+        yield from ("", words.ranking_table(design))
+    yield from ("", escape(words.what_it_rests_on(design)))
 
 
 def _exit_code(verdict: PointsVerdict, *, fail_unstable: bool) -> int:
@@ -105,16 +76,16 @@ def _exit_code(verdict: PointsVerdict, *, fail_unstable: bool) -> int:
     return NOT_MET if verdict.wanted is not None and not verdict.met else 0
 
 
-def _command_line(options: argparse.Namespace) -> str:
+def _command_line(options: argparse.Namespace, request: PointsDesignRequest) -> str:
     """The command that was given, with all that is not left to its default."""
     chosen = ["gfor", "design", str(options.case), "--points", str(options.points)]
     several = {"--controller": options.controller, "--component": options.component, "--mode": options.mode,
                "--scenario": options.scenario, "--parameters": options.parameters}  # fmt: skip
     chosen += [word for option, values in several.items() for value in values for word in (option, str(value))]
-    low, high = options.gain_bounds or GAIN_BOUNDS
-    single = {"--outages": options.outages, "--stages": options.stages, "--step": options.step,
-              "--damping": None if options.damping is None else f"{100 * options.damping:g}%",
-              "--gain-bounds": f"{low:g}:{high:g}", "--min-damping": f"{100 * options.min_damping:g}%"}  # fmt: skip
+    low, high = request.gain_bounds
+    single = {"--outages": options.outages, "--stages": request.stages, "--step": options.step,
+              "--damping": None if request.damping is None else f"{100 * request.damping:g}%",
+              "--gain-bounds": f"{low:g}:{high:g}", "--min-damping": f"{100 * request.least_damping:g}%"}  # fmt: skip
     chosen += [word for option, value in single.items() if value is not None for word in (option, str(value))]
     for key, value in options.set:
         chosen += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]

@@ -2,8 +2,9 @@
 
 import argparse
 
+from orchestrator.asked import read_positive
 from orchestrator.black_box.frequency_response import METHODS, Excitation
-from orchestrator.cli.arguments import positive
+from orchestrator.cli.arguments import switch
 from orchestrator.errors import InputError
 
 _DEFAULTS = Excitation()
@@ -12,13 +13,13 @@ _DEFAULTS = Excitation()
 def add_excitation_arguments(parser: argparse.ArgumentParser) -> None:
     """Method, size and range; whether the state may be saved."""
     parser.add_argument("--method", choices=METHODS, default=_DEFAULTS.method, help="excitation (default: multisine)")
-    parser.add_argument("--amplitude", type=positive, default=_DEFAULTS.amplitude, metavar="A",
+    parser.add_argument("--amplitude", type=read_positive, default=_DEFAULTS.amplitude, metavar="A",
                         help=f"largest deviation of the voltage [pu] ({_DEFAULTS.amplitude:g})")  # fmt: skip
-    parser.add_argument("--from-hz", type=positive, default=_DEFAULTS.lowest_hz, metavar="F",
+    parser.add_argument("--from-hz", type=read_positive, default=_DEFAULTS.lowest_hz, metavar="F",
                         help=f"lowest frequency [Hz] ({_DEFAULTS.lowest_hz:g})")  # fmt: skip
-    parser.add_argument("--to-hz", type=positive, default=_DEFAULTS.highest_hz, metavar="F",
+    parser.add_argument("--to-hz", type=read_positive, default=_DEFAULTS.highest_hz, metavar="F",
                         help=f"highest frequency [Hz] ({_DEFAULTS.highest_hz:g})")  # fmt: skip
-    parser.add_argument("--no-state", action="store_true", help="never save or restore the FMU's state")
+    switch(parser, "--no-state", "never save or restore the FMU's state")
 
 
 def excitation_of(options: argparse.Namespace) -> Excitation:

@@ -4,27 +4,19 @@ import argparse
 from collections.abc import Sequence
 
 from orchestrator.api import executors
-from orchestrator.cli.arguments import count
+from orchestrator.asked import read_whole
+from orchestrator.cli.arguments import option
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor
 
 
 def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
-    parser.add_argument("--workers", type=count, metavar="N", help="processes to compute in (default: one a core)")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="compute on a Dask cluster, such as tcp://host:8786")
-    parser.add_argument("--tls", metavar="DIR", help="folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")
+    option(parser, "--workers", "N", "processes to compute in (default: one a core)", read=read_whole(1, 1000))
+    option(parser, "--scheduler", "ADDRESS", "compute on a Dask cluster, such as tcp://host:8786")
+    option(parser, "--tls", "DIR", "folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")
 
 
 def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:
-    """Where the points are computed, as `executors.choose_executor` chooses it.
-
-    Parameters
-    ----------
-    options
-        With those of `add_executor_arguments`.
-    imports
-        Modules that a worker imports once.
-    """
     if options.scheduler is not None and options.workers is not None:
         raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
     return executors.choose_executor(options.workers, options.scheduler, imports, options.tls)

@@ -4,17 +4,18 @@ import argparse
 from pathlib import Path
 
 from orchestrator.api.comtrade import export_comtrade
-from orchestrator.cli.arguments import positive
+from orchestrator.asked import read_positive
+from orchestrator.cli.arguments import option
 from orchestrator.cli.terminal import saying_warnings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a scenario's results, or its trajectory.nc")
     parser.add_argument("--signal", action="append", metavar="SIGNAL", help="'a.b' or 'a.b - c.d' (repeatable; all)")
-    parser.add_argument("--out", type=Path, metavar="FILE.cfg", help="the recording (default: <RUN>/trajectory.cfg)")
-    parser.add_argument("--form", default="BINARY32", type=str.upper, metavar="FORM",
-                        help="ASCII, BINARY, BINARY32 or FLOAT32 (BINARY32)")  # fmt: skip
-    parser.add_argument("--frequency", type=positive, metavar="HZ", help="rated frequency [Hz] (the run's)")
+    option(parser, "--out", "FILE.cfg", "the recording (default: <RUN>/trajectory.cfg)", read=Path)
+    option(parser, "--form", "FORM",
+           "ASCII, BINARY, BINARY32 or FLOAT32 (BINARY32)", read=str.upper, default="BINARY32")  # fmt: skip
+    option(parser, "--frequency", "HZ", "rated frequency [Hz] (the run's)", read=read_positive)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,7 +4,8 @@ import argparse
 from pathlib import Path
 
 from orchestrator.api.dll import export_dll
-from orchestrator.cli.arguments import positive
+from orchestrator.asked import read_positive
+from orchestrator.cli.arguments import option, repeatable
 from orchestrator.cli.terminal import said_stages
 from orchestrator.errors import InputError
 from orchestrator.units import read_value
@@ -12,16 +13,12 @@ from orchestrator.units import read_value
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="converter, such as gfor")
-    parser.add_argument("--dest", type=Path, default=Path(), metavar="DIR", help="folder (default: here)")
+    option(parser, "--dest", "DIR", "folder (default: here)", read=Path, default=Path())
     parser.add_argument(
         "--platform", action="append", metavar="PLATFORM", help="linux64, win32 or win64 (repeatable; default: all)"
     )
-    parser.add_argument(
-        "--sample-time", type=positive, default=2e-5, metavar="S", help="time between two calls [s] (20e-6)"
-    )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="default of a parameter (repeatable)"
-    )
+    option(parser, "--sample-time", "S", "time between two calls [s] (20e-6)", read=read_positive, default=2e-5)
+    repeatable(parser, "--set", "NAME=VALUE", "default of a parameter (repeatable)")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ from typing import Any
 
 from fmus.toolchain.archive import write_archive
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cli.arguments import seconds
+from orchestrator.cli.arguments import option, seconds
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.errors import InputError
 from orchestrator.ssp.study import study_of
@@ -24,13 +24,9 @@ _TABLES: dict[str, Any] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s] (default: the case's)")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="FILE.ssp",
-        help="the archive, or a folder for one archive a scenario (default: <case>_<scenario>.ssp here)",
-    )
+    option(parser, "--stop", "T", "stop time [s] (default: the case's)", read=seconds)
+    option(parser, "--out", "FILE.ssp", "the archive, or a folder for one archive a scenario (default: "
+           "<case>_<scenario>.ssp here)", read=Path)  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:

@@ -2,41 +2,35 @@
 
 import argparse
 
-from orchestrator.cli.arguments import seconds
+from orchestrator.asked import read_whole
+from orchestrator.cli.arguments import option, seconds
 from orchestrator.cli.terminal import make_errors
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import ENGINES, PATIENCE, TO_JOIN, Federates
-
-
-def port(text: str) -> int:
-    """A port that a broker can listen on; it takes the next one as well."""
-    if not text.isdigit() or not 1 <= int(text) <= 65534:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a port from 1 to 65534")
-    return int(text)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("federates over HELICS (extra `federation`)")
     group.add_argument("--engine", choices=ENGINES, default="local",
                        help="local: all components here; helics: some of them as federates")  # fmt: skip
-    group.add_argument("--federate", type=names, default=(), metavar="NAME,NAME",
-                       help="components that become federates on this machine (default: all but the grid)")  # fmt: skip
+    option(group, "--federate", "NAME,NAME", "components that become federates on this machine (default: all but the "
+           "grid)", read=names, default=())  # fmt: skip
     group.add_argument("--external", type=names, default=(), metavar="NAME,NAME",
                        help="components whose federates others start: `gfor federate`, or a program")  # fmt: skip
-    group.add_argument("--broker", metavar="ADDRESS", help="a broker that runs, such as tcp://host:23405 "
-                       "(default: gfor starts one for this machine alone)")  # fmt: skip
-    group.add_argument("--broker-port", type=port, metavar="PORT",
-                       help="start the broker at this port of all network interfaces")  # fmt: skip
+    option(group, "--broker", "ADDRESS", "a broker that runs, such as tcp://host:23405 (default: gfor starts one for "
+           "this machine alone)")  # fmt: skip
+    option(group, "--broker-port", "PORT",
+           "start the broker at this port of all network interfaces", read=read_whole(1, 65534, "a port"))  # fmt: skip
     group.add_argument("--patience", type=seconds, default=None, metavar="T",
                        help=f"longest time of a federate for one step [s] (default: {PATIENCE:g})")  # fmt: skip
-    group.add_argument("--to-join", type=seconds, default=None, metavar="T",
-                       help=f"how long federates are waited for [s] (default: {TO_JOIN:g})")  # fmt: skip
+    option(group, "--to-join", "T",
+           f"how long federates are waited for [s] (default: {TO_JOIN:g})", read=seconds, default=None)  # fmt: skip
 
 
 def names(text: str) -> tuple[str, ...]:
     found = tuple(dict.fromkeys(part.strip() for part in text.split(",")))
     if not all(found):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a list of names with commas between them, such as gfor,sg1")
+        raise ValueError(f"{text!r} is not a list of names with commas between them, such as gfor,sg1")
     return found
 
 

@@ -1,15 +1,14 @@
 """``gfor identify``: the modes in a recorded signal."""
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.markup import escape
 
 from orchestrator.api.identification import identify
-from orchestrator.cli.arguments import seconds, seconds_or_none
-from orchestrator.cli.terminal import make_console, make_errors, saying_warnings
-from orchestrator.report.tables import PlainTable
+from orchestrator.cli.arguments import option, seconds, seconds_or_none, switch
+from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
+from orchestrator.report.tables import eigenvalue_text, make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,11 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("run", type=Path, metavar="RUN",
                         help="folder of a scenario's results, its trajectory.nc, COMTRADE or CSV")  # fmt: skip
     parser.add_argument("signal", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'")
-    parser.add_argument(
-        "--start", type=seconds_or_none, default=2.0, metavar="T", help="beginning of the free response [s] (2)"
-    )
-    parser.add_argument("--stop", type=seconds, metavar="T", help="its end [s] (default: the run's)")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    option(parser, "--start", "T", "beginning of the free response [s] (2)", read=seconds_or_none, default=2.0)
+    option(parser, "--stop", "T", "its end [s] (default: the run's)", read=seconds)
+    switch(parser, "--json", "print JSON")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -32,19 +29,17 @@ def run(options: argparse.Namespace) -> int:
     with saying_warnings():
         found = identify(options.run, options.signal, options.start, options.stop)
     if options.json:
-        print(json.dumps(found.as_json(), indent=1))
+        print_json(found.as_json())
         for text in found.remarks:
             make_errors().print(text, soft_wrap=True, highlight=False)
         return 0
     title = f"{found.signal} from {found.start:g} to {found.stop:g} s (matrix pencil), strongest first"
-    table = PlainTable(title=escape(title), title_justify="left", header_style="bold")
-    for column in ("λ [rad/s]", "f [Hz]", "Damping [%]", "Amplitude"):
-        table.add_column(column, justify="right")
+    columns, rows = ("λ [rad/s]", "f [Hz]", "Damping [%]", "Amplitude"), []
     for m in found:
-        value = f"{m.eigenvalue.real:+.4f} ± j{abs(m.eigenvalue.imag):.4f}"
-        frequency, damping = f"{m.frequency_hz:.4f}{' ?' if m.doubts else ''}", f"{m.damping_percent:.2f}"
-        shown = ("trend", "-") if found.is_trend(m) else (frequency, damping)
-        table.add_row(value, *shown, f"{m.amplitude:.3g}")
+        figures = (f"{m.frequency_hz:.4f}{' ?' if m.doubts else ''}", f"{m.damping_percent:.2f}")
+        shown = ("trend", "-") if found.is_trend(m) else figures
+        rows.append((eigenvalue_text(m.eigenvalue), *shown, f"{m.amplitude:.3g}"))
+    table = make_table(title, *columns, left=0, rows=rows)
     console = make_console()
     console.print(table)
     for text in found.remarks:

@@ -1,7 +1,6 @@
 """``gfor info``: what an FMU declares."""
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.markup import escape
@@ -9,7 +8,8 @@ from rich.markup import escape
 from fmus.vendor_dll.interface import CONTROLLER
 from orchestrator.api.dll import KEPT_IN
 from orchestrator.api.fmu import info
-from orchestrator.cli.terminal import make_console
+from orchestrator.cli.arguments import switch
+from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.fmi.description import FmuDescription, missing_binary
 from orchestrator.fmi.linear_model import EmbeddedModel
 from orchestrator.report.tables import fmu_variables
@@ -17,14 +17,14 @@ from orchestrator.report.tables import fmu_variables
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--json", "print JSON")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print what the FMU is, what it can do, and its variables."""
     found = info(options.file)
     if options.json:
-        print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
+        print_json(found.as_json())
         return 0
     description = found.description
     console = make_console()

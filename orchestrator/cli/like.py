@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cli.arguments import option
 from orchestrator.errors import InputError
 from orchestrator.interop.masters import MASTERS, master_rules
 from orchestrator.interop.rules import MasterRules
@@ -15,10 +16,8 @@ from orchestrator.study.like import run_like
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``gfor run`` that make it run as another master."""
-    parser.add_argument("--like", metavar="MASTER",
-                        help=f"only trajectories, as another master would give them: {', '.join(MASTERS)}")  # fmt: skip
-    parser.add_argument("--order", metavar="A,B,…",
-                        help="with --like: in which order components step, where they take turns")  # fmt: skip
+    option(parser, "--like", "MASTER", f"only trajectories, as another master would give them: {', '.join(MASTERS)}")
+    option(parser, "--order", "A,B,…", "with --like: in which order components step, where they take turns")
 
 
 def rules_of(options: argparse.Namespace) -> MasterRules | None:
@@ -35,10 +34,7 @@ def rules_of(options: argparse.Namespace) -> MasterRules | None:
 def run(scenarios: Sequence[PreparedScenario], rules: MasterRules, folder: Path, turns: str | None) -> int:
     """Run scenarios as another master would; their trajectories are all that is written.
 
-    Parameters
-    ----------
-    turns
-        Components with commas between them, in the order in which they step; the master's own where None.
+    ``turns`` are components with commas between them, in the order in which they step; the master's own where None.
     """
     order = turns.split(",") if turns else None
     run_id = new_run_id()

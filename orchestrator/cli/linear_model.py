@@ -4,6 +4,7 @@ import argparse
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cli.arguments import option
 from orchestrator.errors import InputError
 from orchestrator.fmi.linear_model import linear_model_members
 from orchestrator.study.component_model import component_model
@@ -19,10 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="CASE",
         help="pack the model's linear model at the steady state of this case into the FMU",
     )
-    parser.add_argument("--scenario", metavar="NAME", help="scenario of that case (default: its only one)")
-    parser.add_argument(
-        "--component", metavar="NAME", help="component of that case (default: the only one of this model)"
-    )
+    option(parser, "--scenario", "NAME", "scenario of that case (default: its only one)")
+    option(parser, "--component", "NAME", "component of that case (default: the only one of this model)")
 
 
 def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, bytes]:

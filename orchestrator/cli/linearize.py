@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.analysis.stability import Stability
+from orchestrator.cli.arguments import option, switch
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import make_console, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
@@ -27,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COMPONENT.VARIABLE",
         help="observed output (repeatable; default: what the case plots)",
     )
-    parser.add_argument("--continuous", action="store_true", help="ẋ = A·x + B·u instead of the step map")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default: results/<case>_linear)")
+    switch(parser, "--continuous", "ẋ = A·x + B·u instead of the step map")
+    option(parser, "--out", "DIR", "folder (default: results/<case>_linear)", read=Path)
     add_verdict_argument(parser)
 
 

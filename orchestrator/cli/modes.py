@@ -1,24 +1,24 @@
 """``gfor modes``: steady state and eigenvalues of a case's scenarios."""
 
 import argparse
-import json
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.scenario import Scenario
-from orchestrator.cli.arguments import frequency_range, percent
-from orchestrator.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.asked import read_percent
+from orchestrator.cli.arguments import option, switch
+from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, chosen
 from orchestrator.cli.terminal import (
     make_console,
-    make_errors,
+    print_json,
     print_named_modes,
     print_sources,
     print_warnings,
     said_stages,
+    say,
 )
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code, print_answers, print_details
 from orchestrator.errors import InputError
@@ -33,33 +33,20 @@ from orchestrator.study.modes import modes_json
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
-    parser.add_argument(
-        "--range",
-        type=frequency_range,
-        default=ELECTROMECHANICAL_HZ,
-        metavar="LO:HI",
-        help="frequencies shown [Hz] (default: 0.1:2)",
-    )
+    add_range_argument(parser, "frequencies shown [Hz] (default: 0.1:2)")
     parser.add_argument(
         "--critical",
-        type=percent,
+        type=read_percent,
         nargs="?",
         const=0.2,
         metavar="PERCENT",
         help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
     )
-    parser.add_argument(
-        "--directional",
-        action="store_true",
-        help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
-    )
-    parser.add_argument(
-        "--black-box",
-        action="store_true",
-        help="identify the components that hide their states from their inputs and outputs",
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write modes, participation, shapes and plots there")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    switch(parser, "--directional", "linearise with the FMUs' own directional derivatives instead of by perturbation "
+           "(with --native)")  # fmt: skip
+    switch(parser, "--black-box", "identify the components that hide their states from their inputs and outputs")
+    option(parser, "--out", "DIR", "write modes, participation, shapes and plots there", read=Path)
+    switch(parser, "--json", "print JSON")
     add_verdict_argument(parser)
     add_details_argument(parser)
 
@@ -94,21 +81,22 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
     written = []
     if folder:
         from orchestrator.results.staging import new_run_id, staged  # noqa: PLC0415 - only here
+        from orchestrator.results.storage import save_json  # noqa: PLC0415 - only here
         from orchestrator.study.files import save_modes  # noqa: PLC0415 - plots: a second to import
 
         written = ["modes.csv", "participation.csv", "mode_shapes.csv"]
         with staged(folder, new_run_id()) as staging:
             plots = [path.name for path in save_modes(results, staging)]
-            written += [*sorted(path.name for path in staging.glob("power_flow_*.csv")), *plots]
+            save_json(modes_json(results), staging / "modes.json")
+            written += ["modes.json", *sorted(path.name for path in staging.glob("power_flow_*.csv")), *plots]
     weights = [] if options.black_box else load_model_weights(scenarios, results, options.range)
     if options.json:
-        print(json.dumps(modes_json(results, weights), indent=1, ensure_ascii=False))
+        print_json(modes_json(results, weights))
         return exit_code(options, [r.stability for r in results])
     console = make_console()
     print_answers(console, [of_modes(r) for r in results], results)
     print_warnings(results)
-    for weight in weights:
-        make_errors().print(f"[bold yellow]question:[/bold yellow] {escape(weight)}")
+    say("question", weights)
     for result in results:
         console.print(tables.all_modes(result), "")
     print_named_modes(console, results)

@@ -15,18 +15,11 @@ from orchestrator.report.progress import progress_bar
 
 Result = TypeVar("Result")
 
-EVERY = 10.0
-"""Where there is no terminal to draw a bar on, a line says how far it is after so long [s]."""
+EVERY = 10.0  # where there is no terminal to draw a bar on, a line says how far it is after so long [s]
 
 
 class _Lines:
-    """Says how far a study is, at its begin and then every `EVERY` seconds.
-
-    Parameters
-    ----------
-    told
-        Of what, and what is counted; nothing is said where None.
-    """
+    """Says how far ``told`` (a study, and what it counts) is, at its begin and then every `EVERY` seconds."""
 
     def __init__(self, told: tuple[str, str] | None) -> None:
         self._told, self._next = told, 0.0
@@ -50,15 +43,7 @@ class Progressing:
         console: Console,
         told: tuple[str, str] | None = None,
     ) -> Result:
-        """Run the study, and close its executor.
-
-        Parameters
-        ----------
-        study
-            Computes all points; it is given a callback for how many are done, of how many.
-        told
-            Of what, and what is counted, for lines on standard error where there is no terminal; no lines where None.
-        """
+        """Run the study, and close its executor; ``told`` is for lines on standard error where there is no terminal."""
         lines = _Lines(None if console.is_terminal or console.is_jupyter else told)
         with progress_bar(console) as bar:
             task = bar.add_task("Points", total=None)

@@ -1,7 +1,6 @@
 """``gfor run``: steady state, modes and time response of a case's scenarios."""
 
 import argparse
-import json
 import warnings
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -11,8 +10,9 @@ from typing import Any
 from rich.markup import escape
 
 from orchestrator.api.scenario import RunEndedWarning, Scenario
+from orchestrator.asked import read_whole
 from orchestrator.cli import checkpoints, federates, like, run_request
-from orchestrator.cli.arguments import seconds, threads, tolerance
+from orchestrator.cli.arguments import option, repeatable, seconds, switch, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
@@ -20,10 +20,13 @@ from orchestrator.cli.terminal import (
     make_console,
     make_errors,
     print_findings,
+    print_json,
     print_recording_questions,
     print_warnings,
+    say,
 )
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
+from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, ResultsError, RunInterruptedError
 from orchestrator.federation.choice import Federates
@@ -41,25 +44,19 @@ from orchestrator.study.run import RunResult
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, optional=True, schedule=True)
-    parser.add_argument("--stop", type=seconds, metavar="T", help="stop time [s], e.g. 5 or '500 ms'")
-    parser.add_argument(
-        "--tolerance",
-        type=tolerance,
-        metavar="TOL",
-        help="take steps as long as this error of a coupled output allows, from 1e-8 to 0.1, such as 1e-4; needs FMUs "
-        "that save their state (default: fixed steps, or the case's tolerance)",
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/<case>)")
+    option(parser, "--stop", "T", "stop time [s], e.g. 5 or '500 ms'", read=seconds)
+    option(parser, "--tolerance", "TOL", "take steps as long as this error of a coupled output allows, from 1e-8 to "
+           "0.1, such as 1e-4; needs FMUs that save their state (default: fixed steps, "
+           "or the case's tolerance)", read=tolerance)  # fmt: skip
+    repeatable(parser, "--force", "'UNIT FREQUENCY AMPLITUDE'", "let a unit's power reference swing, in the place of "
+               "the case's events: 'sg35 0.8 Hz 2 %%', or with more words 'sg35.exciter.V_ref 0.8 Hz 2 %% square from "
+               "2 s' (repeatable)")  # fmt: skip
+    option(parser, "--out", "DIR", "folder for results (default: results/<case>)", read=Path)
     parser.add_argument("--no-csv", dest="csv", action="store_false", help="write trajectories as .nc only")
-    parser.add_argument("--linear", action="store_true", help="lay the linear model's response over the simulated one")
-    parser.add_argument(
-        "--threads",
-        type=threads,
-        metavar="N",
-        help="threads that step native FMUs (default: as many as are faster than one, up to one for each core); "
-        "no value depends on it",
-    )
-    parser.add_argument("--json", action="store_true", help="print the summary as JSON")
+    switch(parser, "--linear", "lay the linear model's response over the simulated one")
+    option(parser, "--threads", "N", "threads that step native FMUs (default: as many as are faster than one, up to "
+           "one for each core); no value depends on it", read=read_whole(1, MOST_THREADS))  # fmt: skip
+    switch(parser, "--json", "print the summary as JSON")
     add_verdict_argument(parser)
     add_details_argument(parser)
     run_request.add_arguments(parser)
@@ -131,7 +128,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     early_end = None if stopped is None else _early_end(*stopped, scenarios, results)
     plots = _save_together(results, folder, run_id, stopped, early_end)
     if options.json:
-        print(json.dumps([summary_of(r) for r in results], indent=1, ensure_ascii=False))
+        print_json([summary_of(r) for r in results])
     else:
         print_run(console, results, early_end, details=options.details)
         written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
@@ -157,7 +154,7 @@ def _say_unfinished(folder: Path) -> None:
             f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; `gfor identify` "
             "and `gfor compare` read them, and you may delete those that you do not need"
         )
-        make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(text)}")
+        say("warning", [text])
 
 
 def _run_into(

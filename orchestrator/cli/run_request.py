@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.case import built_in_cases
-from orchestrator.cli.arguments import seconds_or_none
+from orchestrator.cli.arguments import option, seconds_or_none, switch
 from orchestrator.errors import InputError
 from orchestrator.results.checkpoint_file import CHECKPOINT, CHECKPOINTS
 from orchestrator.results.staging import new_run_id
@@ -18,12 +18,12 @@ from orchestrator.study.checkpoints import EVERY
 _REQUEST = "request.json"
 _OF_THE_RUN: Mapping[str, Any] = {
     "case": None, "scenario": [], "set": [], "parameters": [], "step": None, "schedule": None, "stop": None,
-    "tolerance": None, "linear": False, "csv": True, "require_checkpoint": False, "checkpoint": None,
+    "tolerance": None, "sharing": None, "force": [], "linear": False, "csv": True, "require_checkpoint": False,
+    "checkpoint": None,
 }  # fmt: skip
 """Options as they are where nothing is said; a resumed run keeps those that it had."""
 
-_GIVEN_ANEW = "checkpoint"
-"""The one of them that may go with ``--resume``: no value depends on it."""
+_GIVEN_ANEW = "checkpoint"  # the one of them that may go with ``--resume``: no value depends on it
 
 _NOT_WITH_RESUME: Mapping[str, Any] = {
     **{name: unsaid for name, unsaid in _OF_THE_RUN.items() if name != _GIVEN_ANEW},
@@ -38,26 +38,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help=f"wall-clock time between two checkpoints (default: {EVERY:g}); 0 writes none",
     )
-    parser.add_argument(
-        "--require-checkpoint",
-        action="store_true",
-        help="refuse a run that could not be resumed, because an FMU cannot serialise its state",
-    )
-    parser.add_argument(
-        "--resume",
-        type=Path,
-        metavar="DIR",
-        help="go on with the interrupted run whose results are in DIR; case and options are those that it had",
-    )
+    switch(parser, "--require-checkpoint", "refuse a run that could not be resumed, because an FMU cannot serialise "
+           "its state")  # fmt: skip
+    option(parser, "--resume", "DIR", "go on with the interrupted run whose results are in DIR; case and options are "
+           "those that it had", read=Path)  # fmt: skip
 
 
 def with_request(options: argparse.Namespace) -> argparse.Namespace:
     """The options of a new run, or those of the run that is to be resumed, and its id as ``run``.
 
-    Raises
-    ------
-    InputError
-        If there is no case, nothing to resume, or something is asked of a resumed run that it did not have.
+    Raises `InputError` if there is no case, nothing to resume, or something is asked of a resumed run that it did not
+    have.
     """
     if options.resume is None:
         if options.case is None:
@@ -104,13 +95,7 @@ def _refuse_other_options(options: argparse.Namespace) -> None:
 
 
 def how_it_goes_on(options: argparse.Namespace) -> str:
-    """The command that resumes a run that was ended; "" where it would be refused.
-
-    Parameters
-    ----------
-    options
-        As `with_request` gave them; ``out`` is None until the folder of the results is known.
-    """
+    """The command that resumes a run that was ended; "" where it would be refused, or its folder is not known."""
     folder = options.out
     if folder is None or asked_by(folder) != options.run:  # another run's request is not this one's
         return ""
@@ -129,13 +114,7 @@ def asked_by(folder: Path) -> str | None:
 
 
 def keep_request(folder: Path, options: argparse.Namespace) -> None:
-    """Keep what a run was asked for beside its checkpoints.
-
-    Parameters
-    ----------
-    options
-        As `with_request` gave them.
-    """
+    """Keep the options of `with_request` beside the checkpoints."""
     content = {name: getattr(options, name) for name in _OF_THE_RUN} | {"run": options.run}
     content["case"] = options.case if options.case in built_in_cases() else str(Path(options.case).resolve())
     content["parameters"] = [str(path.resolve()) for path in options.parameters]

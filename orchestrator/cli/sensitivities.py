@@ -1,19 +1,17 @@
 """``gfor sensitivities``: how each parameter of each FMU moves a mode."""
 
 import argparse
-import json
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import Scenario
-from orchestrator.cli.arguments import frequency_range
-from orchestrator.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.cli.terminal import make_console, print_warnings, warn
+from orchestrator.cli.arguments import option, repeatable, switch
+from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, chosen
+from orchestrator.cli.terminal import make_console, print_json, print_warnings, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
@@ -23,36 +21,18 @@ from orchestrator.sensitivities.tables import left_out, sensitivity_table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    parser.add_argument(
-        "--mode",
-        metavar="NAME",
-        help="a mode that the case names, or 'critical' for the least damped one (default: the first named one)",
-    )
-    parser.add_argument(
-        "--parameter",
-        action="append",
-        default=[],
-        metavar="COMPONENT.PARAMETER",
-        help="only this one, tunable or fixed; also a pattern (repeatable; default: all tunable ones)",
-    )
-    parser.add_argument(
-        "--fixed", action="store_true", help="fixed parameters too: the case is started several times for each"
-    )
-    parser.add_argument(
-        "--held",
-        action="store_true",
-        help="partial derivatives at the held operating point, instead of the total ones; tunable parameters only",
-    )
-    parser.add_argument(
-        "--range", type=frequency_range, default=ELECTROMECHANICAL_HZ, metavar="LO:HI", help="frequencies [Hz] (0.1:2)"
-    )
-    parser.add_argument(
-        "--directional",
-        action="store_true",
-        help="linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)",
-    )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write sensitivities.csv and sensitivities.json there")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    option(parser, "--mode", "NAME", "a mode that the case names, or 'critical' for the least damped one (default: the "
+           "first named one)")  # fmt: skip
+    repeatable(parser, "--parameter", "COMPONENT.PARAMETER", "only this one, tunable or fixed; also a pattern "
+               "(repeatable; default: all tunable ones)")  # fmt: skip
+    switch(parser, "--fixed", "fixed parameters too: the case is started several times for each")
+    switch(parser, "--held", "partial derivatives at the held operating point, instead of the total ones; tunable "
+           "parameters only")  # fmt: skip
+    add_range_argument(parser)
+    switch(parser, "--directional", "linearise with the FMUs' own directional derivatives instead of by perturbation "
+           "(with --native)")  # fmt: skip
+    option(parser, "--out", "DIR", "write sensitivities.csv and sensitivities.json there", read=Path)
+    switch(parser, "--json", "print JSON")
     add_verdict_argument(parser)
 
 
@@ -83,7 +63,7 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
             written += one.save(folder / scenario.name)
     results = [one.result.modes for one in found]
     if options.json:
-        print(json.dumps([one.as_json() for one in found], indent=1, ensure_ascii=False))
+        print_json([one.as_json() for one in found])
     else:
         console = make_console()
         print_verdicts(console, results)

@@ -1,14 +1,13 @@
 """``gfor steps``: the largest communication step within a given error, for each schedule."""
 
 import argparse
-import json
 
 import numpy as np
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, damping_percent
-from orchestrator.cli.arguments import frequency_range, seconds
-from orchestrator.cli.case_arguments import add_case_arguments, prepare
-from orchestrator.cli.terminal import make_console
+from orchestrator.analysis.modes import damping_percent
+from orchestrator.cli.arguments import option, seconds, switch
+from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, prepare
+from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.report.tables import make_table
 from orchestrator.study.step_choice import TRIED, Allowed, StepChoice, TriedStep, choose_step, step_choice_json
@@ -16,13 +15,8 @@ from orchestrator.study.step_choice import TRIED, Allowed, StepChoice, TriedStep
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    parser.add_argument(
-        "--error",
-        type=_error,
-        default=Allowed(),
-        metavar="HZ:POINTS",
-        help="accepted error of a critical mode's frequency [Hz] and damping [points] (default: 0.001:0.1)",
-    )
+    option(parser, "--error", "HZ:POINTS", "accepted error of a critical mode's frequency [Hz] and damping [points] "
+           "(default: 0.001:0.1)", read=_error, default=Allowed())  # fmt: skip
     parser.add_argument(
         "--try",
         dest="tried",
@@ -38,14 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=None,
         help=f"schedule to try (repeatable; default: {', '.join(TRIED)})",
     )
-    parser.add_argument(
-        "--range",
-        type=frequency_range,
-        default=ELECTROMECHANICAL_HZ,
-        metavar="LO:HI",
-        help="frequencies of the critical modes [Hz] (default: 0.1:2)",
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_range_argument(parser, "frequencies of the critical modes [Hz] (default: 0.1:2)")
+    switch(parser, "--json", "print JSON")
 
 
 def _error(text: str) -> Allowed:
@@ -53,9 +41,9 @@ def _error(text: str) -> Allowed:
     try:
         hertz, points = map(float, parts)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} is not of the form HZ:POINTS, such as 0.001:0.1") from None
+        raise ValueError(f"{text!r} is not of the form HZ:POINTS, such as 0.001:0.1") from None
     if not (0 < hertz < np.inf and 0 < points < np.inf):
-        raise argparse.ArgumentTypeError(f"{text!r}: both errors must be above 0 and finite")
+        raise ValueError(f"{text!r}: both errors must be above 0 and finite")
     return Allowed(hertz, points)
 
 
@@ -72,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         for prepared in prepare(options)
     ]
     if options.json:
-        print(json.dumps([step_choice_json(choice) for choice in choices], indent=1, ensure_ascii=False))
+        print_json([step_choice_json(choice) for choice in choices])
     else:
         for choice in choices:
             _print(choice)

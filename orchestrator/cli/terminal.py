@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.markup import escape
 
 from orchestrator.errors import Problem
@@ -29,6 +30,23 @@ def make_console(*, stderr: bool = False) -> Console:
 def make_errors() -> Console:
     """Standard error, one line for each message."""
     return Console(stderr=True, soft_wrap=True, highlight=False, emoji=False)
+
+
+def print_json(content: Any) -> None:
+    """The only thing on standard output of a command with ``--json``."""
+    print(json.dumps(content, indent=1, ensure_ascii=False))
+
+
+def print_parts(console: Console, parts: Iterable[RenderableType]) -> None:
+    """Tables, and lines as rich markup."""
+    for part in parts:
+        console.print(part, soft_wrap=isinstance(part, str), highlight=False)
+
+
+def say(kind: str, texts: Iterable[str]) -> None:
+    """Sentences of a kind, such as ``warning``, on standard error."""
+    for text in texts:
+        make_errors().print(f"[bold yellow]{kind}:[/bold yellow] {escape(text)}")
 
 
 def print_named_modes(console: Console, results: Sequence[ModesResult]) -> None:
@@ -72,9 +90,7 @@ def print_recording_questions(scenarios: Iterable[PreparedScenario]) -> None:
 
 
 def _ask(questions: Iterable[Problem]) -> None:
-    console = make_errors()
-    for question in dict.fromkeys(questions):
-        console.print(f"[bold yellow]question:[/bold yellow] {escape(str(question))}")
+    say("question", dict.fromkeys(map(str, questions)))
 
 
 def print_warnings(results: Sequence[ModesResult]) -> None:
@@ -86,19 +102,15 @@ def print_warnings(results: Sequence[ModesResult]) -> None:
 
 def warn(scenario: str, texts: Iterable[str]) -> None:
     """Say on standard error what is to be borne in mind of a scenario."""
-    console = make_errors()
-    for text in texts:
-        console.print(f"[bold yellow]warning:[/bold yellow] {escape(f'scenario {scenario!r}: {text}')}")
+    say("warning", (f"scenario {scenario!r}: {text}" for text in texts))
 
 
 def print_findings(results: Sequence[RunResult]) -> None:
     """Say on standard error what runs did wrong; a failure is said where the study ends."""
-    console = make_errors()
     for result in results:
-        for finding in result.findings:
-            if finding.message not in (str(result.failure), *result.modes.warnings):
-                name = result.modes.prepared.name
-                console.print(f"[bold yellow]found:[/bold yellow] {escape(f'scenario {name!r}: {finding.message}')}")
+        known = (str(result.failure), *result.modes.warnings)
+        name, found = result.modes.prepared.name, [f.message for f in result.findings if f.message not in known]
+        say("found", (f"scenario {name!r}: {text}" for text in found))
 
 
 @contextmanager
@@ -118,8 +130,7 @@ def saying_warnings() -> Iterator[None]:
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", ResultsWarning)
         yield
-    for text in dict.fromkeys(str(w.message) for w in found if issubclass(w.category, ResultsWarning)):
-        make_errors().print(f"[bold yellow]warning:[/bold yellow] {escape(text)}")
+    say("warning", dict.fromkeys(str(w.message) for w in found if issubclass(w.category, ResultsWarning)))
     for other in found:
         if not issubclass(other.category, ResultsWarning):
             warnings.warn_explicit(other.message, other.category, other.filename, other.lineno)

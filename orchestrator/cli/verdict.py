@@ -8,21 +8,17 @@ from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.stability import Stability
+from orchestrator.cli.arguments import switch
 from orchestrator.report.verdict import COLOURS, VerdictSentence
 from orchestrator.study import tables
 from orchestrator.study.answers import ScenarioAnswer, answers_table, outside
 from orchestrator.study.modes import ModesResult
 
-NOT_MET = 3
-"""Exit code where a requirement is not met, or is not known to be."""
+NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
 
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--fail-unstable",
-        action="store_true",
-        help="end with exit code 1 unless everything is known to be stable, at any frequency",
-    )
+    switch(parser, "--fail-unstable", "end with exit code 1 unless everything is known to be stable, at any frequency")
 
 
 def print_stability(
@@ -55,9 +51,7 @@ def _headline(verdicts: Mapping[str, Stability]) -> str:
 
 
 def add_details_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--details", action="store_true", help="print also the power flow, and each verdict with its eigenvalue"
-    )
+    switch(parser, "--details", "print also the power flow, and each verdict with its eigenvalue")
 
 
 def print_answers(console: Console, answers: Sequence[ScenarioAnswer], results: Sequence[ModesResult]) -> None:

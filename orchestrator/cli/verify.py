@@ -5,21 +5,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
 from orchestrator.certification.codes.rows_anew import chosen_rows, verify_rows
+from orchestrator.certification.form import NORM
+from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED, chosen_points, verify_points
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
-from orchestrator.certification.verification import (
-    TOLERANCE,
-    TOLERANCE_IDENTIFIED,
-    Verification,
-    chosen_points,
-    least_damped,
-    read_certificate,
-    verify_files,
-    verify_points,
-)
+from orchestrator.certification.verification import Verification, read_certificate, verify_files
 from orchestrator.cli.arguments import reactances
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.terminal import make_console
@@ -53,91 +46,76 @@ def run(options: argparse.Namespace) -> int:
     -------
     The exit code of the certificate's verdict where it holds, else 5.
     """
-    if (code := read_code_certificate(options.certificate)) is not None:
-        return _run_code(options, *code)
     folder, content = read_certificate(options.certificate)
-    if options.rows:
-        raise InputError(f"--rows: {folder} is the certificate of a damping test, which has points; give --points, "
-                         "with line reactances")  # fmt: skip
+    norm = content["format"] == NORM
     console = make_console(stderr=options.json)
-    wanted = [p["X_L"] for p in content["points"]] if options.all else options.points or (least_damped(content),)
-    points = chosen_points(content, () if options.files_only else wanted)
+    chosen = _chosen(options, folder, content, norm=norm)
     found = verify_files(folder, content)
-    computed = bool(points) and found.holds
+    computed = bool(chosen) and found.holds
     if computed:
-        with progress_bar(console) as bar:
-            task = bar.add_task("Points", total=2 * len(points))
-            executor = choose_executor(options, ["orchestrator.certification.point"])
-            try:
-                again = verify_points(
-                    folder, content, points, executor, lambda done, _: bar.update(task, completed=done)
-                )
-            finally:
-                executor.close()
+        again = _anew(options, folder, content, chosen, console, norm=norm)
         found = Verification(found.faults + again.faults, found.agreed + again.agreed)
     if options.json:
-        said = {"holds": found.holds, "verdict": content["verdict"], "points": content["judged"],
+        said = {"holds": found.holds, "verdict": content["verdict"], **({"points": content["judged"]} if norm else {}),
                 "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
-                "agreed": found.agreed, "computed": [p["X_L"] for p in points] if computed else []}  # fmt: skip
+                "agreed": found.agreed, "computed": chosen if computed else []}  # fmt: skip
         print(json.dumps(said, indent=1, ensure_ascii=False))
-        return _exit_code(found, content)
+    else:
+        _show(found, content, chosen, console, computed=computed, norm=norm)
+    return exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
+
+
+def _chosen(options: argparse.Namespace, folder: Path, content: dict[str, Any], *, norm: bool) -> list[Any]:
+    """Line reactances, or names of rows, that are computed anew."""
+    if norm and options.rows:
+        raise InputError(f"--rows: {folder} is the certificate of a damping test, which has points; give --points, "
+                         "with line reactances")  # fmt: skip
+    if options.points and not norm:
+        raise InputError(f"--points: {folder} is the certificate of a grid code, which has rows; give --rows, with "
+                         "their names")  # fmt: skip
+    if options.files_only:
+        return []
+    if norm:
+        return chosen_points(content, options.points or (), every=options.all)
+    return chosen_rows(content, options.rows or (), every=options.all)
+
+
+def _anew(
+    options: argparse.Namespace, folder: Path, content: dict[str, Any], chosen: list[Any], console: Console, *,
+    norm: bool,
+) -> Verification:  # fmt: skip
+    verify, module = (verify_points, "point") if norm else (verify_rows, "codes.bench_point")
+    executor = choose_executor(options, [f"orchestrator.certification.{module}"])
+    with progress_bar(console) as bar:
+        task = bar.add_task("Points" if norm else "Rows", total=len(chosen) * (2 if norm else 1))
+        try:
+            return verify(folder, content, chosen, executor, lambda done, _: bar.update(task, completed=done))
+        finally:
+            executor.close()
+
+
+def _show(
+    found: Verification, content: dict[str, Any], chosen: list[Any], console: Console, *, computed: bool, norm: bool
+) -> None:
     for text in found.agreed:
         console.print(f"[green]agrees[/]        {escape(text)}")
     for text in found.faults:
         console.print(f"[bold red]does not agree[/] {escape(text)}")
     console.print("")
-    if points and not computed:
-        console.print("No point was computed anew: with other files that would say nothing of this certificate.")
-    if computed:
+    one, every = ("point", content["points"]) if norm else ("row", content["rows"])
+    if chosen and not computed:
+        console.print(f"No {one} was computed anew: with other files that would say nothing of this certificate.")
+    if computed and norm:
         console.print(f"Allowed are differences of {TOLERANCE:g} of an eigenvalue and of a signal's range "
                       f"({TOLERANCE_IDENTIFIED:g} of an eigenvalue with an identified converter).")  # fmt: skip
+    if computed and len(chosen) < len(every):
+        console.print(f"{len(chosen)} of {len(every)} {one}s were computed anew; --all takes every one.")
     if found.holds:
         console.print("The certificate holds. That is no proof of who made it: hashes guard against accidents only.")
-        console.print(_verdict(content), soft_wrap=True, highlight=False)
+        console.print(_verdict(content, norm=norm), soft_wrap=True, highlight=False)
     else:
         count = f"{len(found.faults)} disagreement{'' if len(found.faults) == 1 else 's'}"
         console.print(f"[bold red]The certificate does not hold: {count}.[/]")
-    return _exit_code(found, content)
-
-
-def _run_code(options: argparse.Namespace, folder: Path, content: dict[str, Any]) -> int:
-    """The certificate of a code on the test bench: its hashes, its rows judged again, and some computed anew."""
-    if options.points:
-        raise InputError(f"--points: {folder} is the certificate of a grid code, which has rows; give --rows, with "
-                         "their names")  # fmt: skip
-    console = make_console(stderr=options.json)
-    found = verify_code(folder, content)
-    rows = [] if options.files_only else chosen_rows(content, options.rows or (), every=options.all)
-    computed = bool(rows) and found.holds
-    if computed:
-        with progress_bar(console) as bar:
-            task = bar.add_task("Rows", total=len(rows))
-            executor = choose_executor(options, ["orchestrator.certification.codes.bench_point"])
-            try:
-                again = verify_rows(folder, content, rows, executor, lambda done, _: bar.update(task, completed=done))
-            finally:
-                executor.close()
-        found = Verification(found.faults + again.faults, found.agreed + again.agreed)
-    if options.json:
-        print(json.dumps({"holds": found.holds, "verdict": content["verdict"], "faults": found.faults,
-                          "agreed": found.agreed, "computed": rows if computed else []},
-                         indent=1, ensure_ascii=False))  # fmt: skip
-        return _exit_code(found, content)
-    for text in found.agreed:
-        console.print(f"[green]agrees[/]        {escape(text)}")
-    for text in found.faults:
-        console.print(f"[bold red]does not agree[/] {escape(text)}")
-    if rows and not computed:
-        console.print("No row was computed anew: with other files that would say nothing of this certificate.")
-    if computed and len(rows) < len(content["rows"]):
-        console.print(f"{len(rows)} of {len(content['rows'])} rows were computed anew; --all takes every one.")
-    holds = "The certificate holds" if found.holds else "[bold red]The certificate does not hold[/]"
-    console.print(f"{holds}; its verdict: {escape(content['verdict'])}.")
-    return _exit_code(found, content)
-
-
-def _exit_code(found: Verification, content: dict[str, Any]) -> int:
-    return exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
 
 
 def _refused(content: dict[str, Any]) -> bool:
@@ -145,8 +123,8 @@ def _refused(content: dict[str, Any]) -> bool:
     return content["acceptance"] is not None and not content["acceptance"]["trusted"]
 
 
-def _verdict(content: dict[str, Any]) -> str:
+def _verdict(content: dict[str, Any], *, norm: bool) -> str:
     colour = "green" if content["verdict"] == PASSES and not _refused(content) else "red"
+    judged = f", {escape(content['judged'])} line reactances of the norm judged" if norm else ""
     tail = "; acceptance tests of the FMU failed" if _refused(content) else ""
-    line = f"Its verdict: [bold {colour}]{escape(content['verdict'])}[/], "
-    return f"{line}{escape(content['judged'])} line reactances of the norm judged{tail}."
+    return f"Its verdict: [bold {colour}]{escape(content['verdict'])}[/]{judged}{tail}."

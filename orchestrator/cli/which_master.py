@@ -1,7 +1,6 @@
 """``gfor which-master``: which schedule another tool runs."""
 
 import argparse
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,8 @@ from rich.console import Console
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import TARGETS, host_platform
 from fmus.toolchain.extras import require
-from orchestrator.cli.terminal import make_console
+from orchestrator.cli.arguments import option, repeatable, switch
+from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import Candidate
 from orchestrator.interop.instructions import instructions
@@ -39,15 +39,14 @@ _WORDS: dict[str, tuple[str, dict[Any, str]]] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", type=Path, nargs="?", metavar="RESULT.csv", help="what the tool gave")
-    parser.add_argument("--build", type=Path, metavar="DIR", help="write the probe pair and how to run it")
+    option(parser, "--build", "DIR", "write the probe pair and how to run it", read=Path)
     parser.add_argument("--platform", action="append", choices=sorted(TARGETS),
                         help="with --build: compile for this one (repeatable; default: this machine's)")  # fmt: skip
-    parser.add_argument("--step", type=float, default=STEP_SIZE, metavar="H",
-                        help=f"communication step that the tool had [s] ({STEP_SIZE:g})")  # fmt: skip
-    parser.add_argument("--stop", type=float, default=STOP_TIME, metavar="T", help=f"its duration [s] ({STOP_TIME:g})")
-    parser.add_argument("--column", action="append", default=[], metavar="SIGNAL=HEADING",
-                        help="heading of the column for time, a.y, b.y, … (repeatable)")  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    option(parser, "--step", "H",
+           f"communication step that the tool had [s] ({STEP_SIZE:g})", read=float, default=STEP_SIZE)  # fmt: skip
+    option(parser, "--stop", "T", f"its duration [s] ({STOP_TIME:g})", read=float, default=STOP_TIME)
+    repeatable(parser, "--column", "SIGNAL=HEADING", "heading of the column for time, a.y, b.y, … (repeatable)")
+    switch(parser, "--json", "print JSON")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -59,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     named = dict(_named(text) for text in options.column)
     verdict = identify(read_probe_result(options.result, named), options.step, options.stop)
     if options.json:
-        print(json.dumps(_json(verdict), indent=1, ensure_ascii=False))
+        print_json(_json(verdict))
     else:
         _print(verdict, make_console())
     return 0 if verdict.fits else 1

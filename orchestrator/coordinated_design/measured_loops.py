@@ -14,11 +14,8 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.step_awareness import other_step
 from orchestrator.errors import AnalysisError
 
-UNIT_GAIN = 50.0
-"""Gain with which a loop is measured [pu]; the signal stays far below its limit."""
-
-_RANK = 1e-6
-"""A loop has one signal: the second singular value of its effect is below this part of the first."""
+UNIT_GAIN = 50.0  # gain with which a loop is measured [pu]; the signal stays far below its limit
+_RANK = 1e-6  # A loop has one signal: the second singular value of its effect is below this part of the first
 
 
 def measure(master: Master, model: LinearModel, blocks: Blocks, places: Sequence[PodPlace]) -> OpenLoops:

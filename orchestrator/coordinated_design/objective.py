@@ -14,9 +14,7 @@ from orchestrator.coordinated_design.open_loops import LEAD, OpenLoops, PodPlace
 BANDS_HZ = (*ELECTROMECHANICAL_HZ, 10.0, 100.0)
 """Between these frequencies [Hz] other modes are compared with those that were there before."""
 
-ALLOWED = 1e-3
-"""The least damping ratio of a band may become worse by this where it is below the bound already."""
-
+ALLOWED = 1e-3  # the least damping ratio of a band may become worse by this where it is below the bound already
 UNMOVED = 0.02
 """Loops hardly move a mode that all of them together move by less than this part of its size, by their largest gains.
 It counts as others do; beside it a search raises the least damping of the rest."""
@@ -31,38 +29,20 @@ Naming = Callable[[Sequence[str], list[Mode]], Mapping[str, Mode]]
 
 @dataclass(frozen=True)
 class Aim:
-    """Which modes a design damps, and the damping ratio below which it may push no other.
+    """Which modes a design damps, and the damping ratio below which it may push no other."""
 
-    Attributes
-    ----------
-    names
-        Of the case's modes; none for all electromechanical ones.
-    naming
-        Gives the named modes; None where none is named.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the case's modes; none for all electromechanical ones
     least: float
-    naming: Naming | None = None
+    naming: Naming | None = None  # gives the named modes; None where none is named
 
 
 @dataclass(frozen=True)
 class Watched:
-    """A mode at one operating point.
+    """A mode at one operating point."""
 
-    Attributes
-    ----------
-    value
-        λ [rad/s].
-    place
-        Its column among the eigenvectors.
-    floor
-        Damping ratio that it may not fall below; None for a mode that the design damps.
-    """
-
-    value: complex
-    place: int
-    floor: float | None
+    value: complex  # λ [rad/s]
+    place: int  # its column among the eigenvectors
+    floor: float | None  # damping ratio that it may not fall below; None for a mode that the design damps
     hardly_moved: bool = False
 
     @property
@@ -81,12 +61,8 @@ _SWINGING = band_of(2j * np.pi)
 def floors_of(values: Iterable[complex], least: float) -> dict[int, float]:
     """The damping ratio, by band, that other modes may not fall below.
 
-    Parameters
-    ----------
-    values
-        The other modes without the controllers [rad/s], one of each pair.
-    least
-        The bound; a band that has a mode below it keeps what it has, less `ALLOWED`.
+    ``values``: the other modes without the controllers [rad/s], one of each pair.
+    ``least``: the bound; a band that has a mode below it keeps what it has, less `ALLOWED`.
     """
     floors = dict.fromkeys(range(len(BANDS_HZ) + 1), least)
     for value in values:
@@ -98,14 +74,9 @@ def floors_of(values: Iterable[complex], least: float) -> dict[int, float]:
 def split(values: Complex, targets: Iterable[int] | None, floors: Mapping[int, float]) -> list[Watched]:
     """All oscillations of a spectrum, with what is asked of each.
 
-    Parameters
-    ----------
-    values
-        All eigenvalues [rad/s].
-    targets
-        Places of the modes that the design damps; None for all electromechanical ones.
-    floors
-        As `floors_of` gives them.
+    ``values``: all eigenvalues [rad/s].
+    ``targets``: places of the modes that the design damps; None for all electromechanical ones.
+    ``floors``: as `floors_of` gives them.
     """
     chosen = None if targets is None else set(targets)
     found = []
@@ -124,24 +95,11 @@ def growth(values: Complex) -> float:
 
 @dataclass(frozen=True)
 class Worth:
-    """What a setting is worth at one or at all operating points.
-
-    Attributes
-    ----------
-    worst
-        Least damping ratio of the modes that the design damps; 1 where there are none.
-    breach
-        By how much another mode is below its floor, or the system grows more than before [1/s]; at most 0 if neither.
-    point
-        Number of the point with the least damping.
-    rest
-        Least damping ratio of those that the loops move more than hardly; at least ``worst``.
-    """
-
-    worst: float
+    worst: float  # least damping ratio of the modes that the design damps; 1 where there are none
+    # by how much another mode is below its floor, or the system grows more than before [1/s]; at most 0 if neither
     breach: float
-    point: int = 0
-    rest: float = 1.0
+    point: int = 0  # number of the point with the least damping
+    rest: float = 1.0  # least damping ratio of those that the loops move more than hardly; at least ``worst``
 
     @property
     def allowed(self) -> bool:
@@ -155,10 +113,7 @@ _ROUNDING = 1e-7
 def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, point: int = 0) -> Worth:
     """The worth of a spectrum.
 
-    Parameters
-    ----------
-    growing, growing_before
-        As `growth` gives them, with the setting and without it [1/s].
+    ``growing`` and ``growing_before``: as `growth` gives them, with the setting and without it [1/s].
     """
     damped = [mode for mode in watched if mode.floor is None]
     worst = min((mode.damping for mode in damped), default=1.0)
@@ -171,11 +126,8 @@ def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, 
 class RatedPoint:
     """One operating point of the search: its loops, and what its modes may not fall below.
 
-    Parameters
-    ----------
-    largest
-        The largest gain of every loop that may be closed [pu]; None where all modes count, also those that no loop
-        moves.
+    ``largest``: the largest gain of every loop that may be closed [pu]; None where all modes count, also those that no
+    loop moves.
     """
 
     def __init__(self, number: int, loops: OpenLoops, aim: Aim, largest: Mapping[PodPlace, float] | None) -> None:

@@ -15,11 +15,8 @@ from orchestrator.arrays import Complex, Matrix, Vector
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, lead_lag_turning
 
-REDUCED = 300
-"""Systems with more states are reduced to their slow modes."""
-
-_FASTEST = 2 * np.pi * 30
-"""Faster modes than this [rad/s] answer as they do at rest, unless loops move them."""
+REDUCED = 300  # systems with more states are reduced to their slow modes
+_FASTEST = 2 * np.pi * 30  # faster modes than this [rad/s] answer as they do at rest, unless loops move them
 
 LEAD = lead_lag_turning(2 * LARGEST_STAGE_ANGLE, 1.0, 2).filtering_ratio ** -2
 """Two stages of a lead/lag that leads most pass fast signals with this gain."""
@@ -28,14 +25,10 @@ _GAIN, _MOVED, _SLOWEST = 400.0, 0.02, 0.3
 """A mode that loops with this gain [pu] move by less than this part of its size, which counts as at least so much
 [rad/s], stays where it is. Fast modes meet the gain with the lead's on top."""
 
-_TRUE = 1e-6
-"""A reduction whose modes are not those of the system to this part is not taken."""
+_TRUE = 1e-6  # A reduction whose modes are not those of the system to this part is not taken
+_SEEN = (0.05, 4.0)  # modes between these frequencies [Hz] are kept however little they move
 
-_SEEN = (0.05, 4.0)
-"""Modes between these frequencies [Hz] are kept however little they move."""
-
-Setting = Mapping["PodPlace", PodSetting]
-"""The setting of each loop that is closed; the others stay open."""
+Setting = Mapping["PodPlace", PodSetting]  # the setting of each loop that is closed; the others stay open
 
 
 @dataclass(frozen=True, order=True)
@@ -57,44 +50,28 @@ class PodPlace:
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """Eigenvalues of a closed loop.
-
-    Attributes
-    ----------
-    values
-        λ [rad/s]; of a reduced system, those that it left out stand last.
-    left, right
-        Eigenvectors as columns, of a reduced system in its own coordinates and without those that it left out.
-    """
-
-    values: Complex
+    values: Complex  # λ [rad/s]; of a reduced system, those that it left out stand last
+    # left, right: eigenvectors as columns, of a reduced system in its own coordinates and without those that it left
+    # out
     left: Complex
     right: Complex
 
 
 @dataclass(frozen=True)
 class OpenLoops:
-    """ẋ = A·x + U·w and y = V·x + D·w: y are the loops' signals with unit gain, w is what acts in their place.
+    """ẋ = A·x + U·w and y = V·x + D·w: y are the loops' signals with unit gain, w is what acts in their place."""
 
-    Attributes
-    ----------
-    A, U, V, D
-        Shapes (r, r), (r, m), (m, r), (m, m).
-    right, left
-        From the states x to the n states, and back: shapes (n, r) and (r, n); None where both are the same.
-    rest
-        Eigenvalues that the reduction left out [rad/s]: no loop moves them, or they are fast.
-    """
-
+    # A, U, V, D: shapes (r, r), (r, m), (m, r), (m, m)
     A: Vector
     U: Vector
     V: Vector
     D: Vector
     places: tuple[PodPlace, ...]
     names: tuple[str, ...]
+    # right, left: from the states x to the n states, and back: shapes (n, r) and (r, n); None where both are the same
     right: Matrix | None = None
     left: Matrix | None = None
-    rest: Complex | None = None
+    rest: Complex | None = None  # eigenvalues that the reduction left out [rad/s]: no loop moves them, or they are fast
 
     @classmethod
     def of(
@@ -102,12 +79,8 @@ class OpenLoops:
     ) -> "OpenLoops":
         """The system of full matrices, reduced where it is large.
 
-        Parameters
-        ----------
-        A, U, V
-            Shapes (n, n), (n, m), (m, n).
-        D
-            Shape (m, m); none where no loop's signal reaches another, or itself, without a state between.
+        ``A`` and ``U`` and ``V``: shapes (n, n), (n, m), (m, n).
+        ``D``: shape (m, m); none where no loop's signal reaches another, or itself, without a state between.
         """
         whole = cls(A, U, V, np.zeros((len(places), len(places))) if D is None else D, tuple(places), tuple(names))
         return (_reduced(whole) if len(A) > REDUCED else None) or whole
@@ -115,10 +88,7 @@ class OpenLoops:
     def closed(self, setting: Setting) -> Vector:
         """The matrix of the system with some loops closed.
 
-        Returns
-        -------
-        ndarray
-            Shape (r + k, r + k): behind the states x stand those of the lead/lag stages, loop by loop.
+        Returns shape (r + k, r + k): behind the states x stand those of the lead/lag stages, loop by loop.
         """
         used = [k for k, place in enumerate(self.places) if place in setting and setting[place].gain]
         parts = [setting[self.places[k]] for k in used]
@@ -166,10 +136,7 @@ class OpenLoops:
     def whole(self, vector: Complex, *, left: bool = False) -> Complex:
         """An eigenvector of a closed loop in all n states and the stages.
 
-        Parameters
-        ----------
-        vector
-            As `solve` gives it, shape (r + k,).
+        ``vector``: as `solve` gives it, shape (r + k,).
         """
         if self.right is None or self.left is None:
             return vector
@@ -222,12 +189,8 @@ def _seen_by(A: Matrix, V: Matrix) -> NDArray[np.bool_]:
 def _real_form(values: Complex, rows: Complex, columns: Complex) -> tuple[Matrix, Matrix, Matrix]:
     """The real matrix of some modes, with blocks for pairs, and the way from its states to all and back.
 
-    Parameters
-    ----------
-    values
-        λ [rad/s], shape (r,), both of every pair.
-    rows, columns
-        Left and right eigenvectors with rows·columns = 1, shapes (r, n) and (n, r).
+    ``values``: λ [rad/s], shape (r,), both of every pair.
+    ``rows`` and ``columns``: left and right eigenvectors with rows·columns = 1, shapes (r, n) and (n, r).
     """
     real, upper = np.flatnonzero(values.imag == 0), np.flatnonzero(values.imag > 0)
     blocks = [np.array([[value]]) for value in values[real].real]

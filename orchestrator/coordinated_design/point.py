@@ -32,9 +32,7 @@ from orchestrator.screening.preparation import ACCEPT, ItemPreparation, failure
 from orchestrator.screening.record import Item, Status
 from orchestrator.study.naming import named_modes
 
-_MOST_STATES = 2500
-"""All eigenvalues of larger systems take too long for a design."""
-
+_MOST_STATES = 2500  # all eigenvalues of larger systems take too long for a design
 _SHOWN = 3
 
 
@@ -42,12 +40,8 @@ _SHOWN = 3
 class PointsTask:
     """Operating points with outages that are computed together.
 
-    Attributes
-    ----------
-    case, fingerprint, scenario, layers, step_size, trust_fmus
-        As in `orchestrator.screening.point.StretchTask`.
-    places
-        Loops that are measured; none where only the modes are asked for.
+    ``case``, ``fingerprint``, ``scenario``, ``layers``, ``step_size``, ``trust_fmus``: As in
+    `orchestrator.screening.point.StretchTask`.
     """
 
     case: str
@@ -56,51 +50,27 @@ class PointsTask:
     layers: tuple[ParameterFile, ...]
     step_size: float | None
     items: tuple[Item, ...]
-    places: tuple[PodPlace, ...]
+    places: tuple[PodPlace, ...]  # loops that are measured; none where only the modes are asked for
     key: str
     trust_fmus: bool = False
 
 
 @dataclass(frozen=True)
 class PointModes:
-    """What was found at one operating point with one outage.
-
-    Attributes
-    ----------
-    status, text
-        What became of it, and why.
-    doubtful
-        Whether a limit is so close that the linear model is doubtful.
-    values
-        All eigenvalues [rad/s]; empty where nothing was computed.
-    swinging
-        Places of the electromechanical modes, least damped first.
-    named
-        The place of each mode that the case names.
-    who
-        For each of ``swinging``: who takes part most.
-    rightmost
-        The same for the eigenvalue with the largest real part.
-    loops
-        The open loops; None where they were not asked for.
-    clocks
-        Number of states that are coupled with no other, each of which is a zero in ``values``.
-    lasting
-        Whether computing it again would give the same.
-    """
-
+    # status, text: what became of it, and why
     status: Status
     text: str = ""
     warnings: tuple[str, ...] = ()
-    doubtful: bool = False
+    doubtful: bool = False  # whether a limit is so close that the linear model is doubtful
+    # all eigenvalues [rad/s]; empty where nothing was computed
     values: Complex = field(default_factory=lambda: np.zeros(0, dtype=complex))
-    swinging: tuple[int, ...] = ()
-    named: dict[str, int] = field(default_factory=dict)
-    who: tuple[str, ...] = ()
-    rightmost: str = ""
-    loops: OpenLoops | None = None
-    clocks: int = 0
-    lasting: bool = True
+    swinging: tuple[int, ...] = ()  # places of the electromechanical modes, least damped first
+    named: dict[str, int] = field(default_factory=dict)  # the place of each mode that the case names
+    who: tuple[str, ...] = ()  # for each of ``swinging``: who takes part most
+    rightmost: str = ""  # the same for the eigenvalue with the largest real part
+    loops: OpenLoops | None = None  # the open loops; None where they were not asked for
+    clocks: int = 0  # number of states that are coupled with no other, each of which is a zero in ``values``
+    lasting: bool = True  # whether computing it again would give the same
 
     @property
     def computed(self) -> bool:

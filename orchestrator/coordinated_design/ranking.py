@@ -14,26 +14,14 @@ from orchestrator.pod_design.closed_loop import PodSetting
 
 @dataclass(frozen=True)
 class RankedConverter:
-    """What a controller at one converter can do, with all others that are designed off.
-
-    Attributes
-    ----------
-    shift
-        How far it moves the least damped mode of each point by 1 pu of gain, as long as the gain is small: the mean of
-        the residues' sizes over all points [rad/s per pu].
-    setting
-        The best setting that a search finds for it alone; None where none was searched.
-    worst
-        Least damping ratio with that setting, of all points and all modes to be damped; None where it is not known.
-    stages
-        N_S of its lead/lag.
-    """
-
     place: PodPlace
+    # how far it moves the least damped mode of each point by 1 pu of gain, as long as the gain is small: the mean of
+    # the residues' sizes over all points [rad/s per pu]
     shift: float
-    setting: PodSetting | None = None
+    setting: PodSetting | None = None  # the best setting that a search finds for it alone; None where none was searched
+    # least damping ratio with that setting, of all points and all modes to be damped; None where it is not known
     worst: float | None = None
-    stages: int = 0
+    stages: int = 0  # N_S of its lead/lag
 
 
 def ranked(
@@ -47,16 +35,10 @@ def ranked(
 ) -> tuple[RankedConverter, ...]:
     """The controllers by the size of their residues; for the first a controller alone is designed.
 
-    Parameters
-    ----------
-    stages
-        N_S of each.
-    largest
-        The largest gain [pu].
-    frequency
-        ω that the centres relate to [rad/s].
-    known
-        A controller that was designed alone already, with its setting.
+    ``stages``: N_S of each.
+    ``largest``: the largest gain [pu].
+    ``frequency``: ω that the centres relate to [rad/s].
+    ``known``: A controller that was designed alone already, with its setting.
     """
     by_shift = sorted(((_shift(place, points), place) for place in places), key=lambda one: (-one[0], one[1]))
     found = []

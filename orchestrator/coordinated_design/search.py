@@ -21,12 +21,9 @@ from orchestrator.sensitivities.sensitivities import damping_change
 _RADIUS, _SMALLEST, _LARGEST = 0.15, 2e-4, 0.4
 """Of the region in which the sensitivities are trusted, as parts of the ranges."""
 _STEPS = 60
-_PRICE = 10.0
-"""What a breach costs, in damping ratio."""
-_BESIDE = 1e-3
-"""Weight of the least damping of those modes that are moved more than hardly, beside that of all."""
-_NEAR, _NEAR_FLOOR = 0.3, 0.1
-"""Modes whose damping ratio is farther away than this are left out of a linear program."""
+_PRICE = 10.0  # what a breach costs, in damping ratio
+_BESIDE = 1e-3  # weight of the least damping of those modes that are moved more than hardly, beside that of all
+_NEAR, _NEAR_FLOOR = 0.3, 0.1  # modes whose damping ratio is farther away than this are left out of a linear program
 _APART = 0.2
 _EDGE, _POLISHING = 0.1, 40
 _DIFFERENCE = 1e-6
@@ -35,10 +32,8 @@ _TURNS, _CENTRES, _GAINS = (-90.0, -45.0, 0.0, 45.0, 90.0), (0.7, 1.0, 1.8), (0.
 _STARTS, _STARTS_OF_SEVERAL = 4, 6
 _GRID, _LEAST_SHARE = (13, 6, 9), 0.025
 """Turns, centres and gains of an exhaustive grid, and its smallest gain as a part of the largest."""
-_MOST_CUBED = 4e6
-"""Sum of the cubes of all points' numbers of states up to which a grid is computed."""
-_SPREAD, _MOST_SPREAD = 64, 256
-"""Vectors that are spread over all ranges for each of several groups, and at most."""
+_MOST_CUBED = 4e6  # sum of the cubes of all points' numbers of states up to which a grid is computed
+_SPREAD, _MOST_SPREAD = 64, 256  # vectors that are spread over all ranges for each of several groups, and at most
 
 
 @dataclass(frozen=True)
@@ -70,12 +65,8 @@ class SettingSearch:
     def best(self, starts: int | None = None, *, polish: bool = True) -> Tried:
         """The best vector that the search finds; it harms no other mode, unless every vector does.
 
-        Parameters
-        ----------
-        starts
-            Number of vectors of the coarse scan that are improved; by default 4, for several groups 6.
-        polish
-            Whether the best is improved without sensitivities as well.
+        ``starts``: number of vectors of the coarse scan that are improved; by default 4, for several groups 6.
+        ``polish``: whether the best is improved without sensitivities as well.
         """
         several = len(self._space.groups) > 1
         scanned = sorted((self.tried(x) for x in self._coarse()), key=lambda one: -one.merit)

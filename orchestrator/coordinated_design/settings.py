@@ -11,31 +11,16 @@ from orchestrator.coordinated_design.open_loops import PodPlace, Setting
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, NO_COMPENSATION, lead_lag_turning
 
-CENTRES = (0.5, 4.0)
-"""Range of the lead/lag's centre, as parts of the modes' frequency."""
-
-_OFF = 1e-9
-"""Part of the largest gain that stands for a gain of 0 in a search, where a loop must keep its states."""
+CENTRES = (0.5, 4.0)  # range of the lead/lag's centre, as parts of the modes' frequency
+_OFF = 1e-9  # part of the largest gain that stands for a gain of 0 in a search, where a loop must keep its states
 
 
 @dataclass(frozen=True)
 class PodGroup:
-    """Converters whose controllers get one setting.
-
-    Attributes
-    ----------
-    controller
-        ``pod_p`` or ``pod_q``.
-    key
-        Their names in a parameter file.
-    stages
-        N_S of the lead/lag.
-    """
-
-    controller: str
+    controller: str  # ``pod_p`` or ``pod_q``
     components: tuple[str, ...]
-    key: tuple[str, ...]
-    stages: int
+    key: tuple[str, ...]  # their names in a parameter file
+    stages: int  # N_S of the lead/lag
 
     @property
     def name(self) -> str:
@@ -51,12 +36,8 @@ class PodGroup:
 class SettingSpace:
     """Vectors x with three numbers for each group: turn and gain as parts of their ranges, logarithm of the centre.
 
-    Parameters
-    ----------
-    gain_bounds
-        Of every gain [pu].
-    frequency
-        ω of the modes to be damped [rad/s], to which the centres relate.
+    ``gain_bounds``: of every gain [pu].
+    ``frequency``: ω of the modes to be damped [rad/s], to which the centres relate.
     """
 
     def __init__(self, groups: Sequence[PodGroup], gain_bounds: tuple[float, float], frequency: float) -> None:

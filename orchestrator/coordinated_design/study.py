@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.analysis.modes import Mode
+from orchestrator.asked import DAMPING, GAIN_BOUNDS, NAMES, RANKED, STAGES, asked
 from orchestrator.cases.case import Case
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.coordinated_design.following import with_followed_names
 from orchestrator.coordinated_design.objective import Aim, RatedPoint, worth_of_all
 from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointModes, PointsRecord, PointsTask, compute_points
@@ -36,53 +38,32 @@ from orchestrator.screening.record import Item
 from orchestrator.screening.study import plan_screening
 from orchestrator.study.naming import modes_named
 
-ALL = "all"
-"""Stands for all electromechanical modes."""
-
-_SPARE = 1e-4
-"""Damping ratio beyond the wanted one with which a search for the smallest gain is content."""
-
-TOGETHER = 4
-"""Operating points with outages that are computed together."""
+ALL = "all"  # stands for all electromechanical modes
+_SPARE = 1e-4  # damping ratio beyond the wanted one with which a search for the smallest gain is content
+TOGETHER = 4  # operating points with outages that are computed together
 
 
 @dataclass(frozen=True)
 class PointsDesignRequest:
-    """What is asked of a design over operating points.
-
-    Attributes
-    ----------
-    controllers
-        ``pod_p``, ``pod_q``, or both.
-    components
-        Names or patterns of converters; each gets a setting of its own. All with the controller share one where empty.
-    scenario
-        Its name; the one in which all PODs are off where None.
-    modes
-        Names of the case's modes that are damped; all electromechanical ones where empty.
-    damping
-        Damping ratio that is wanted; None for the best that there is.
-    gain_bounds
-        Of every gain [pu of the converter's rating].
-    stages
-        N_S of the lead/lag; the components' own where None.
-    least_damping
-        No other mode may fall below this damping ratio, or, where it is below already, below what it has.
-    ranked
-        For how many converters a controller alone is designed to rank them.
-    overrides, parameters, step_size
-        As in `orchestrator.pod_design.design.DesignRequest`.
-    """
-
     controllers: tuple[str, ...]
-    components: tuple[str, ...] = ()
+    components: tuple[str, ...] = asked(
+        NAMES, (), "converters, or patterns, each with a setting of its own", option="--component"
+    )
     scenario: str | None = None
-    modes: tuple[str, ...] = ()
-    damping: float | None = None
-    gain_bounds: tuple[float, float] = (0.0, 400.0)
-    stages: int | None = None
-    least_damping: float = 0.05
-    ranked: int = 3
+    # all electromechanical ones where empty
+    modes: tuple[str, ...] = asked(
+        NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode"
+    )
+    damping: float | None = asked(DAMPING, None, "required damping, such as 20")  # None for the best that there is
+    gain_bounds: tuple[float, float] = asked(GAIN_BOUNDS, (0.0, 400.0), "bounds of every gain [pu]")
+    stages: int | None = asked(STAGES, None, "lead/lag stages (default: the components' own)")
+    # no other mode may fall below this damping ratio, or, where it is below already, below what it has
+    least_damping: float = asked(
+        DAMPING, 0.05, "damping below which no other mode may be pushed (default: 5)", option="--min-damping"
+    )
+    ranked: int = asked(
+        RANKED, 3, "converters for which a controller alone is designed to rank them (default: 3)", option="--rank"
+    )
     overrides: Mapping[str, Value] = field(default_factory=dict)
     parameters: Sequence[ParameterFile] = ()
     step_size: float | None = None
@@ -113,12 +94,8 @@ def plan_points_design(
 ) -> PointsDesignPlan:
     """Check a design over operating points, and build the FMUs that it needs.
 
-    Parameters
-    ----------
-    points
-        CSV file with the operating points, as `gfor screen` takes it.
-    outages
-        As `orchestrator.screening.outages.read_outages` takes them.
+    ``points``: CSV file with the operating points, as `gfor screen` takes it.
+    ``outages``: as `orchestrator.screening.outages.read_outages` takes them.
     """
     groups = _groups(case, request)
     known = [table.name for table in case.table.analysis.modes]
@@ -200,30 +177,15 @@ def _candidates(
 
 @dataclass(frozen=True)
 class PointsDesign:
-    """A design over operating points with what it comes to.
-
-    Attributes
-    ----------
-    frequency
-        ω that the centres relate to [rad/s].
-    found
-        The search's own figures, on the linear models; nothing of the verdict rests on them.
-    points
-        Every operating point with every outage, without the controllers and with them, all modes computed anew.
-    ranking
-        Converters by what a controller there alone would give, the best first.
-    compared
-        Number of settings of an exhaustive grid that were tried; 0 without one.
-    """
-
     plan: PointsDesignPlan
-    frequency: float
+    frequency: float  # ω that the centres relate to [rad/s]
     settings: tuple[PodSetting, ...]
-    found: Tried
+    found: Tried  # the search's own figures, on the linear models; nothing of the verdict rests on them
+    # every operating point with every outage, without the controllers and with them, all modes computed anew
     points: tuple[JudgedPoint, ...]
-    ranking: tuple[RankedConverter, ...]
+    ranking: tuple[RankedConverter, ...]  # converters by what a controller there alone would give, the best first
     evaluations: int
-    compared: int = 0
+    compared: int = 0  # number of settings of an exhaustive grid that were tried; 0 without one
 
     @property
     def verdict(self) -> PointsVerdict:
@@ -240,12 +202,8 @@ def design_over_points(
 ) -> PointsDesign:
     """Find the settings, and compute all modes anew with them.
 
-    Parameters
-    ----------
-    plan
-        As `plan_points_design` gives it.
-    report
-        Called with the numbers of points done and in all, first without and then with the controllers.
+    ``plan``: as `plan_points_design` gives it.
+    ``report``: called with the numbers of points done and in all, first without and then with the controllers.
     """
     stage("operating points without the controllers")
     before = modes_at(plan, plan.off, plan.candidates, executor, store, lambda n, of: report(n, 2 * of))
@@ -270,6 +228,7 @@ def design_over_points(
     settings = tuple(space.group_settings(found.x))
     stage("operating points with the controllers")
     after = modes_at(plan, values_of(plan.groups, settings), (), executor, store, lambda n, of: report(of + n, 2 * of))
+    after = with_followed_names(plan.aim.names, before, after, space.setting(found.x))
     stage("ranking")
     every = dict.fromkeys(plan.candidates, largest)
     alike = [RatedPoint(point.number, point.loops, plan.aim, every) for point in rated]
@@ -278,7 +237,7 @@ def design_over_points(
     alone = ranked(plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked, designed)
     ranking = best_first(
         [
-            _confirmed(plan, one, after if designed and one.place == designed[0] else None, executor, store)
+            _confirmed(plan, one, before, after if designed and one.place == designed[0] else None, executor, store)
             for one in alone
         ]
     )
@@ -291,6 +250,7 @@ def design_over_points(
 def _confirmed(
     plan: PointsDesignPlan,
     one: RankedConverter,
+    before: Sequence[PointModes],
     known: Sequence[PointModes] | None,
     executor: Executor,
     store: PointStore,
@@ -300,7 +260,9 @@ def _confirmed(
         return one
     group = PodGroup(one.place.controller, (one.place.component,), (one.place.component,), one.stages)
     values = {**plan.off, **values_of([group], [one.setting])}
-    points = known or modes_at(plan, values, (), executor, store)
+    points = known or with_followed_names(
+        plan.aim.names, before, modes_at(plan, values, (), executor, store), {one.place: one.setting}
+    )
     return replace(one, worst=least_of(points, plan.aim))
 
 
@@ -348,14 +310,9 @@ def modes_at(
 ) -> list[PointModes]:
     """The modes of all operating points and outages with some values, from the power flow on.
 
-    Parameters
-    ----------
-    values
-        By ``component.variable``; they go before all layers.
-    places
-        Loops that are measured as well.
-    executor, store
-        Where the points are computed, and what keeps them.
+    ``values``: by ``component.variable``; they go before all layers.
+    ``places``: loops that are measured as well.
+    ``executor`` and ``store``: where the points are computed, and what keeps them.
     """
     layers = (*plan.layers, OptionValues.of(values))
     content = {

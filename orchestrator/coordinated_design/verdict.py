@@ -40,31 +40,20 @@ class PlacedMode:
 
 @dataclass(frozen=True)
 class JudgedPoint:
-    """One operating point with one outage, without and with the controllers.
-
-    Attributes
-    ----------
-    target_before, target
-        The least damped of the modes that the design damps; None where there is none.
-    other
-        The other mode that is farthest below its floor, or nearest to it; None where there is none.
-    worth
-        Least damping and breach with the controllers; None where nothing is known.
-    predicted
-        The same worth from the search's linear models; None where they were not asked.
-    unnamed
-        Whether a name that is asked for is borne by no mode here, so that all electromechanical ones count.
-    """
+    """One operating point with one outage, without and with the controllers."""
 
     point: OperatingCase
     outage: Outage
     before: PointModes
     after: PointModes
+    # target_before, target: the least damped of the modes that the design damps; None where there is none
     target_before: PlacedMode | None = None
     target: PlacedMode | None = None
+    # the other mode that is farthest below its floor, or nearest to it; None where there is none
     other: PlacedMode | None = None
-    worth: Worth | None = None
-    predicted: Worth | None = None
+    worth: Worth | None = None  # least damping and breach with the controllers; None where nothing is known
+    predicted: Worth | None = None  # the same worth from the search's linear models; None where they were not asked
+    # whether a name that is asked for is borne by no mode here, so that all electromechanical ones count
     unnamed: bool = False
 
     @property
@@ -170,14 +159,9 @@ def _placed(mode: Watched, point: PointModes) -> PlacedMode:
 class PointsVerdict:
     """What a design comes to over all points.
 
-    Parameters
-    ----------
-    wanted
-        Damping ratio that is wanted everywhere; None for the best that there is.
-    largest
-        The largest gain that the search was allowed [pu].
-    compared
-        Number of settings of an exhaustive grid none of which was better; 0 without one.
+    ``wanted``: damping ratio that is wanted everywhere; None for the best that there is.
+    ``largest``: the largest gain that the search was allowed [pu].
+    ``compared``: number of settings of an exhaustive grid none of which was better; 0 without one.
     """
 
     def __init__(

@@ -86,10 +86,10 @@ def what_it_rests_on(design: PointsDesign) -> str:
 
 
 def settings_table(design: PointsDesign) -> Table:
-    table = make_table("Settings", "Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
-    for group, setting in zip(design.plan.groups, design.settings, strict=True):
-        table.add_row(group.name, *_setting(setting), str(len(group.components)))
-    return table
+    columns = ("Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
+    placed = zip(design.plan.groups, design.settings, strict=True)
+    rows = [(group.name, *_setting(setting), str(len(group.components))) for group, setting in placed]
+    return make_table("Settings", *columns, rows=rows)
 
 
 def _setting(setting: PodSetting) -> list[str]:
@@ -100,18 +100,17 @@ def _setting(setting: PodSetting) -> list[str]:
 
 def points_table(verdict: PointsVerdict) -> Table:
     """The points with the least damping, the worst first."""
-    having = [point for point in verdict.known if point.target is not None]
-    ordered = sorted(having, key=lambda point: point.target.damping_ratio if point.target else 1.0)
-    table = make_table(
-        f"The {min(_ROWS, len(ordered))} least damped of {len(verdict.points)} points and outages",
-        "Point", "Outage", "before [%]", "with it [%]", "f [Hz]", "Who", "Stable", left=2,
-    )  # fmt: skip
-    for point in ordered[:_ROWS]:
-        assert point.target is not None
-        before = "–" if point.target_before is None else f"{100 * point.target_before.damping_ratio:.2f}"
-        table.add_row(point.point.name, point.outage.name, before, f"{100 * point.target.damping_ratio:.2f}",
-                      f"{point.target.frequency_hz:.3f}", point.target.who, _stable(point))  # fmt: skip
-    return table
+    having = [(point, point.target) for point in verdict.known if point.target is not None]
+    ordered = sorted(having, key=lambda entry: entry[1].damping_ratio)
+    columns = ("Point", "Outage", "before [%]", "with it [%]", "f [Hz]", "Who", "Stable")
+    rows = [
+        (point.point.name, point.outage.name,
+         "–" if point.target_before is None else f"{100 * point.target_before.damping_ratio:.2f}",
+         f"{100 * target.damping_ratio:.2f}", f"{target.frequency_hz:.3f}", target.who, _stable(point))
+        for point, target in ordered[:_ROWS]
+    ]  # fmt: skip
+    title = f"The {min(_ROWS, len(ordered))} least damped of {len(verdict.points)} points and outages"
+    return make_table(title, *columns, left=2, rows=rows)
 
 
 def _stable(point: JudgedPoint) -> str:
@@ -120,14 +119,19 @@ def _stable(point: JudgedPoint) -> str:
 
 def ranking_table(design: PointsDesign) -> Table:
     """Converters by what a controller there alone would give."""
-    table = make_table(
-        "Converters by what a controller there alone gives: the least damping of all points, computed anew",
-        "Converter", "Controller", "least damping [%]", "K [pu]", "T_S1 [s]", "T_S2 [s]", "shift by 1 pu [rad/s]",
-        left=2,
-    )  # fmt: skip
-    for one in design.ranking[:_ROWS]:
-        table.add_row(one.place.component, one.place.controller, *ranked_cells(one), f"{one.shift:.3g}")
-    return table
+    title = "Converters by what a controller there alone gives: the least damping of all points, computed anew"
+    columns = (
+        "Converter",
+        "Controller",
+        "least damping [%]",
+        "K [pu]",
+        "T_S1 [s]",
+        "T_S2 [s]",
+        "shift by 1 pu [rad/s]",
+    )
+    found = [(one.place.component, one.place.controller, *ranked_cells(one), f"{one.shift:.3g}")
+             for one in design.ranking[:_ROWS]]  # fmt: skip
+    return make_table(title, *columns, left=2, rows=found)
 
 
 def ranked_cells(one: RankedConverter) -> list[str]:
@@ -172,7 +176,7 @@ def remarks(verdict: PointsVerdict) -> list[str]:
     if unnamed:
         texts.append(
             f"at {len(unnamed)} of {total}, first at {unnamed[0].where}: a name that is asked for is borne by no mode, "
-            "so all modes from 0.1 to 2 Hz count there"
+            "or its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count there"
         )
     warned = [(text, point) for point in verdict.known for text in point.after.warnings]
     kinds, first = Counter(text for text, _ in warned), dict(reversed(warned))

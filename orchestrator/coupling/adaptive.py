@@ -22,21 +22,11 @@ from orchestrator.errors import ComponentError, CosimError, CouplingError, Ended
 _ORDER = 2
 """Of the schedules in which inputs follow straight lines: the error of a pair of steps falls with this power plus 1."""
 
-_SAFETY = 0.5
-"""Part of the tolerance that the next pair is aimed at."""
-
-_SHORTEST = 1 / 1024
-"""Shortest step, as a part of the communication step."""
-
-_FIRST = 1 / 4
-"""First pair, and the first after an event, as a part of the communication step."""
-
-_MOST_HALVINGS = 4
-"""So often a pair is halved at once, at most."""
-
-_PROVEN_EVERY = 100
-"""Pairs between two proofs that all components go back to their saved states."""
-
+_SAFETY = 0.5  # part of the tolerance that the next pair is aimed at
+_SHORTEST = 1 / 1024  # shortest step, as a part of the communication step
+_FIRST = 1 / 4  # first pair, and the first after an event, as a part of the communication step
+_MOST_HALVINGS = 4  # so often a pair is halved at once, at most
+_PROVEN_EVERY = 100  # pairs between two proofs that all components go back to their saved states
 _SAME = 1e-8
 """Of 1 or of an output: by how much a step may differ from the same step, done again. ``newton`` agrees to 1e-10."""
 
@@ -49,16 +39,10 @@ class AdaptiveLoop:
     A step ends at every communication point at which the caller stops: at events, and where something is recorded.
     Between them it has the length of that stretch, halved as often as is needed.
 
-    Parameters
-    ----------
-    groups
-        Components that step together, in the order of the schedule.
-    y
-        All coupled outputs; the loops write them.
-    tracks
-        Where each output went; the loops write them.
-    step_size
-        The communication step [s].
+    ``groups``: components that step together, in the order of the schedule.
+    ``y``: all coupled outputs; the loops write them.
+    ``tracks``: where each output went; the loops write them.
+    ``step_size``: the communication step [s].
     """
 
     def __init__(

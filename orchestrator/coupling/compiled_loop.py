@@ -20,9 +20,7 @@ from orchestrator.coupling.trial import Trial
 from orchestrator.coupling.turns import Turn, not_finite
 from orchestrator.fmi.interrupts import calls
 
-SOURCES = ("team.c", "inner_loop.c")
-"""Compiled as one."""
-
+SOURCES = ("team.c", "inner_loop.c")  # compiled as one
 _FUNCTIONS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
 _NOT_FINITE = -1
 
@@ -30,8 +28,7 @@ _LOOKED_AT = 20
 """Communication steps over which a call's time is averaged; the least average of several counts, because others use
 the processor as well."""
 
-_BALANCED_AT = (100, 1000, 10_000, 100_000)
-"""Communication steps after which the calls are shared out anew."""
+_BALANCED_AT = (100, 1000, 10_000, 100_000)  # communication steps after which the calls are shared out anew
 
 
 class _Call(ctypes.Structure):
@@ -102,13 +99,9 @@ class CompiledLoop:
     The first communication steps are done by one thread; by what each call took then, the calls of a group are shared
     out. Who does a call changes no value.
 
-    Parameters
-    ----------
-    library
-        `loop_library`.
-    threads
-        How many step; None for as many as make a step shortest, up to one for each core, and only while they are seen
-        to be faster than one.
+    ``library``: `loop_library`.
+    ``threads``: how many step; None for as many as make a step shortest, up to one for each core, and only while they
+    are seen to be faster than one.
     """
 
     def __init__(
@@ -205,10 +198,7 @@ class CompiledLoop:
     def _note(self, steps: int, seconds: float, team: Team | None) -> None:
         """Note what calls took, and share them out when it is time.
 
-        Parameters
-        ----------
-        steps, seconds
-            Communication steps that were done just now, and the wall-clock time they took [s].
+        ``steps`` and ``seconds``: communication steps that were done just now, and the wall-clock time they took [s].
         """
         self._done += steps
         self._together += steps if team is not None else 0

@@ -24,10 +24,8 @@ from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.instance import open_component
 
 _INITIAL_PASSES = 20
-_JUMP = 1e-6
-"""Of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they were."""
-_SAME = 1e-6
-"""Relative difference of a parameter from what was set, as of an FMU that computes in single precision."""
+_JUMP = 1e-6  # of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they were
+_SAME = 1e-6  # relative difference of a parameter from what was set, as of an FMU that computes in single precision
 
 
 def open_plan(name: str, plan: ComponentPlan, directory: Path) -> Component:
@@ -37,12 +35,8 @@ def open_plan(name: str, plan: ComponentPlan, directory: Path) -> Component:
 class CoupledComponents:
     """Components at their common start; a context manager that releases every FMU.
 
-    Attributes
-    ----------
-    y
-        All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
-    wires
-        The connections that do more than carry a value.
+    ``y``: All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
+    ``wires``: The connections that do more than carry a value.
     """
 
     def __init__(

@@ -3,8 +3,11 @@
 Most come down to variables that are set; faults of connections and components set none (`Fault`).
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
+from math import pi, sin
+from typing import Literal
 
 from fmus.grid.names import line_variable
 from orchestrator.coupling.imperfections import Imperfection
@@ -13,15 +16,16 @@ from orchestrator.coupling.system import Connection
 SMALLEST_FAULT_REACTANCE = 1e-5
 """X [pu, 100 MVA] of a fault without impedance: what is left of the voltage is 1e-5 pu for each pu of its current."""
 
+FORCING_POINTS = 200  # values a period by which a forcing follows a sine
+
+ForcingShape = Literal["sine", "square"]
+
 
 @dataclass(frozen=True, slots=True)
 class Event:
     """Something that happens at a communication point, before the step that starts there.
 
-    Parameters
-    ----------
-    time
-        [s]
+    ``time``: [s]
     """
 
     time: float
@@ -171,10 +175,7 @@ class Fault(Event):
 class WireFault(Fault):
     """A connection gets an imperfection, in place of another of its kind.
 
-    Parameters
-    ----------
-    time, component
-        As `Event`; the component is the one that the connection leads to.
+    ``time``, ``component``: As `Event`; the component is the one that the connection leads to.
     """
 
     connection: Connection
@@ -209,6 +210,54 @@ class Silence(Fault):
 
     def __str__(self) -> str:
         return f"t = {self.time:g} s: {self.component} answers no more"
+
+
+@dataclass(frozen=True, slots=True)
+class Forcing(Fault):
+    """A reference swings around its value: what a faulty controller or a pulsating prime mover does.
+
+    ``variable``: The tunable variable that is set, such as ``governor.delta_P_ref``.
+    ``frequency``: [Hz]
+    ``amplitude``: Half of what the reference goes through, in the variable's unit.
+    ``end``: From then on the reference has its own value again [s]; None for the end of the run.
+    """
+
+    variable: str
+    frequency: float
+    amplitude: float
+    shape: ForcingShape = "sine"
+    end: float | None = None
+
+    def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
+        """The component that is concerned, without a value: it has another one at every moment."""
+        return {self.component: {}}
+
+    def values(self, step_size: float, stop: float) -> Iterator[ParameterChange]:
+        """What is set one after the other, at communication points of a step [s], until ``stop`` [s].
+
+        A sine is held for at most a two hundredth of its period, at its value in the middle of that time.
+        """
+        end = stop if self.end is None else min(self.end, stop)
+        first, last = round(self.time / step_size), round(end / step_size)
+        parts = 2 if self.shape == "square" else FORCING_POINTS
+        points = [first + round(k / (parts * self.frequency * step_size))
+                  for k in range(int((last - first) * step_size * parts * self.frequency) + 2)]  # fmt: skip
+        for k, (point, following) in enumerate(pairwise(dict.fromkeys(points))):
+            if point >= last:
+                break
+            middle = (point + following - 2 * first) / 2 * step_size
+            phase = 2 * pi * self.frequency * middle
+            value = sin(phase) if self.shape == "sine" else (-1.0) ** k
+            yield ParameterChange(point * step_size, self.component, self.variable, self.amplitude * value)
+        if last * step_size < stop:
+            yield ParameterChange(last * step_size, self.component, self.variable, 0.0)
+
+    def __str__(self) -> str:
+        until = "" if self.end is None else f" until {self.end:g} s"
+        return (
+            f"t = {self.time:g} s: {self.component}.{self.variable} swings by {self.amplitude!r} at "
+            f"{self.frequency!r} Hz ({self.shape}){until}"
+        )
 
 
 def faults_among(events: Iterable[Event]) -> list[Fault]:

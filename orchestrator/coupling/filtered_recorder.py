@@ -13,11 +13,8 @@ from orchestrator.coupling.rows import RowSink
 PASS_BAND, STOP_BAND = 0.4, 0.5
 """Frequencies below the first pass, those above the second are taken away, in parts of 1/interval."""
 
-_HALF = 25
-"""The filter reaches so many intervals to both sides."""
-
-_BETA = 7.857
-"""Of the Kaiser window: 80 dB."""
+_HALF = 25  # the filter reaches so many intervals to both sides
+_BETA = 7.857  # of the Kaiser window: 80 dB
 
 FILTER = (
     f"symmetric FIR filter over all steps of {_HALF} intervals to both sides, Kaiser window with beta = {_BETA:g}; "
@@ -25,8 +22,7 @@ FILTER = (
 )
 """What a row is made by, in words."""
 
-_MOST_READ = 1024
-"""Steps whose values are kept until they are added to the rows that they are part of."""
+_MOST_READ = 1024  # steps whose values are kept until they are added to the rows that they are part of
 
 
 class FilteredRecorder(Recorder):
@@ -35,10 +31,7 @@ class FilteredRecorder(Recorder):
     Its delay is 0: a row at t is made of what was within 25 intervals before and after t. Before the start and after
     the end the first and the last values are taken to hold. What jumps shows beforehand, too, as small ripples.
 
-    Parameters
-    ----------
-    keep
-        Each ``keep``-th row stays in memory.
+    ``keep``: each ``keep``-th row stays in memory.
     """
 
     def __init__(self, names: Sequence[str], interval: int, *, sink: RowSink | None = None, keep: int = 1) -> None:

@@ -25,14 +25,10 @@ class Bias:
 class Noise:
     """Normally distributed noise is added: in every communication step a new value.
 
-    Parameters
-    ----------
-    deviation
-        Standard deviation, in the signal's unit, with a bandwidth as without.
-    seed
-        Together with the connection's name it determines every value.
-    bandwidth
-        Cut-off frequency of a first-order low-pass [Hz]; None for noise that is white at the communication step.
+    ``deviation``: standard deviation, in the signal's unit, with a bandwidth as without.
+    ``seed``: together with the connection's name it determines every value.
+    ``bandwidth``: cut-off frequency of a first-order low-pass [Hz]; None for noise that is white at the communication
+    step.
     """
 
     deviation: float
@@ -80,21 +76,11 @@ Imperfection = Bias | Noise | Quantisation | Delay | DropOut
 
 @dataclass
 class WirePlan:
-    """What one connection does, and may do later.
+    """What one connection does, and may do later."""
 
-    Attributes
-    ----------
-    name
-        ``a.out -> b.in``.
-    permanent
-        From t = 0 on, by kind.
-    later
-        What events may bring.
-    """
-
-    name: str
-    permanent: dict[type[Imperfection], Imperfection] = field(default_factory=dict)
-    later: list[Imperfection] = field(default_factory=list)
+    name: str  # ``a.out -> b.in``
+    permanent: dict[type[Imperfection], Imperfection] = field(default_factory=dict)  # from t = 0 on, by kind
+    later: list[Imperfection] = field(default_factory=list)  # what events may bring
 
     def disturb(self, imperfection: Imperfection) -> None:
         """From t = 0 on."""

@@ -21,12 +21,8 @@ def state_of(
 ) -> RunState:
     """All that another process needs to go on from here.
 
-    Parameters
-    ----------
-    components
-        Serialised state of each FMU; by default they are asked for it.
-    applied, seconds, spent
-        See `RunState`.
+    ``components``: serialised state of each FMU; by default they are asked for it.
+    ``applied`` and ``seconds`` and ``spent``: see `RunState`.
     """
     if components is None:
         components = {name: state_as_bytes(component) for name, component in stepper.components.items()}

@@ -20,10 +20,7 @@ from orchestrator.fmi.interrupts import calls
 class PythonLoop:
     """Steps a system in Python.
 
-    Parameters
-    ----------
-    hand_over
-        Sets all inputs before each step; by default each component takes its own as it steps.
+    ``hand_over``: sets all inputs before each step; by default each component takes its own as it steps.
     """
 
     def __init__(
@@ -109,16 +106,10 @@ def make_loop(
 ) -> Loop:
     """The compiled loop where there is one and it can do what is asked, else the loop in Python.
 
-    Parameters
-    ----------
-    groups
-        Components that step together, in the order of the schedule.
-    y
-        All coupled outputs; the loop writes them.
-    tracks
-        Where each output went; the loop writes them.
-    threads
-        As for `CompiledLoop`; the loop in Python has one.
+    ``groups``: components that step together, in the order of the schedule.
+    ``y``: all coupled outputs; the loop writes them.
+    ``tracks``: where each output went; the loop writes them.
+    ``threads``: as for `CompiledLoop`; the loop in Python has one.
     """
     library = compiled_loop.loop_library() if schedule.is_plain else None
     if library is None:

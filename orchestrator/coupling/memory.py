@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-LINE = 128
-"""Bytes that a processor may fetch together: two lines of 64."""
+LINE = 128  # bytes that a processor may fetch together: two lines of 64
 
 
 def apart(count: int, dtype: DTypeLike = np.float64) -> NDArray[Any]:

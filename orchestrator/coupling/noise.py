@@ -9,8 +9,7 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-_BLOCK = 1024
-"""Values of one setting of the counter."""
+_BLOCK = 1024  # values of one setting of the counter
 
 
 def key_of_noise(seed: int, name: str) -> int:

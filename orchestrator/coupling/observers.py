@@ -16,14 +16,9 @@ if TYPE_CHECKING:
 class ObservedRun(Protocol):
     """What an observer sees of a run; the master is one.
 
-    Attributes
-    ----------
-    index, time
-        Number of communication steps done, and the time [s] reached.
-    y
-        All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
-    tracks
-        Where each of them went, step by step, since an observer last looked.
+    ``index``, ``time``: Number of communication steps done, and the time [s] reached.
+    ``y``: All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
+    ``tracks``: Where each of them went, step by step, since an observer last looked.
     """
 
     @property
@@ -55,15 +50,9 @@ class ObservedRun(Protocol):
 
 
 class Observer(Protocol):
-    """Called by the master at communication points.
+    """Called by the master at communication points."""
 
-    Attributes
-    ----------
-    every
-        Number of communication steps between two calls of `observe`.
-    """
-
-    every: int
+    every: int  # number of communication steps between two calls of `observe`
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
         """Called once, when the run is about to start."""

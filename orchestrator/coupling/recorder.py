@@ -12,19 +12,11 @@ from orchestrator.coupling.rows import MemoryRows, RowSink
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import RealBatch
 
-BLOCK_ROWS = 8192
-"""Most rows of a block."""
-
-_BLOCK_BYTES = 8_000_000
-"""Size of the largest block; the more is recorded, the fewer rows a block has."""
-
+BLOCK_ROWS = 8192  # most rows of a block
+_BLOCK_BYTES = 8_000_000  # size of the largest block; the more is recorded, the fewer rows a block has
 _FEWEST_ROWS = 64
-
-PATIENCE = 5.0
-"""Rows of a block that is not full wait for so long until they are handed to the sink [s]."""
-
-_SHARE = 0.01
-"""They wait longer where handing them over would take a larger part of the time than this."""
+PATIENCE = 5.0  # rows of a block that is not full wait for so long until they are handed to the sink [s]
+_SHARE = 0.01  # they wait longer where handing them over would take a larger part of the time than this
 
 
 class Recorder:
@@ -33,22 +25,13 @@ class Recorder:
     Rows are collected in a block. A full block, or one that waited for `PATIENCE`, is handed to the sink, such as a
     folder on the disk; so the memory that is needed does not grow with the run, but for the rows that are kept.
 
-    Parameters
-    ----------
-    every
-        Communication steps between two rows.
-    after_exchange
-        Hand every component the newest outputs of its partners before anything is read; else outputs are recorded as
-        they were read at the end of the step, with the inputs that were held in it.
-    keep
-        Each ``keep``-th row stays in memory, beginning with the first.
+    ``every``: Communication steps between two rows.
+    ``after_exchange``: Hand every component the newest outputs of its partners before anything is read; else outputs
+    are recorded as they were read at the end of the step, with the inputs that were held in it.
+    ``keep``: Each ``keep``-th row stays in memory, beginning with the first.
 
-    Attributes
-    ----------
-    times
-        [s], shape (n,), of the rows that are kept.
-    values
-        Shape (n, number of names), in the order of ``names``; only what was reached before a failure.
+    ``times``: [s], shape (n,), of the rows that are kept.
+    ``values``: Shape (n, number of names), in the order of ``names``; only what was reached before a failure.
     """
 
     def __init__(
@@ -99,10 +82,7 @@ class Recorder:
                 raise InputError(f"cannot record {name!r}: there is no such variable; `gfor info` lists them")
             by_component.setdefault(component, []).append((column, variable))
         self._batches = [
-            (
-                RealBatch(run.components[component], [v for _, v in entries]),
-                np.array([c for c, _ in entries]),
-            )
+            (RealBatch(run.components[component], [v for _, v in entries]), np.array([c for c, _ in entries]))
             for component, entries in by_component.items()
         ]
         self._allocate((stop_index - run.index) // self.every + 2)

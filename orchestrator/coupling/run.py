@@ -16,8 +16,7 @@ from orchestrator.errors import ComponentError, NotFiniteError
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.silence import silence
 
-_LONGEST_STRETCH = 1000
-"""Communication steps done at a stretch, so that an interrupt from the keyboard is heard."""
+_LONGEST_STRETCH = 1000  # communication steps done at a stretch, so that an interrupt from the keyboard is heard
 
 
 class Run:
@@ -78,10 +77,7 @@ class Run:
     def _steps(self, stop: int, due: Mapping[int, Sequence[Event]], first: int) -> Iterator[None]:
         """Step from event to event; each time that it yields, the run is whole.
 
-        Parameters
-        ----------
-        first
-            Communication point at which the run began.
+        ``first``: communication point at which the run began.
         """
         for target in sorted({stop, *(i for i in due if self._stepper.index <= i < stop)}):
             yield from self._run_to(target, first)

@@ -11,8 +11,7 @@ from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
 
-Position = Mapping[str, Any]
-"""How far an observer has come: numbers and arrays by name."""
+Position = Mapping[str, Any]  # how far an observer has come: numbers and arrays by name
 
 
 @runtime_checkable
@@ -28,39 +27,22 @@ class Resumable(Protocol):
 
 @dataclass(frozen=True)
 class RunState:
-    """A run after its observers have looked at a communication point.
-
-    Attributes
-    ----------
-    applied
-        Whether the events of this communication point have happened.
-    handed_over
-        Whether the newest outputs were handed to all components already.
-    seconds, spent
-        Wall-clock time so far [s], and that inside each component's calls, in the order of the schedule.
-    y, tracks
-        The coupled outputs, and where they went since the last look.
-    before
-        The outputs one step earlier, where inputs are extrapolated; else empty.
-    components
-        Serialised state of each FMU; empty at the end of a run.
-    observers
-        Position of each observer that is `Resumable`, in their order.
-    wires
-        Of connections that do more than carry a value, group by group: delay lines, noise generators, settings, and
-        what arrived last.
-    """
+    """A run after its observers have looked at a communication point."""
 
     index: int
-    applied: bool
-    handed_over: bool
+    applied: bool  # whether the events of this communication point have happened
+    handed_over: bool  # whether the newest outputs were handed to all components already
+    # seconds, spent: wall-clock time so far [s], and that inside each component's calls, in the order of the schedule
     seconds: float
     spent: NDArray[np.float64]
+    # y, tracks: the coupled outputs, and where they went since the last look
     y: NDArray[np.float64]
     tracks: NDArray[np.float64]
-    before: NDArray[np.float64]
-    components: Mapping[str, bytes]
-    observers: Sequence[Position]
+    before: NDArray[np.float64]  # the outputs one step earlier, where inputs are extrapolated; else empty
+    components: Mapping[str, bytes]  # serialised state of each FMU; empty at the end of a run
+    observers: Sequence[Position]  # position of each observer that is `Resumable`, in their order
+    # of connections that do more than carry a value, group by group: delay lines, noise generators, settings, and what
+    # arrived last
     wires: Sequence[Mapping[str, NDArray[np.float64]]]
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -149,8 +131,7 @@ class _NotKept:
         """See `Keeper.finish`."""
 
 
-NOT_KEPT = _NotKept()
-"""The keeper of a run that nobody wants to go on with."""
+NOT_KEPT = _NotKept()  # the keeper of a run that nobody wants to go on with
 
 
 def why_not_kept(description: FmuDescription) -> str | None:

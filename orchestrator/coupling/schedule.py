@@ -39,17 +39,13 @@ anew with the inputs of the step's end.
 """
 
 
-TOLERANCES = (1e-8, 0.1)
-"""Smallest and largest tolerance of a step's error."""
+TOLERANCES = (1e-8, 0.1)  # smallest and largest tolerance of a step's error
 
 
 def check_tolerance(tolerance: float) -> None:
     """Refuse a tolerance that is none.
 
-    Raises
-    ------
-    InputError
-        If it is outside of `TOLERANCES`.
+    Raises an `InputError` if it is outside of `TOLERANCES`.
     """
     least, most = TOLERANCES
     if isinstance(tolerance, bool) or not least <= tolerance <= most:
@@ -60,25 +56,17 @@ def check_tolerance(tolerance: float) -> None:
 class Schedule:
     """Groups of component names, in order.
 
-    Parameters
-    ----------
-    first_inputs
-        What connected inputs hold in the first step.
-    extrapolation
-        Inputs are held at y + extrapolation·(y − y before), y being the output that feeds them at a communication point
-        and the one before it; 0 takes y itself.
-    wire_by_wire
-        Between two steps connections are served one after the other, in the order in which they were made: an output
-        that depends directly on inputs is read after those that were set before it. This needs a single group, and
-        inputs that are held.
-    ticks_per_second
-        Of a master that keeps time in whole ticks: its FMUs are told differences of times, which rounding makes not
-        quite equal. None tells them the communication step itself.
-    micro_step
-        Of second order: an FMU does a step in parts of at most this [s]; None does it in one.
-    tolerance
-        Largest error of a coupled output in a pair of steps, of 1 or of its value: steps are as long as it allows.
-        None takes each communication step as it is. Only for schedules of second order.
+    ``first_inputs``: what connected inputs hold in the first step.
+    ``extrapolation``: inputs are held at y + extrapolation·(y − y before), y being the output that feeds them at a
+    communication point and the one before it; 0 takes y itself.
+    ``wire_by_wire``: between two steps connections are served one after the other, in the order in which they were
+    made: an output that depends directly on inputs is read after those that were set before it. This needs a single
+    group, and inputs that are held.
+    ``ticks_per_second``: of a master that keeps time in whole ticks: its FMUs are told differences of times, which
+    rounding makes not quite equal. None tells them the communication step itself.
+    ``micro_step``: of second order: an FMU does a step in parts of at most this [s]; None does it in one.
+    ``tolerance``: largest error of a coupled output in a pair of steps, of 1 or of its value: steps are as long as it
+    allows. None takes each communication step as it is. Only for schedules of second order.
     """
 
     name: str

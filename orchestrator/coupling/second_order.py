@@ -23,22 +23,12 @@ from orchestrator.coupling.turns import Exchange, not_finite
 from orchestrator.errors import CouplingError, InputError
 from orchestrator.fmi.interrupts import calls
 
-_PASSES = 20
-"""Most exchanges after a step until outputs that depend on inputs directly agree."""
-
-_REPETITIONS = 12
-"""Most repetitions of a step under ``newton``."""
-
-_AGREED = 1e-10
-"""Of 1 or of an output: by how much it may differ from what the step was made with, under ``newton``."""
-
-_SLOW = 0.1
-"""A repetition that leaves more than this part of the disagreement asks for new derivatives."""
-
+_PASSES = 20  # most exchanges after a step until outputs that depend on inputs directly agree
+_REPETITIONS = 12  # most repetitions of a step under ``newton``
+_AGREED = 1e-10  # of 1 or of an output: by how much it may differ from what the step was made with, under ``newton``
+_SLOW = 0.1  # A repetition that leaves more than this part of the disagreement asks for new derivatives
 _UNSETTLED = -2
-
-_NUDGE = 1e-6
-"""Of 1 or of an input: change for the derivatives of a step."""
+_NUDGE = 1e-6  # of 1 or of an input: change for the derivatives of a step
 
 Values = NDArray[np.float64]
 

@@ -12,32 +12,19 @@ HANDOVER = 2e-6
 
 @dataclass(frozen=True)
 class Shares:
-    """Who does the calls of one group.
+    """Who does the calls of one group."""
 
-    Attributes
-    ----------
-    own
-        Calls that the calling thread alone may do.
-    of
-        Calls of each thread, the calling one first; any of them may do those of another that has not begun them.
-    seconds
-        Cost of the thread that has most to do [s].
-    """
-
-    own: tuple[int, ...]
+    own: tuple[int, ...]  # calls that the calling thread alone may do
+    # calls of each thread, the calling one first; any of them may do those of another that has not begun them
     of: tuple[tuple[int, ...], ...]
-    seconds: float
+    seconds: float  # cost of the thread that has most to do [s]
 
 
 def shares(calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.float64], threads: int) -> Shares:
     """Share out the calls of a group, the costly ones first, each to who has least.
 
-    Parameters
-    ----------
-    bound
-        Of every call, whether the calling thread alone may do it.
-    costs
-        Of every call [s].
+    ``bound``: of every call, whether the calling thread alone may do it.
+    ``costs``: of every call [s].
     """
     own = tuple(call for call in calls if bound[call])
     loads = [0.0] * threads

@@ -16,20 +16,9 @@ class ComponentStatistics:
 
 @dataclass(slots=True)
 class StepCounts:
-    """What a tolerance made of the communication steps.
-
-    Attributes
-    ----------
-    accepted
-        Steps that count, in pairs of equal length.
-    rejected
-        Pairs that were taken back, because their error was too large or a component refused them.
-    shortest, longest
-        Of the steps that count [s].
-    """
-
-    accepted: int = 0
-    rejected: int = 0
+    accepted: int = 0  # steps that count, in pairs of equal length
+    rejected: int = 0  # pairs that were taken back, because their error was too large or a component refused them
+    # shortest, longest: of the steps that count [s]
     shortest: float = float("inf")
     longest: float = 0.0
 
@@ -41,26 +30,14 @@ class StepCounts:
 
 @dataclass(frozen=True, slots=True)
 class StepStatistics:
-    """Of a whole run.
-
-    Attributes
-    ----------
-    steps, seconds
-        Steps that count, and wall-clock time [s] they took, recording included.
-    components
-        In the order of the schedule. What is left of the time is the coupling, the observers, and threads that wait.
-    simulated
-        Time that was simulated [s].
-    one_thread
-        By component, why only one thread may step it.
-    """
-
+    # steps, seconds: steps that count, and wall-clock time [s] they took, recording included
     steps: int
     seconds: float
+    # In the order of the schedule. What is left of the time is the coupling, the observers, and threads that wait.
     components: tuple[ComponentStatistics, ...]
-    simulated: float = 0.0
+    simulated: float = 0.0  # time that was simulated [s]
     threads: int = 1
-    one_thread: Mapping[str, str] = field(default_factory=dict)
+    one_thread: Mapping[str, str] = field(default_factory=dict)  # by component, why only one thread may step it
     adaptive: StepCounts | None = None
 
     @property

@@ -10,8 +10,7 @@ STEP_PARAMETER = "communication_step"
 """A component with a parameter of this name is given the communication step [s], unless the parameter is set."""
 
 
-INTERNAL_STEP = "internal_step"
-"""Parameter of our FMUs: longest step of their own integrator [s]."""
+INTERNAL_STEP = "internal_step"  # parameter of our FMUs: longest step of their own integrator [s]
 
 
 def tell_step(system: System, step_size: float) -> frozenset[str]:

@@ -91,10 +91,7 @@ class Stepper(CoupledComponents):
     def advance(self, count: int) -> None:
         """Do ``count`` communication steps and nothing else.
 
-        Raises
-        ------
-        ComponentError
-            With the time of the step that failed; ``index`` counts the steps that were completed.
+        Raises a `ComponentError` with the time of the step that failed; ``index`` counts the steps that were completed.
         """
         if self.wires:
             for index, part in self.wires.stretches(self.index, count):
@@ -133,12 +130,8 @@ class Stepper(CoupledComponents):
     def statistics(self, steps: int, seconds: float, before: Sequence[float]) -> StepStatistics:
         """Speed of a run.
 
-        Parameters
-        ----------
-        seconds
-            How long it took [s].
-        before
-            What `seconds` gave when it began.
+        ``seconds``: how long it took [s].
+        ``before``: what `seconds` gave when it began.
         """
         names = [name for group in self.schedule.groups for name in group]
         spent = [after - then for after, then in zip(self.seconds(), before, strict=True)]

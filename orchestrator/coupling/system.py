@@ -52,10 +52,7 @@ class ComponentPlan:
 class System:
     """Components by name, with checked connections.
 
-    Attributes
-    ----------
-    wires
-        Connections that do more than carry a value, or may in a run, by their target.
+    ``wires``: Connections that do more than carry a value, or may in a run, by their target.
     """
 
     def __init__(self) -> None:
@@ -76,16 +73,10 @@ class System:
     ) -> None:
         """Add a component.
 
-        Parameters
-        ----------
-        name
-            By which connections and signals mean it.
-        parameters
-            Values that are set before initialisation, by variable.
-        inputs
-            Constants for inputs that nothing feeds, by variable.
-        isolated
-            Whether it runs in a process of its own; by default all but our own FMUs do.
+        ``name``: by which connections and signals mean it.
+        ``parameters``: values that are set before initialisation, by variable.
+        ``inputs``: constants for inputs that nothing feeds, by variable.
+        ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do.
         """
         if name in self.components:
             raise InputError(f"component {name!r} is added twice; give each instance a name of its own")

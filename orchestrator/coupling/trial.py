@@ -1,11 +1,7 @@
 """Whether several threads are faster than one, found out by running both ways in turns."""
 
-_BLOCK = 50
-"""Communication steps done one way before the other has its turn."""
-
-_BLOCKS = 8
-"""Of a trial, half of them each way: other programs on the same cores disturb both alike."""
-
+_BLOCK = 50  # communication steps done one way before the other has its turn
+_BLOCKS = 8  # of a trial, half of them each way: other programs on the same cores disturb both alike
 _VALID = 5000
 """Communication steps for which a trial's outcome counts; another follows, because the load of a machine changes."""
 
@@ -24,12 +20,8 @@ class Trial:
     def took(self, steps: int, seconds: float) -> None:
         """Note what communication steps took.
 
-        Parameters
-        ----------
-        steps
-            How many were done, at most `most`.
-        seconds
-            Wall-clock time [s].
+        ``steps``: how many were done, at most `most`.
+        ``seconds``: wall-clock time [s].
         """
         self._left -= steps
         if self._block is not None:

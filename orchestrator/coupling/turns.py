@@ -12,15 +12,11 @@ from orchestrator.fmi.component import Component, RealBatch
 class Exchange:
     """The coupled inputs and outputs of one component.
 
-    Attributes
-    ----------
-    inputs, outputs
-        Batches of the connected variables. The outputs' values are a window of the system's vector y.
-    sources
-        For each input the index in y of the output that feeds it.
-    delivered
-        The index of what arrives at each input: the same, or behind the outputs the place of what a connection makes
-        of it (`orchestrator.coupling.wires`).
+    ``inputs``, ``outputs``: Batches of the connected variables. The outputs' values are a window of the system's vector
+    y.
+    ``sources``: For each input the index in y of the output that feeds it.
+    ``delivered``: The index of what arrives at each input: the same, or behind the outputs the place of what a
+    connection makes of it (`orchestrator.coupling.wires`).
     """
 
     def __init__(
@@ -109,29 +105,17 @@ class Turn(Protocol):
 
 
 class Loop(Protocol):
-    """Steps a system.
-
-    Attributes
-    ----------
-    completed
-        Communication steps that the last call did.
-    before
-        The outputs one step earlier, where inputs are extrapolated; else None.
-    """
+    """Steps a system."""
 
     def advance(self, index: int, count: int, step_size: float) -> None:
         """Do communication steps.
 
-        Raises
-        ------
-        ComponentError
-            If a call fails; ``completed`` tells how many steps were done before.
-        NotFiniteError
-            If a step gives an output that is no finite number.
+        Raises a `ComponentError` if a call fails; ``completed`` tells how many steps were done before.
+        Raises a `NotFiniteError` if a step gives an output that is no finite number.
         """
 
-    completed: int
-    before: NDArray[np.float64] | None
+    completed: int  # communication steps that the last call did
+    before: NDArray[np.float64] | None  # the outputs one step earlier, where inputs are extrapolated; else None
 
     def seconds(self) -> list[float]:
         """Time spent inside each component's FMI calls [s], in the order of the schedule."""
@@ -147,9 +131,6 @@ class Loop(Protocol):
 def not_finite(outputs: Batch, index: int, time: float) -> NotFiniteError:
     """The error of an output that is no finite number.
 
-    Parameters
-    ----------
-    time
-        At which it was read [s].
+    ``time``: at which it was read [s].
     """
     return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)

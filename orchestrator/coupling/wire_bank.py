@@ -19,9 +19,7 @@ from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Imperfecti
 from orchestrator.coupling.noise import key_of_noise, white
 from orchestrator.errors import InputError
 
-STRETCH = 1000
-"""Communication steps for which the noise is made at once."""
-
+STRETCH = 1000  # communication steps for which the noise is made at once
 _PASS, _HOLD, _SUBSTITUTE = 0, 1, 2
 _REALS = ("bias", "deviation", "keep", "fresh", "quantum", "substitute", "coloured", "last")
 _INTEGERS = ("mode", "delay", "capacity", "head", "started")
@@ -72,21 +70,12 @@ class WireValues:
 class WireBank:
     """The connections of a system into one group that do more than carry a value.
 
-    Parameters
-    ----------
-    step_size
-        Communication step [s].
-    sources
-        Index of each connection's output in the system's vector y.
-    outputs
-        Where what arrives is written, shape (number of connections,).
-    window
-        Where that is in the vector that the loop reads.
-
-    Raises
-    ------
-    InputError
-        If a delay is no multiple of the communication step, or a noise's bandwidth is beyond what the step shows.
+    ``step_size``: communication step [s].
+    ``sources``: index of each connection's output in the system's vector y.
+    ``outputs``: where what arrives is written, shape (number of connections,).
+    ``window``: where that is in the vector that the loop reads.
+    Raises an `InputError` if a delay is no multiple of the communication step, or a noise's bandwidth is beyond what
+    the step shows.
     """
 
     name, one_thread = "connections", "no FMU"

@@ -16,16 +16,10 @@ from orchestrator.errors import InputError
 class Wires:
     """Banks of such connections, one before each group that they lead into.
 
-    Parameters
-    ----------
-    system, schedule
-        The system, and the order in which its components step.
-    step_size
-        Communication step [s].
-    output_index
-        Where in y each coupled output stands.
-    values
-        y, and behind it a place for what arrives over each of these connections.
+    ``system`` and ``schedule``: the system, and the order in which its components step.
+    ``step_size``: communication step [s].
+    ``output_index``: where in y each coupled output stands.
+    ``values``: y, and behind it a place for what arrives over each of these connections.
     """
 
     def __init__(

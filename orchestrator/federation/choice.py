@@ -6,55 +6,31 @@ from dataclasses import dataclass, field
 from orchestrator.errors import InputError
 
 ENGINES = ("local", "helics")
-
-OWN_NAME = "gfor_cosim"
-"""Name of the federate of gfor itself."""
-
+OWN_NAME = "gfor_cosim"  # name of the federate of gfor itself
 OVER = "the run is over"
 """Reason with which gfor ends a federation at a broker that is not its own: otherwise time goes on without it."""
 
-PROTOCOL = 1
-"""Changes whenever a federate of the version before would misunderstand."""
-
-FIRST_NS = 1
-"""When gfor reads what federates published before their first step [ns]."""
-
-PATIENCE = 30.0
-"""How long a federate may take for one step, or one answer [s]."""
-
-TO_JOIN = 60.0
-"""How long is waited for all federates to join [s]."""
-
-DEFAULT_PORT = 23405
-"""Of a HELICS broker whose address names none."""
+PROTOCOL = 1  # changes whenever a federate of the version before would misunderstand
+FIRST_NS = 1  # when gfor reads what federates published before their first step [ns]
+PATIENCE = 30.0  # how long a federate may take for one step, or one answer [s]
+TO_JOIN = 60.0  # how long is waited for all federates to join [s]
+DEFAULT_PORT = 23405  # of a HELICS broker whose address names none
 
 
 @dataclass(frozen=True, slots=True)
 class Federates:
-    """A choice of federates.
-
-    Attributes
-    ----------
-    names
-        Components that gfor starts as federates on this machine, each in a process of its own.
-    external
-        Components that somebody else starts as federates: `gfor federate`, or a HELICS program of their own.
-    broker
-        Address of a broker that runs already, such as ``tcp://host:23405``; None has gfor start one.
-    port
-        Where a broker that gfor starts listens on all network interfaces; None takes a free port of this machine alone.
-    patience, to_join
-        Time for one step or answer, and for all to join [s].
-    announce
-        Takes sentences that the user should read meanwhile: who is waited for, and how long the run will take.
-    """
-
+    # components that gfor starts as federates on this machine, each in a process of its own
     names: tuple[str, ...] = ()
+    # components that somebody else starts as federates: `gfor federate`, or a HELICS program of their own
     external: tuple[str, ...] = ()
+    # address of a broker that runs already, such as ``tcp://host:23405``; None has gfor start one
     broker: str | None = None
+    # where a broker that gfor starts listens on all network interfaces; None takes a free port of this machine alone
     port: int | None = None
+    # patience, to_join: time for one step or answer, and for all to join [s]
     patience: float = PATIENCE
     to_join: float = TO_JOIN
+    # takes sentences that the user should read meanwhile: who is waited for, and how long the run will take
     announce: Callable[[str], None] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -71,10 +47,7 @@ class Federates:
 def address_of(broker: str) -> tuple[str, int]:
     """Host and port of a broker's address.
 
-    Raises
-    ------
-    InputError
-        If it is not of the form ``tcp://host:port``.
+    Raises an `InputError` if it is not of the form ``tcp://host:port``.
     """
     host, colon, port = broker.removeprefix("tcp://").partition(":")
     if not host or "/" in host or (colon and not (port.isdigit() and 0 < int(port) < 65536)):

@@ -17,11 +17,8 @@ from orchestrator.federation.layout import Part
 from orchestrator.fmi.component import Component, Derived, RealBatch
 from orchestrator.fmi.description import FmuDescription
 
-_FAILED = 3
-"""Status of a call that did not succeed, as fmi2Error."""
-
-_LONGEST_LOG = 20_000
-"""Calls of an initialisation that are kept."""
+_FAILED = 3  # status of a call that did not succeed, as fmi2Error
+_LONGEST_LOG = 20_000  # calls of an initialisation that are kept
 
 
 class Exchanges(Protocol):
@@ -38,14 +35,9 @@ class Exchanges(Protocol):
 class FederatedComponent(Derived):
     """One component of a federation.
 
-    Parameters
-    ----------
-    description
-        Of the FMU; of a foreign federate only what it publishes and takes.
-    inner
-        The FMU in this process until `hand_over`; None of a foreign federate.
-    published
-        Outputs that the federate publishes, in this order.
+    ``description``: of the FMU; of a foreign federate only what it publishes and takes.
+    ``inner``: the FMU in this process until `hand_over`; None of a foreign federate.
+    ``published``: outputs that the federate publishes, in this order.
     """
 
     def __init__(

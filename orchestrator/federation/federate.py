@@ -38,10 +38,7 @@ from orchestrator.fmi.instance import open_component
 class OwnFederate:
     """An FMU that steps when HELICS grants it time.
 
-    Parameters
-    ----------
-    to_join
-        How long a broker is waited for [s].
+    ``to_join``: how long a broker is waited for [s].
     """
 
     def __init__(self, name: str, description: FmuDescription, broker: str, to_join: float) -> None:
@@ -54,10 +51,8 @@ class OwnFederate:
     def run(self) -> None:
         """Join, and step until the federation ends.
 
-        Raises
-        ------
-        ComponentError, InputError
-            If the FMU gives no instance, the broker does not answer, or the federation ends with an error.
+        Raises a `ComponentError, InputError` if the FMU gives no instance, the broker does not answer, or the
+        federation ends with an error.
         """
         helics = library()
         with open_component(self.name, self._description, isolated=True) as component:

@@ -36,32 +36,19 @@ from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.process_end import fault_of_exit, last_line
 
-_LOOK = 0.2
-"""Between two looks at the processes while something is waited for [s]."""
-
-_GRACE = 10.0
-"""What the hub gets beyond its own patience [s]."""
-
-_TO_END = 5.0
-"""For a process to end by itself [s]."""
-
-_AFTER_CTRL_C = 2.0
-"""How long Ctrl-C waits for the end of a step [s]."""
+_LOOK = 0.2  # between two looks at the processes while something is waited for [s]
+_GRACE = 10.0  # what the hub gets beyond its own patience [s]
+_TO_END = 5.0  # for a process to end by itself [s]
+_AFTER_CTRL_C = 2.0  # how long Ctrl-C waits for the end of a step [s]
 
 
 class Federation:
     """The processes of one run, from `with` to its end.
 
-    Attributes
-    ----------
-    prepared
-        Inside of ``with``: the scenario with foreign federates as what they publish.
+    ``prepared``: Inside of ``with``: the scenario with foreign federates as what they publish.
 
-    Raises
-    ------
-    InputError
-        On entering: if the choice does not fit the scenario, the broker does not answer or its port is taken, or a
-        federate does not join, has other names or is of another version.
+    Raises `InputError` on entering: if the choice does not fit the scenario, the broker does not answer or its port is
+    taken, or a federate does not join, has other names or is of another version.
     """
 
     def __init__(self, prepared: PreparedScenario, federates: Federates) -> None:

@@ -22,12 +22,8 @@ class Frames:
     def receive(self, seconds: float | None = None) -> tuple[bytes, bytes]:
         """Receive a frame; after a TimeoutError the same call can be made again.
 
-        Raises
-        ------
-        TimeoutError
-            If no whole frame came within the time [s].
-        EOFError
-            If the other side is gone.
+        Raises a `TimeoutError` if no whole frame came within the time [s].
+        Raises an `EOFError` if the other side is gone.
         """
         self._socket.settimeout(seconds)
         while True:
@@ -60,10 +56,7 @@ class Door:
     def accept(self, seconds: float) -> Frames:
         """The hub's call.
 
-        Raises
-        ------
-        TimeoutError
-            If it does not come within the time [s].
+        Raises a `TimeoutError` if it does not come within the time [s].
         """
         self._server.settimeout(seconds)
         while True:

@@ -8,9 +8,7 @@ from typing import Any
 from fmus.toolchain.extras import require
 from orchestrator.federation.choice import address_of
 
-CORE = "zmq"
-"""HELICS's own default, and the only core of its packages that always works between machines."""
-
+CORE = "zmq"  # HELICS's own default, and the only core of its packages that always works between machines
 FAULT_MARK, OURS_MARK = "fault", "gfor-cosim"
 """Texts that a federate publishes as ``component/fault`` and ``component/gfor-cosim``."""
 
@@ -28,10 +26,7 @@ def library() -> ModuleType:
 def join(name: str, broker: str, seconds: float) -> Any:
     """A federate at a broker.
 
-    Raises
-    ------
-    helics.HelicsException
-        If the broker does not answer within the time [s], or the name is taken.
+    Raises a `helics.HelicsException` if the broker does not answer within the time [s], or the name is taken.
     """
     helics = library()
     host, port = address_of(broker)

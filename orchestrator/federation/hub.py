@@ -30,8 +30,7 @@ from orchestrator.federation.helics_calls import (
 )
 
 _END = json.dumps({"number": 0, "command": "end", "arguments": []})
-_LOOK = 0.02
-"""Between two looks at who has joined [s]."""
+_LOOK = 0.02  # between two looks at who has joined [s]
 
 
 class _FederationError(Exception):

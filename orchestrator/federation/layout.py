@@ -10,14 +10,9 @@ from orchestrator.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """One exchange within each communication step, for the federates of one group; times from its beginning [ns].
+    """One exchange within each communication step, for the federates of one group; times from its beginning [ns]."""
 
-    Attributes
-    ----------
-    publish, compute, read
-        When gfor publishes inputs, when the federates compute, and when gfor reads their outputs.
-    """
-
+    # publish, compute, read: when gfor publishes inputs, when the federates compute, and when gfor reads their outputs
     publish: int
     compute: int
     read: int
@@ -49,10 +44,8 @@ class Layout:
 def make_layout(prepared: PreparedScenario, names: Sequence[str], external: Sequence[str]) -> Layout:
     """The exchanges of a scenario some of whose components are federates.
 
-    Raises
-    ------
-    InputError
-        If there is no such component, or the schedule or the communication step cannot be kept over HELICS.
+    Raises an `InputError` if there is no such component, or the schedule or the communication step cannot be kept over
+    HELICS.
     """
     system, known = prepared.system, prepared.system.components
     for option, given in (("--federate", names), ("--external", external)):

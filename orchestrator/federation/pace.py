@@ -5,8 +5,7 @@ from time import perf_counter
 
 from orchestrator.coupling.observers import ObservedRun
 
-_LOOK = 1.0
-"""After so long the pace is told [s]."""
+_LOOK = 1.0  # after so long the pace is told [s]
 
 
 class Pace:

@@ -7,8 +7,7 @@ from orchestrator.errors import InputError
 from orchestrator.federation.choice import address_of
 
 _TRIES = 50
-_TO_CONNECT = 5.0
-"""How long a broker's address is tried [s]."""
+_TO_CONNECT = 5.0  # how long a broker's address is tried [s]
 
 
 def broker_port(wanted: int | None) -> int:

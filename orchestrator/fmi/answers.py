@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from orchestrator.errors import ComponentError, InputError, UnsupportedFmuError
 from orchestrator.fmi.protection import Protection
 
-_MOST_TEXT = 4000
-"""Characters of a text that are passed on."""
+_MOST_TEXT = 4000  # characters of a text that are passed on
 
 
 class NotAnAnswerError(ValueError):

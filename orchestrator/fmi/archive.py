@@ -25,9 +25,7 @@ from orchestrator.errors import FmuFileError, HostileFmuError
 MODEL_DESCRIPTION = "modelDescription.xml"
 
 MOST_FILES = 20_000
-MOST_BYTES = 2 * 1024**3
-"""Size of everything in an archive, unpacked."""
-
+MOST_BYTES = 2 * 1024**3  # size of everything in an archive, unpacked
 MOST_XML_BYTES = 64 * 1024**2
 MOST_XML_DEPTH = 64
 MOST_XML_ELEMENTS = 600_000
@@ -97,16 +95,9 @@ def listed_twice(path: Path) -> tuple[str, ...]:
 def extract(path: Path, folder: Path | None = None) -> Path:
     """Unpack an FMU into a folder of its own.
 
-    Parameters
-    ----------
-    folder
-        Where to; by default a new temporary folder.
-
-    Raises
-    ------
-    FmuFileError
-        If the archive is damaged, would write outside of the folder, or is larger than `MOST_BYTES`. Nothing is left
-        behind then.
+    ``folder``: where to; by default a new temporary folder.
+    Raises a `FmuFileError` if the archive is damaged, would write outside of the folder, or is larger than
+    `MOST_BYTES`. Nothing is left behind then.
     """
     with _opened(path) as archive:
         target = own_folder("fmu") if folder is None else folder

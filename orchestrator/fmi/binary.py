@@ -16,8 +16,7 @@ from orchestrator.fmi.fmi3 import FUNCTIONS as FUNCTIONS_OF_3
 from orchestrator.fmi.fmi3 import in_words_of_3, needed_functions
 from orchestrator.fmi.wine import PLATFORM
 
-_FUNCTIONS = tuple(name for name in dir(FMU2Slave) if name.startswith("fmi2"))
-"""Those of co-simulation."""
+_FUNCTIONS = tuple(name for name in dir(FMU2Slave) if name.startswith("fmi2"))  # those of co-simulation
 
 _ALWAYS = ("fmi2Instantiate", "fmi2FreeInstance", "fmi2SetupExperiment", "fmi2EnterInitializationMode",
            "fmi2ExitInitializationMode", "fmi2Terminate", "fmi2Reset", "fmi2DoStep", "fmi2GetReal",

@@ -134,10 +134,9 @@ class BoundComponent(Derived):
         except NotFiniteError:
             raise
         except ComponentError as error:
-            unlike = self.description.unlike_delivered()
-            if not unlike:
+            if not (cause := self.description.likely_cause()):
                 raise
-            said = f"{error.log}; likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]"
+            said = f"{error.log}; {cause}"
             raise ComponentError(error.component, error.call, error.status, said, error.time, error.kind) from error
 
     def progress_of_step(self) -> tuple[bool, float | None]:

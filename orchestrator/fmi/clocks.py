@@ -7,34 +7,21 @@ from xml.etree import ElementTree
 
 from orchestrator.errors import FmuFileError
 
-MOST_CLOCKS = 64
-"""As many as the adapter has bits for."""
-
+MOST_CLOCKS = 64  # as many as the adapter has bits for
 _VARIABILITIES = ("constant", "fixed", "tunable", "changing", "countdown", "triggered")
 _CONTINUOUS = ("Float64", "Float32")
 
 
 @dataclass(frozen=True, slots=True)
 class FmiClock:
-    """One clock.
-
-    Attributes
-    ----------
-    variability
-        By FMI 3.0: constant, fixed and tunable ones are periodic; changing and countdown ones tell the next interval
-        after events; triggered ones depend on others' clocks.
-    interval
-        Between two ticks [s]; None where the FMU is asked for it.
-    shift
-        Time of the first tick after the start [s].
-    """
-
     name: str
     reference: int
     causality: str
+    # by FMI 3.0: constant, fixed and tunable ones are periodic; changing and countdown ones tell the next interval
+    # after events; triggered ones depend on others' clocks
     variability: str
-    interval: float | None
-    shift: float
+    interval: float | None  # between two ticks [s]; None where the FMU is asked for it
+    shift: float  # time of the first tick after the start [s]
 
     @property
     def periodic(self) -> bool:

@@ -18,20 +18,9 @@ from orchestrator.fmi.interrupts import calls
 
 
 class Component(Protocol):
-    """An instance of an FMU.
-
-    Attributes
-    ----------
-    name
-        Name of the instance, used in errors and results.
-    pointer
-        First argument of the three functions below [address].
-    set_real, get_real, do_step
-        As fmi2SetReal, fmi2GetReal and fmi2DoStep, callable from C; they return a status.
-    """
-
-    name: str
-    pointer: Any
+    name: str  # name of the instance, used in errors and results
+    pointer: Any  # first argument of the three functions below [address]
+    # set_real, get_real, do_step: as fmi2SetReal, fmi2GetReal and fmi2DoStep, callable from C; they return a status
     set_real: Any
     get_real: Any
     do_step: Any
@@ -93,10 +82,7 @@ class Component(Protocol):
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
         """Partial derivatives of Real variables by others, from the FMU's own directional derivatives.
 
-        Returns
-        -------
-        ndarray
-            Shape (unknowns, knowns).
+        Returns shape (unknowns, knowns).
         """
 
     # -- state -----------------------------------------------------------------------------------
@@ -144,10 +130,7 @@ class Derived:
 class RealBatch:
     """Real variables of one component that are read or written together, without any copying.
 
-    Attributes
-    ----------
-    values
-        Array of shape (n,), the caller's to read or fill.
+    ``values``: Array of shape (n,), the caller's to read or fill.
     """
 
     def __init__(self, component: Component, names: Sequence[str], values: NDArray[np.float64] | None = None) -> None:

@@ -20,28 +20,18 @@ from orchestrator.fmi.mailbox import Mailbox, mailbox_library, shared_memory
 from orchestrator.fmi.process_end import ProcessFault, fault_of_exit, last_line
 from orchestrator.fmi.protection import Protection
 
-_PATIENCE = 5.0
-"""Time in which a supervisor ends all that it watches over [s]; then it is ended itself."""
+_PATIENCE = 5.0  # time in which a supervisor ends all that it watches over [s]; then it is ended itself
 
 
 class ConfinedProcess:
     """A worker, started behind a supervisor (`supervisor`).
 
-    Parameters
-    ----------
-    worker
-        Module whose function ``main`` does what the mailbox asks.
-    readable
-        Files and folders that it may read.
-    limits
-        What it may take.
-    windows
-        Whether the FMU is for Windows, and Wine's server is needed.
+    ``worker``: Module whose function ``main`` does what the mailbox asks.
+    ``readable``: Files and folders that it may read.
+    ``limits``: What it may take.
+    ``windows``: Whether the FMU is for Windows, and Wine's server is needed.
 
-    Attributes
-    ----------
-    protections
-        What keeps it from the rest of the machine; empty until the worker has told.
+    ``protections``: What keeps it from the rest of the machine; empty until the worker has told.
     """
 
     def __init__(

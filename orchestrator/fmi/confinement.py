@@ -31,8 +31,7 @@ from orchestrator.fmi.protection import (
 )
 from orchestrator.fmi.seccomp import filter_calls
 
-LAYERS = ("namespaces", "landlock", "seccomp")
-"""Means that can be left out one by one: tests try each alone."""
+LAYERS = ("namespaces", "landlock", "seccomp")  # means that can be left out one by one: tests try each alone
 
 _SYSTEM = ("/usr", "/lib", "/lib32", "/lib64", "/bin", "/sbin", "/opt", "/etc/ld.so.cache", "/etc/ld.so.conf",
            "/etc/ld.so.conf.d", "/etc/alternatives", "/etc/localtime", "/etc/timezone", "/sys/devices/system",
@@ -46,27 +45,13 @@ _OF_THE_KERNEL = ("/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/proc/stat", 
 
 @dataclass
 class Means:
-    """Which means are in force.
-
-    Attributes
-    ----------
-    namespaces
-        Empty where they are, else why not; likewise ``landlock`` and ``seccomp``.
-    own_processes
-        Whether /proc shows its own processes only.
-    read_only
-        Whether it sees every folder but its own read-only, with a limit on the size of its own.
-    supervised
-        Whether another process watches over its end.
-    """
-
-    namespaces: str = "not tried"
-    own_processes: bool = False
-    read_only: bool = False
+    namespaces: str = "not tried"  # empty where they are, else why not; likewise ``landlock`` and ``seccomp``
+    own_processes: bool = False  # whether /proc shows its own processes only
+    read_only: bool = False  # whether it sees every folder but its own read-only, with a limit on the size of its own
     version: int = 0
     landlock: str = "not tried"
     seccomp: str = "not tried"
-    supervised: bool = False
+    supervised: bool = False  # whether another process watches over its end
 
 
 def confine(
@@ -74,18 +59,11 @@ def confine(
 ) -> None:
     """Close this process off; ``means`` is completed.
 
-    Parameters
-    ----------
-    means
-        What is in force already.
-    layers
-        Which of `LAYERS` may be used.
-    work
-        The folder in which it may write.
-    readable
-        What it may read beside the system's libraries and Python's own folders.
-    windows
-        Whether the FMU is for Windows: Wine's server (`wine`) is started here, with what is in force by then.
+    ``means``: what is in force already.
+    ``layers``: which of `LAYERS` may be used.
+    ``work``: the folder in which it may write.
+    ``readable``: what it may read beside the system's libraries and Python's own folders.
+    ``windows``: whether the FMU is for Windows: Wine's server (`wine`) is started here, with what is in force by then.
     """
     if sys.platform != "linux":
         means.landlock = means.seccomp = f"{sys.platform} has none"

@@ -23,9 +23,7 @@ _WAITS = frozenset(
 )
 """Modules in which Python code waits for others; there a signal is raised at once, as Python does."""
 
-_LONGEST = 3.0
-"""Seconds that a signal waits for a library at most; afterwards it is raised wherever the program is."""
-
+_LONGEST = 3.0  # seconds that a signal waits for a library at most; afterwards it is raised wherever the program is
 _LIBRARIES = ("site-packages", "dist-packages", os.path.dirname(os.__file__))
 
 

@@ -21,11 +21,8 @@ from orchestrator.fmi.values import Scalar, typed
 from orchestrator.fmi.vendor_files import as_fmu
 
 TOOL = "gfor-cosim"
-REVERSE_DOMAIN = "org.gfor-cosim"
-"""Begins the names of what is ours inside other people's formats."""
-
-VERSIONS = ("2.0", "3.0")
-"""Of FMI that can be run."""
+REVERSE_DOMAIN = "org.gfor-cosim"  # begins the names of what is ours inside other people's formats
+VERSIONS = ("2.0", "3.0")  # of FMI that can be run
 
 _TYPES_OF_3 = {"Float64": "Real", "Float32": "Real"} | {
     f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)
@@ -42,37 +39,24 @@ _CAUSALITIES = {
 }
 """That FMI 2.0 allows with each variability."""
 
-_SCALARS = "ModelVariables/ScalarVariable"
-"""Where FMI 2.0 has its variables."""
-
+_SCALARS = "ModelVariables/ScalarVariable"  # where FMI 2.0 has its variables
 _OTHER_KINDS = {"ModelExchange": "for Model Exchange", "ScheduledExecution": "for Scheduled Execution"}
 
 
 @dataclass(frozen=True, slots=True)
 class VariableInfo:
-    """One variable of a modelDescription.
-
-    Attributes
-    ----------
-    type
-        By FMI 2.0, such as ``Real``; what that has no name for is ``Array``, ``Binary`` or ``Clock``.
-    start
-        By the type: a number of a Real, Integer or Enumeration, a bool of a Boolean, else text; None without one.
-    declared_type
-        As the file has it, such as ``Float64``.
-    """
-
     name: str
     reference: int
-    type: str
+    type: str  # by FMI 2.0, such as ``Real``; what that has no name for is ``Array``, ``Binary`` or ``Clock``
     causality: str
     variability: str
     unit: str
+    # by the type: a number of a Real, Integer or Enumeration, a bool of a Boolean, else text; None without one
     start: Scalar | None
     minimum: float | None
     maximum: float | None
     description: str
-    declared_type: str = ""
+    declared_type: str = ""  # as the file has it, such as ``Float64``
 
     @property
     def start_number(self) -> float:
@@ -84,45 +68,7 @@ class VariableInfo:
 class FmuDescription:
     """A co-simulation FMU on disk. An FMU of FMI 3.0 is described in the words of FMI 2.0.
 
-    Attributes
-    ----------
-    states
-        Names of the continuous states, in the order of ``ModelStructure/Derivatives``, then of the discrete states that
-        a sampled controller declares under ``VendorAnnotations``.
-    rates
-        Names of the continuous states' derivatives, in the same order.
-    states_are_settable
-        Whether the FMU declares that a master may set its states at communication points. That is
-        an extension of FMI; our FMUs declare it under ``VendorAnnotations``.
-    can_save_state, can_serialize_state
-        ``canGetAndSetFMUstate``, ``canSerializeFMUstate``.
-    one_instance, needs_tool
-        ``canBeInstantiatedOnlyOncePerProcess``, ``needsExecutionTool``.
-    stop_time
-        Of ``DefaultExperiment`` [s]; None where it does not say.
-    fmi_version
-        ``2.0`` or ``3.0``.
-    gives_directional_derivatives
-        ``providesDirectionalDerivative``.
-    units
-        Exponents of SI base units, factor and offset of every unit that the FMU defines, as text.
-    default_step_size
-        Communication step that the FMU suggests [s].
-    has_event_mode, returns_early
-        Of FMI 3.0: whether its events can be handled from outside, and whether it may return early from a step.
-    clocks
-        Of FMI 3.0, where it has an event mode.
-    specials
-        Of FMI 3.0 with an event mode: reference of every variable that belongs to clocks, and its clocks' references;
-        of every other variable whose change is an event, and nothing.
-    sample_time
-        Of a sampled controller that declares it under ``VendorAnnotations`` [s]; None where none does.
-    frequency
-        Parameter with the frequency at which its phase quantities repeat [Hz]; empty where it has none.
-    kept_in
-        Where a DLL keeps its state: ``arrays``, ``library``, ``hidden`` or ``not tried``; empty where it is no DLL.
-    kept_why
-        Why that was not tried, or is hidden, in words.
+    ``can_save_state``, ``can_serialize_state``: ``canGetAndSetFMUstate``, ``canSerializeFMUstate``.
     """
 
     path: Path
@@ -132,28 +78,41 @@ class FmuDescription:
     model_identifier: str
     generation_tool: str
     variables: dict[str, VariableInfo]
+    # names of the continuous states, in the order of ``ModelStructure/Derivatives``, then of the discrete states that a
+    # sampled controller declares under ``VendorAnnotations``.
     states: tuple[str, ...]
+    # whether the FMU declares that a master may set its states at communication points. That is an extension of FMI;
+    # our FMUs declare it under ``VendorAnnotations``.
     states_are_settable: bool
     can_save_state: bool
-    gives_directional_derivatives: bool
+    gives_directional_derivatives: bool  # ``providesDirectionalDerivative``
     output_dependencies: dict[str, tuple[str, ...] | None]
     platforms: tuple[str, ...]
+    # exponents of SI base units, factor and offset of every unit that the FMU defines, as text.
     units: dict[str, dict[str, str]]
-    default_step_size: float | None
+    default_step_size: float | None  # communication step that the FMU suggests [s]
     can_serialize_state: bool = False
+    # one_instance, needs_tool: ``canBeInstantiatedOnlyOncePerProcess``, ``needsExecutionTool``.
     one_instance: bool = False
     needs_tool: bool = False
-    stop_time: float | None = None
-    fmi_version: str = "2.0"
-    rates: tuple[str, ...] = ()
+    stop_time: float | None = None  # of ``DefaultExperiment`` [s]; None where it does not say
+    fmi_version: str = "2.0"  # ``2.0`` or ``3.0``
+    rates: tuple[str, ...] = ()  # names of the continuous states' derivatives, in the same order
+    # has_event_mode, returns_early: of FMI 3.0: whether its events can be handled from outside, and whether it may
+    # return early from a step.
     has_event_mode: bool = False
     returns_early: bool = False
-    clocks: tuple[FmiClock, ...] = ()
+    clocks: tuple[FmiClock, ...] = ()  # of FMI 3.0, where it has an event mode
+    # of FMI 3.0 with an event mode: reference of every variable that belongs to clocks, and its clocks' references; of
+    # every other variable whose change is an event, and nothing.
     specials: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    # of a sampled controller that declares it under ``VendorAnnotations`` [s]; None where none does.
     sample_time: float | None = None
+    # parameter with the frequency at which its phase quantities repeat [Hz]; empty where it has none.
     frequency: str = ""
+    # where a DLL keeps its state: ``arrays``, ``library``, ``hidden`` or ``not tried``; empty where it is no DLL.
     kept_in: str = ""
-    kept_why: str = ""
+    kept_why: str = ""  # why that was not tried, or is hidden, in words
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -224,10 +183,7 @@ def read_declared(path: Path | str) -> FmuDescription:
 def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
     """The description in a modelDescription.xml.
 
-    Raises
-    ------
-    FmuFileError, UnsupportedFmuError
-        As `read_description`, but for the platform.
+    Raises a `FmuFileError, UnsupportedFmuError`: As `read_description`, but for the platform.
     """
     root = _root(path, text)
     version = _fmi_version(root)

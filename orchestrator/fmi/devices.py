@@ -6,8 +6,7 @@ from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription, read_declared
 from orchestrator.fmi.vendor_files import as_fmu, is_vendor_file
 
-PORT = ("v_re", "v_im", "i_re", "i_im")
-"""Inputs and outputs of our port."""
+PORT = ("v_re", "v_im", "i_re", "i_im")  # inputs and outputs of our port
 
 NO_BUS = (
     "a controller alone stands at no bus. Lay a circuit around it with a device's file and give that instead "
@@ -23,10 +22,8 @@ def is_controller_alone(description: FmuDescription) -> bool:
 def as_device(path: Path, binding: Path | None) -> Path:
     """The FMU of what is to stand at a bus: of an FMU, of a DLL, or of a device's file.
 
-    Raises
-    ------
-    InputError
-        If it is a vendor's controller alone, and no binding makes it a device; otherwise as `as_fmu`.
+    Raises an `InputError` if it is a vendor's controller alone, and no binding makes it a device; otherwise as
+    `as_fmu`.
     """
     found = as_fmu(path)
     if binding is None and is_vendor_file(path) and is_controller_alone(read_declared(found)):

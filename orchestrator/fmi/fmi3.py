@@ -12,12 +12,9 @@ from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi.clocks import MOST_CLOCKS, FmiClock
 from orchestrator.fmi.description import FmuDescription
 
-SOURCES = ("fmi3_instance.c", "fmi3_events.c", "fmi3_as_fmi2.c")
-"""Compiled as one, in this order."""
-
+SOURCES = ("fmi3_instance.c", "fmi3_events.c", "fmi3_as_fmi2.c")  # compiled as one, in this order
 _KINDS = ("Float64", "Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean")
-_ALIKE = {"Enumeration": "Int64"}
-"""A type that goes through the functions of another."""
+_ALIKE = {"Enumeration": "Int64"}  # A type that goes through the functions of another
 
 FUNCTIONS = ("InstantiateCoSimulation", "FreeInstance", "SetDebugLogging", "EnterInitializationMode",
              "ExitInitializationMode", "Terminate", "Reset", "DoStep", "GetFMUState", "SetFMUState", "FreeFMUState",

@@ -54,16 +54,10 @@ def open_component(
 ) -> Component:
     """Instantiate an FMU.
 
-    Parameters
-    ----------
-    name
-        Name of the instance, used in errors and results.
-    description
-        The FMU; a `BoundDescription` gives a component that speaks our port.
-    directory
-        Where its archive is extracted; by default a new temporary folder of its own.
-    isolated
-        Whether it runs in a process of its own; by default all but our own FMUs do.
+    ``name``: name of the instance, used in errors and results.
+    ``description``: the FMU; a `BoundDescription` gives a component that speaks our port.
+    ``directory``: where its archive is extracted; by default a new temporary folder of its own.
+    ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do.
     """
     compile_adapters(description)
     if isinstance(description, BoundDescription):

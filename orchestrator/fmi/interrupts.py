@@ -21,13 +21,9 @@ from orchestrator.fmi.deferral import Deferral, frame_of_ours
 class _Calls:
     """``with calls:`` goes around whatever calls FMUs of this process.
 
-    Attributes
-    ----------
-    taken, terminated
-        Whether any signal was taken since the command began, and whether a SIGTERM was.
-    over
-        Whether all is done: then the exit code says how, and no signal changes it any more. It is set, not called,
-        because Python takes signals where a function begins.
+    ``taken``, ``terminated``: Whether any signal was taken since the command began, and whether a SIGTERM was.
+    ``over``: Whether all is done: then the exit code says how, and no signal changes it any more. It is set, not
+    called, because Python takes signals where a function begins.
     """
 
     def __init__(self) -> None:
@@ -64,10 +60,7 @@ class _Calls:
     def terminable(self, ending: bool = False) -> Iterator[None]:
         """Inside, the first SIGTERM does what Ctrl-C does; a second one ends the process at once.
 
-        Parameters
-        ----------
-        ending
-            Whether the process ends afterwards. Both signals are ignored then, as where `over` is set.
+        ``ending``: whether the process ends afterwards. Both signals are ignored then, as where `over` is set.
         """
         self.taken = self.terminated = self.over = False
         if threading.current_thread() is not threading.main_thread():

@@ -42,10 +42,7 @@ from orchestrator.fmi.remote_calls import RemoteCalls
 class IsolatedComponent(RemoteCalls, Derived):
     """An instance of an FMU in a process of its own.
 
-    Parameters
-    ----------
-    limits
-        What it may take.
+    ``limits``: what it may take.
     """
 
     def __init__(

@@ -20,10 +20,8 @@ _EXECUTE, _WRITE_FILE, _READ_FILE, _READ_FOLDER = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 _ALL_OF_FIRST = (1 << 13) - 1
 _REFER, _TRUNCATE, _DEVICE_CONTROL = 1 << 13, 1 << 14, 1 << 15
 _OF_A_FILE = _EXECUTE | _WRITE_FILE | _READ_FILE | _TRUNCATE | _DEVICE_CONTROL
-_TCP = 0b11
-"""To bind and to connect."""
-_SCOPES = 0b11
-"""Abstract UNIX sockets and signals reach only what is bound likewise."""
+_TCP = 0b11  # to bind and to connect
+_SCOPES = 0b11  # abstract UNIX sockets and signals reach only what is bound likewise
 
 
 def landlock_version() -> int:

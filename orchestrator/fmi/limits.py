@@ -12,9 +12,7 @@ from pathlib import Path
 
 from orchestrator.fmi.protection import CPU, DISK, MEMORY, TASKS
 
-_OUR_TASKS = 3
-"""Processes of ours around an FMU that count as its own."""
-
+_OUR_TASKS = 3  # processes of ours around an FMU that count as its own
 TO_BEGIN = 60.0
 """Wall-clock time for a process to begin, before it comes to the FMU [s]: on a busy machine that is not the FMU's."""
 
@@ -33,34 +31,17 @@ def crowded() -> float:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of a foreign FMU.
+    """Limits of a foreign FMU."""
 
-    Attributes
-    ----------
-    seconds
-        Wall-clock time for one call; in acceptance tests times `crowded`.
-    memory
-        Address space of one process beyond what it has before the FMU is loaded, and memory that all its processes
-        together have in use [bytes].
-    output
-        Largest file that it may write, its standard output included [bytes].
-    messages
-        Log messages in one call after which it counts as flooded.
-    disk
-        All files in its folder together [bytes].
-    tasks
-        Processes and threads that it may have at the same time.
-    cpu
-        Processor time that one of its processes may take [s].
-    """
-
-    seconds: float = 30.0
+    seconds: float = 30.0  # wall-clock time for one call; in acceptance tests times `crowded`
+    # address space of one process beyond what it has before the FMU is loaded, and memory that all its processes
+    # together have in use [bytes]
     memory: int = 4 * 1024**3
-    output: int = 16 * 1024**2
-    messages: int = 20_000
-    disk: int = 256 * 1024**2
-    tasks: int = 128
-    cpu: float = 7 * 86_400.0
+    output: int = 16 * 1024**2  # largest file that it may write, its standard output included [bytes]
+    messages: int = 20_000  # log messages in one call after which it counts as flooded
+    disk: int = 256 * 1024**2  # all files in its folder together [bytes]
+    tasks: int = 128  # processes and threads that it may have at the same time
+    cpu: float = 7 * 86_400.0  # processor time that one of its processes may take [s]
 
 
 def apply_limits(limits: Limits, folder: Path, *, own_users: bool) -> list[str]:

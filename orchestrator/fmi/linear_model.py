@@ -24,37 +24,28 @@ VERSION = "1.0.0"
 FOLDER = f"extra/{NAME}"
 
 _LS = "http://fmi-standard.org/fmi-ls-manifest"
-_MATLAB_HEADER = 116
-"""Bytes of free text at the beginning of a MAT file, in which scipy writes the date."""
+_MATLAB_HEADER = 116  # bytes of free text at the beginning of a MAT file, in which scipy writes the date
 
 register_namespace("fmi-ls", _LS)
 
 
 @dataclass(frozen=True)
 class EmbeddedModel:
-    """ẋ = A·x + B·u, y = C·x + D·u in deviations from an operating point.
+    """ẋ = A·x + B·u, y = C·x + D·u in deviations from an operating point."""
 
-    Attributes
-    ----------
-    A, B, C, D
-        Shapes (n, n), (n, m), (p, n), (p, m), in the variables' own units and seconds.
-    states, inputs, outputs
-        Values at the operating point by name, in the order of rows and columns.
-    parameters
-        Those that differ from the FMU's start values. With them and the inputs the FMU comes to this point.
-    origin
-        The case, scenario and component that the operating point is of, in words and figures.
-    """
-
+    # A, B, C, D: shapes (n, n), (n, m), (p, n), (p, m), in the variables' own units and seconds
     A: NDArray[np.float64]
     B: NDArray[np.float64]
     C: NDArray[np.float64]
     D: NDArray[np.float64]
+    # states, inputs, outputs: values at the operating point by name, in the order of rows and columns
     states: dict[str, float]
     inputs: dict[str, float]
     outputs: dict[str, float]
+    # Those that differ from the FMU's start values. With them and the inputs the FMU comes to this point.
     parameters: dict[str, float | bool]
     units: dict[str, str]
+    # the case, scenario and component that the operating point is of, in words and figures
     origin: dict[str, str | float]
 
 

@@ -11,8 +11,7 @@ NEW_USER, NEW_PROCESSES, NEW_NETWORK, NEW_MOUNTS, NEW_IPC = 0x10000000, 0x200000
 """Flags of ``unshare`` and ``clone``, one for each namespace."""
 
 _DIES_WITH_PARENT, _DROP_CAPABILITY, _NO_NEW_PRIVILEGES, _SUBREAPER = 1, 24, 38, 36
-_CAPABILITIES = 64
-"""More than any kernel has."""
+_CAPABILITIES = 64  # more than any kernel has
 
 
 @cache
@@ -50,10 +49,7 @@ def unshare(flags: int) -> None:
 def mount(source: str | None, target: str, kind: str | None, flags: int = 0, data: str | None = None) -> None:
     """Mount a file system.
 
-    Parameters
-    ----------
-    flags, data
-        As ``mount(2)`` takes them.
+    ``flags`` and ``data``: as ``mount(2)`` takes them.
     """
     texts = [None if text is None else os.fsencode(text) for text in (source, target, kind, data)]
     _done(libc().mount(texts[0], texts[1], texts[2], ctypes.c_ulong(flags), texts[3]))

@@ -25,29 +25,18 @@ from orchestrator.fmi.refusal import FATAL, check_log, in_its_words, refusal
 from orchestrator.fmi.wine import NoWineError
 from orchestrator.fmi.wine_program import WineProgram, proxy_path
 
-PYTHON_BACKED = "Python-backed"
-"""Why one thread alone steps an FMU: Python's lock lets one thread run at a time."""
-
-_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
-"""Kinds of ``fmi2Get…Status``."""
+PYTHON_BACKED = "Python-backed"  # why one thread alone steps an FMU: Python's lock lets one thread run at a time
+_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # kinds of ``fmi2Get…Status``
 
 
 class LoadedComponent(Derived):
     """An instance of an FMU that is loaded into this process; always released, also after an error.
 
-    Parameters
-    ----------
-    name
-        Name of the instance, used in errors and results.
-    directory
-        Where its archive is extracted; by default a new temporary folder of its own.
-    ours
-        Whether it is known to be an FMU of this project.
+    ``name``: Name of the instance, used in errors and results.
+    ``directory``: Where its archive is extracted; by default a new temporary folder of its own.
+    ``ours``: Whether it is known to be an FMU of this project.
 
-    Attributes
-    ----------
-    lost
-        Whether it said ``fmi2Fatal``: no call is allowed any more.
+    ``lost``: Whether it said ``fmi2Fatal``: no call is allowed any more.
     """
 
     def __init__(

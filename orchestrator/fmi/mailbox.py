@@ -16,10 +16,7 @@ from orchestrator.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("mailbox.c")
 _TEXT, _LOG = 1 << 24, 8192
-
-MOST, ROOM = 16384, 1 << 18
-"""References of one question; numbers of a question for many steps."""
-
+MOST, ROOM = 16384, 1 << 18  # references of one question; numbers of a question for many steps
 SET, STEP, GET = 1, 2, 4
 TALK, RUN = 2, 3
 OK = 0
@@ -134,10 +131,7 @@ def shared_memory(folder: Path) -> int | str:
 class Mailbox:
     """Memory that two processes map.
 
-    Parameters
-    ----------
-    memory
-        As `shared_memory` gave it.
+    ``memory``: as `shared_memory` gave it.
     """
 
     def __init__(self, memory: int | str) -> None:

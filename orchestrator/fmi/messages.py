@@ -15,9 +15,7 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-FLOODED = 97
-"""Exit code of a process whose FMU logs without end."""
-
+FLOODED = 97  # exit code of a process whose FMU logs without end
 _KEPT = 50
 
 try:  # printf-style arguments of native FMUs need fmpy's proxy; it is missing on some platforms
@@ -39,8 +37,7 @@ def texts(messages: Iterable[tuple[int, str]], least: int = 0) -> list[str]:
     return list(dict.fromkeys(text for status, text in messages if status >= least))
 
 
-_guards: list[Callable[[Messages], None]] = []
-"""Called for each message: none, or the one that `on_message` sets."""
+_guards: list[Callable[[Messages], None]] = []  # called for each message: none, or the one that `on_message` sets
 
 
 def on_message(

@@ -10,22 +10,12 @@ import struct
 from collections.abc import Iterable
 from pathlib import Path
 
-from orchestrator.fmi.linux import (
-    NEW_IPC,
-    NEW_MOUNTS,
-    NEW_NETWORK,
-    NEW_PROCESSES,
-    NEW_USER,
-    call,
-    mount,
-    unshare,
-)
+from orchestrator.fmi.linux import NEW_IPC, NEW_MOUNTS, NEW_NETWORK, NEW_PROCESSES, NEW_USER, call, mount, unshare
 
 _MOUNT_SETATTR, _HERE, _RECURSIVE, _READ_ONLY = 442, -100, 0x8000, 0x1
 _PRIVATE, _ALL_BELOW = 1 << 18, 1 << 14
 _NO_SETUID, _NO_DEVICES = 0x2, 0x4
-_FEWEST_NUMBERS = 301
-"""The smallest number of process numbers that the kernel lets a namespace have."""
+_FEWEST_NUMBERS = 301  # the smallest number of process numbers that the kernel lets a namespace have
 _MOST_FILES = 4096
 _SHARED = 16 * 1024**2
 """What memory shared by name may come to [bytes]; it lies outside of the folder, and counts for no process."""
@@ -44,14 +34,9 @@ def enter_namespaces() -> None:
 def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[str]:
     """Have a view of all files of one's own, where only a folder in memory can be changed.
 
-    Parameters
-    ----------
-    folder
-        Where that folder is put, empty.
-    size
-        What it may hold [bytes].
-    more
-        Folders in whose place there is an empty one in memory as well.
+    ``folder``: where that folder is put, empty.
+    ``size``: what it may hold [bytes].
+    ``more``: folders in whose place there is an empty one in memory as well.
     """
     unshare(NEW_MOUNTS)
     mount(None, "/", None, _PRIVATE | _ALL_BELOW)

@@ -5,7 +5,9 @@ network's frame, ``p`` and ``q`` at the bus [pu, S_n]; parameters ``S_n`` [MVA] 
 [pu, S_n], ``v_0`` [pu], ``theta_0`` [rad].
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from math import pi
@@ -14,6 +16,7 @@ from typing import Any, Self
 from fmus.toolchain.port_variables import INPUTS, OUTPUTS, S_N, START_VALUES
 from fmus.toolchain.variables import Variable
 from orchestrator.fmi.description import FmuDescription, VariableInfo
+from orchestrator.units import to_unit
 
 PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 """Variables of the port; their places are their value references."""
@@ -21,11 +24,14 @@ PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 START = tuple(variable.name for variable in START_VALUES)
 """Its parameters: the rating and the power flow's start values."""
 
-_SAME, _OTHER = 0.01, 2.0
-"""How far the rating of a binding may be from the FMU's own, and the factor from which on its start is another's."""
+_SAME, _NEAR, _OTHER = 0.01, 1.06, 2.0
+"""How far the rating of a binding may be from the FMU's own, and the factors from which on its start is another's: in
+volts, and in general.
+"""
 
-Matrix2 = tuple[float, float, float, float]
-"""A real 2×2 matrix, by rows."""
+_NAMED = {name: re.compile(rf"(?:^|\.){of}_?(?:n|nom|rated)$", re.I) for name, of in (("S_n", "s"), ("V_n", "[vu]"))}
+
+Matrix2 = tuple[float, float, float, float]  # A real 2×2 matrix, by rows
 
 
 class Form(IntEnum):
@@ -39,23 +45,15 @@ class Form(IntEnum):
 
 @dataclass(frozen=True)
 class PhasorMap:
-    """Voltage or current as the FMU has it.
-
-    Attributes
-    ----------
-    matrix
-        Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
-        its own rating. Magnitude and angle, phases and powers are taken behind or before it.
-    angle_factor
-        The FMU's unit of angle per radian.
-    per_rating
-        Current: whether the matrix grows with S_n (several units in parallel, or an output in pu of the rating).
-    """
+    """Voltage or current as the FMU has it."""
 
     form: Form
     variables: tuple[str, ...]
+    # Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
+    # its own rating. Magnitude and angle, phases and powers are taken behind or before it.
     matrix: Matrix2
-    angle_factor: float = 1.0
+    angle_factor: float = 1.0  # the FMU's unit of angle per radian
+    # current: whether the matrix grows with S_n (several units in parallel, or an output in pu of the rating)
     per_rating: bool = True
 
 
@@ -81,28 +79,18 @@ class SignalMap:
 
 @dataclass(frozen=True)
 class PortMap:
-    """All of a binding, in numbers.
+    """All of a binding, in numbers."""
 
-    Attributes
-    ----------
-    rating
-        S_n of the FMU as delivered [MVA].
-    start
-        For each of `START` the variables that take it; none for those that the FMU does not know.
-    settings
-        Values of the FMU's own parameters and inputs.
-    current_limit
-        Largest current that it gives, as somebody declares it [pu, rating].
-    """
-
-    rating: float
+    rating: float  # S_n of the FMU as delivered [MVA]
     f_n: float
     voltage: PhasorMap
     current: PhasorMap
+    # for each of `START` the variables that take it; none for those that the FMU does not know
     start: Mapping[str, tuple[StartMap, ...]]
     signals: Mapping[str, SignalMap]
-    settings: Mapping[str, float | bool]
-    current_limit: float | None = None
+    settings: Mapping[str, float | bool]  # values of the FMU's own parameters and inputs
+    current_limit: float | None = None  # largest current that it gives, as somebody declares it [pu, rating]
+    V_n: float | None = None  # the voltage of one of them, line to line [kV]; None where nothing needs it
 
     @classmethod
     def of_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -136,22 +124,17 @@ class PortMap:
 
 @dataclass(frozen=True, kw_only=True)
 class BoundDescription(FmuDescription):
-    """A foreign FMU, described with the variables of our port and whatever else it has.
-
-    Attributes
-    ----------
-    inner_names
-        For every variable here that is not the port's: the FMU's own name of it. A variable whose own name is one of
-        the port's is called ``native.<name>`` here.
-    """
+    """A foreign FMU, described with the variables of our port and whatever else it has."""
 
     inner: FmuDescription
     port: PortMap
+    # For every variable here that is not the port's: the FMU's own name of it. A variable whose own name is one of the
+    # port's is called ``native.<name>`` here.
     inner_names: Mapping[str, str]
 
     def unlike_delivered(self) -> dict[str, str]:
         """Ratings of the binding, by name, that do not fit to what the FMU starts with by itself, and why."""
-        found, port = {}, self.port
+        found, port = dict(self._unlike_named()), self.port
         for name in ("S_n", "v_0", "P_0"):
             for target in port.start.get(name, ()):
                 info = self.inner.variables[target.variable]
@@ -161,11 +144,34 @@ class BoundDescription(FmuDescription):
                 itself = f"{info.name} is {info.start:g} {info.unit or 'pu'} by itself, {value:.3g} times"
                 if name == "S_n" and info.name not in port.settings and abs(value / port.rating - 1) > _SAME:
                     found["S_n"] = f"S_n = {port.rating:g} MVA, and the FMU's {info.name} is {value:g} MVA by itself"
-                if name == "v_0" and not 1 / _OTHER < value < _OTHER:
-                    found["V_n"] = f"another V_n than the FMU starts with: its {itself} what is bound"
+                V_n = None if info.unit in ("pu", "p.u.", "1", "") else port.V_n
+                most = _NEAR if V_n else _OTHER
+                if name == "v_0" and not 1 / most < value < most:
+                    kV = f" ({V_n:g} kV, and {value * V_n:.3g} kV by itself)" if V_n else ""
+                    found.setdefault("V_n", f"another V_n than the FMU starts with: its {itself} what is bound{kV}")
                 if name == "P_0" and value > _OTHER:
                     found.setdefault("S_n", f"S_n = {port.rating:g} MVA, and the FMU's {itself} as much")
         return found
+
+    def _unlike_named(self) -> Iterator[tuple[str, str]]:
+        """By the FMU's own parameters that are called as a rating is, and say something else."""
+        own = [v for v in self.inner.variables.values() if v.causality == "parameter" and v.type == "Real"]
+        for name, unit, bound in (("S_n", "MVA", self.port.rating), ("V_n", "kV", self.port.V_n)):
+            if bound is None:
+                continue
+            for info in (v for v in own if v.unit and v.start and v.name not in self.port.taken):
+                with suppress(ValueError):
+                    value = (
+                        to_unit(f"{info.start_number} {info.unit}", unit) if _NAMED[name].search(info.name) else bound
+                    )
+                    if abs(value / bound - 1) > _SAME:
+                        said = f"{name} = {bound:g} {unit}, and the FMU's {info.name} is {value:g} {unit} by itself"
+                        yield name, said
+
+    def likely_cause(self) -> str:
+        """What of the ratings does not fit, as the end of a sentence on something that went wrong; "" for nothing."""
+        unlike = self.unlike_delivered()
+        return f"likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]" if unlike else ""
 
     @classmethod
     def of(cls, inner: FmuDescription, port: PortMap) -> Self:

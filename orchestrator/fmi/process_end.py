@@ -27,10 +27,7 @@ class ProcessFault(StrEnum):
 def fault_of_exit(code: int, limits: Limits) -> tuple[ProcessFault, str]:
     """Name of the fault that ended a process, and what happened.
 
-    Parameters
-    ----------
-    code
-        As `subprocess.Popen.wait` returns it: the negative number of a signal where one ended the process.
+    ``code``: As `subprocess.Popen.wait` returns it: the negative number of a signal where one ended the process.
 
     Examples
     --------

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _PROC = Path("/proc")
-MOST_FILES = 20_000
-"""Files and folders below a folder beyond which it counts as too large."""
+MOST_FILES = 20_000  # files and folders below a folder beyond which it counts as too large
 
 
 @dataclass(frozen=True, slots=True)

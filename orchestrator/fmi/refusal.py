@@ -18,23 +18,16 @@ _SILENT = {
 }
 """What a status means where an FMU says nothing."""
 
-Said = Callable[[int], list[str]]
-"""Gives the distinct messages of at least a status, oldest first."""
+Said = Callable[[int], list[str]]  # gives the distinct messages of at least a status, oldest first
 
 
 def refusal(component: Component, said_by: Said, status: int, call: str, time: float | None) -> CosimError:
     """The error for a call whose status is neither OK nor Warning.
 
-    Parameters
-    ----------
-    said_by
-        The FMU's log since the call.
-    status
-        The call's, as FMI 2.0 numbers them.
-    call
-        By its name in FMI 2.0; the error has the name in the FMU's own version.
-    time
-        Of a step [s].
+    ``said_by``: the FMU's log since the call.
+    ``status``: the call's, as FMI 2.0 numbers them.
+    ``call``: by its name in FMI 2.0; the error has the name in the FMU's own version.
+    ``time``: of a step [s].
     """
     described = component.description
     name = in_its_words(described, STATUS[status] if status < len(STATUS) else f"status {status}")

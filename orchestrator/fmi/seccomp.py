@@ -19,8 +19,7 @@ _SET_FILTER, _ALL_THREADS = 1, 1
 _LOAD, _EQUAL, _ANY_BIT, _AND, _RETURN = 0x20, 0x15, 0x45, 0x54, 0x06
 _ALLOW, _ERROR = 0x7FFF0000, 0x00050000
 _NUMBER, _ARCHITECTURE = 0, 4
-_32_BIT_CALLS = 0x40000000
-"""Numbers from here on are those of x32, a second way to every call on x86."""
+_32_BIT_CALLS = 0x40000000  # numbers from here on are those of x32, a second way to every call on x86
 _DATAGRAM, _RAW = 2, 3
 _TYPE_OF_SOCKET = 0xF
 _NEW_NAMESPACES = 0x7E020000
@@ -60,11 +59,9 @@ _OF_A_PROCESS = {
     "sched_setparam": (142, 118), "sched_setattr": (314, 274), "migrate_pages": (256, 238), "move_pages": (279, 239),
 }  # fmt: skip
 """Their first argument says whose limits, processors or pages are changed; 0 is the caller."""
-_OF_SOME_PROCESS = {"setpriority": (141, 140), "ioprio_set": (251, 30)}
-"""Likewise, their second argument."""
+_OF_SOME_PROCESS = {"setpriority": (141, 140), "ioprio_set": (251, 30)}  # likewise, their second argument
 _SOCKETPAIR, _CLONE, _CLONE3, _PRCTL = (53, 199), (56, 220), (435, 435), (157, 167)
-_SET_DUMPABLE = 4
-"""An option of prctl by which a process hides what it has in use."""
+_SET_DUMPABLE = 4  # an option of prctl by which a process hides what it has in use
 
 
 def _step(code: int, value: int, then: int = 0, otherwise: int = 0) -> bytes:
@@ -118,17 +115,12 @@ def _program(own_process: int | None, *, signals: bool, attributes: bool, ipc: b
 def filter_calls(*, attributes: bool, ipc: bool, own_process: int | None, signals: bool) -> None:
     """Refuse system calls in every thread of this process and in what they start, for good.
 
-    Parameters
-    ----------
-    attributes
-        Whether the mode, the owner, the times and the extended attributes of files are kept from it as well, also in
-        its own folder: where no read-only mount protects those of other files.
-    ipc
-        Whether semaphores of System V and queues by name are refused: where they are not its own.
-    own_process
-        Number of the only process whose limits and priority it may change: its own; None where it sees no other.
-    signals
-        Whether it may send signals to that process only: where they would reach others.
+    ``attributes``: whether the mode, the owner, the times and the extended attributes of files are kept from it as
+    well, also in its own folder: where no read-only mount protects those of other files.
+    ``ipc``: whether semaphores of System V and queues by name are refused: where they are not its own.
+    ``own_process``: number of the only process whose limits and priority it may change: its own; None where it sees no
+    other.
+    ``signals``: whether it may send signals to that process only: where they would reach others.
     """
     program = _program(own_process, signals=signals and own_process is not None, attributes=attributes, ipc=ipc)
     buffer = ctypes.create_string_buffer(program, len(program))

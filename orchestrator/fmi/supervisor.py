@@ -27,10 +27,8 @@ from orchestrator.fmi.linux import adopt_orphans, die_with_parent
 from orchestrator.fmi.namespaces import enter_namespaces, mount_read_only
 from orchestrator.fmi.process_tree import descendants, end_descendants, size_of, size_of_removed, usage
 
-_LOOK = 100
-"""Time after which it is looked what the FMU's processes take [ms]."""
-_OURS = 256 * 1024**2
-"""Memory that the worker may have in use before the FMU is loaded [bytes]; it takes some 100 MB."""
+_LOOK = 100  # time after which it is looked what the FMU's processes take [ms]
+_OURS = 256 * 1024**2  # memory that the worker may have in use before the FMU is loaded [bytes]; it takes some 100 MB
 _LINUX = sys.platform == "linux"
 
 

@@ -14,18 +14,13 @@ from orchestrator.fmi import wine
 from orchestrator.safe_files import file_hash
 
 DLL_ENDINGS = (".so", ".dll", ".dylib")
-DEVICE_ENDING = ".toml"
-"""Of a file that lays a circuit around a DLL."""
-
-_KEPT = "dlls"
-"""Not the folder of our own FMUs, which are trusted: a vendor's code runs in a process of its own."""
-
+DEVICE_ENDING = ".toml"  # of a file that lays a circuit around a DLL
+_KEPT = "dlls"  # not the folder of our own FMUs, which are trusted: a vendor's code runs in a process of its own
 _FOR_NOW = "for-now"
 """Folder beside a kept FMU with one whose DLL could not be tried at that time; each process tries it once."""
 
 _log = logging.getLogger("gfor")
-_tried_now: dict[Path, Path] = {}
-"""FMUs for now that this process made, by where they would be kept for good."""
+_tried_now: dict[Path, Path] = {}  # FMUs for now that this process made, by where they would be kept for good
 
 READER = "orchestrator.fmi.dll_reading"
 """Module whose process, closed off, reads a DLL; also one for Windows, under Wine."""
@@ -34,10 +29,7 @@ READER = "orchestrator.fmi.dll_reading"
 def foreign_platforms(library: Path) -> tuple[str, ...]:
     """Platforms other than this machine's whose DLLs run here.
 
-    Raises
-    ------
-    InputError
-        If a DLL for Windows needs Wine, which is not there, or its program cannot be compiled.
+    Raises an `InputError` if a DLL for Windows needs Wine, which is not there, or its program cannot be compiled.
     """
     try:
         with library.open("rb") as file:

@@ -23,9 +23,7 @@ from pathlib import Path
 
 from orchestrator.fmi.linux import die_with_parent
 
-PLATFORM = "win64"
-"""FMI's name of the platform whose libraries Wine runs."""
-
+PLATFORM = "win64"  # FMI's name of the platform whose libraries Wine runs
 _LOADERS = ("wine64", "/usr/lib/wine/wine64", "wine")
 _SERVERS = ("/usr/lib/wine/wineserver64", "/usr/lib/wine/wineserver", "wineserver")
 PREFIX = "wine"
@@ -36,12 +34,9 @@ _BESIDE = ("lib64/wine", "lib/wine")
 """From the folder above that of the loader, where Wine is not one of the system's own."""
 NOTE = "wine-socket"
 """Debian's server has its sockets in such a folder in the place that TMPDIR names; its name stands in the prefix."""
-_LONGEST = 20.0
-"""For the server to begin [s]."""
-SHARED = 24 * 1024**2
-"""Size of the memory that a program shares with whoever asks it [bytes]; a mailbox and no more."""
-_LEFT_BEHIND = 86_400.0
-"""Age of an empty folder for sockets at which nobody is about to use it [s]."""
+_LONGEST = 20.0  # for the server to begin [s]
+SHARED = 24 * 1024**2  # size of the memory that a program shares with whoever asks it [bytes]; a mailbox and no more
+_LEFT_BEHIND = 86_400.0  # age of an empty folder for sockets at which nobody is about to use it [s]
 _NOT_STARTED = "wineboot.exe,services.exe,explorer.exe,winedevice.exe=d"
 """Programs of Windows that a library has no use for."""
 
@@ -162,12 +157,8 @@ def _end_with_parent() -> None:
 class Server:
     """Wine's server for one prefix, with a connection that one program can use.
 
-    Parameters
-    ----------
-    folder
-        Where `prepare` made the prefix.
-    tied
-        Whether the kernel ends it, and its programs, with the thread that started them.
+    ``folder``: where `prepare` made the prefix.
+    ``tied``: whether the kernel ends it, and its programs, with the thread that started them.
     """
 
     def __init__(self, folder: Path, *, tied: bool, programs: int = 1) -> None:
@@ -232,5 +223,4 @@ class Server:
 in_process: list[Server] = []
 """The server of this process, which closed itself off after it was started; none elsewhere."""
 
-PROGRAMS = 16
-"""That a process which closed itself off can start: instances at once, and those that crashed."""
+PROGRAMS = 16  # that a process which closed itself off can start: instances at once, and those that crashed

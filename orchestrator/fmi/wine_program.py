@@ -37,10 +37,8 @@ _FROM_OUTSIDE = tuple(
     -getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT") if hasattr(signal, name)
 )
 """How a process is ended by others."""
-_TO_END = 2.0
-"""For a program that no longer answers to end [s]."""
-_WORDS = 4000
-"""Most bytes of its last words that are read."""
+_TO_END = 2.0  # for a program that no longer answers to end [s]
+_WORDS = 4000  # most bytes of its last words that are read
 _idle: list[tuple[Path, "subprocess.Popen[bytes]"]] = []
 """Programs without an instance, in a process that is closed off, with the files of their shared memory."""
 
@@ -85,10 +83,7 @@ def proxy() -> Any:
 class WineProgram:
     """The program under Wine, with one library loaded.
 
-    Parameters
-    ----------
-    patience
-        Time for one answer [s].
+    ``patience``: time for one answer [s].
     """
 
     def __init__(self, library: Path, patience: float = 1e300, note: Note | None = None) -> None:
@@ -138,10 +133,7 @@ class WineProgram:
     def ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:
         """One question to the program.
 
-        Parameters
-        ----------
-        command
-            One of those of `wine_talk.c`.
+        ``command``: one of those of `wine_talk.c`.
         """
         for k, value in enumerate(arguments):
             self._talk.a[k] = value

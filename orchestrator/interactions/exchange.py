@@ -14,8 +14,7 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.interactions.places import Place
 
-SAME_FLOW = 1e-6
-"""Largest difference of a bus voltage [pu] between two systems at the same operating point."""
+SAME_FLOW = 1e-6  # largest difference of a bus voltage [pu] between two systems at the same operating point
 
 STAND_IN = "static_generation"
 """The neutral device: the current of the operating point, which turns with the voltage, and no other dynamics."""
@@ -116,15 +115,8 @@ def _kept(events: list[EventTable]) -> list[EventTable]:
 def require_same_flow(wanted: Mapping[str, complex], prepared: PreparedScenario) -> None:
     """Refuse a system whose power flow is another one.
 
-    Parameters
-    ----------
-    wanted
-        Voltages of all buses [pu]; empty for a case without a power flow.
-
-    Raises
-    ------
-    InputError
-        If a voltage differs by more than `SAME_FLOW`.
+    ``wanted``: voltages of all buses [pu]; empty for a case without a power flow.
+    Raises an `InputError` if a voltage differs by more than `SAME_FLOW`.
     """
     found = voltages_of(prepared.power_flow)
     apart = {bus: abs(found.get(bus, 0j) - voltage) for bus, voltage in wanted.items()}

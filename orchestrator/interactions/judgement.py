@@ -16,8 +16,7 @@ from orchestrator.interactions.point import SharedMode, SystemRecord
 from orchestrator.interactions.study import InteractionsResult
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
 
-SAME = 0.01
-"""A damping that falls by no more than this [points] is the same: what a perturbation leaves open."""
+SAME = 0.01  # A damping that falls by no more than this [points] is the same: what a perturbation leaves open
 
 
 """In the reason why a component that hides its states cannot be linearised."""

@@ -13,12 +13,9 @@ GENERATORS, GRID, OTHERS = "generators", "grid", "others"
 
 NOT_VENDORS = (GENERATORS, GRID, OTHERS)
 
-_IN, _OUT = ("v_re", "v_im"), ("i_re", "i_im")
-"""A device takes the voltage of its bus and gives its current."""
+_IN, _OUT = ("v_re", "v_im"), ("i_re", "i_im")  # A device takes the voltage of its bus and gives its current
 
-_OF_MACHINES = "machine."
-"""Begin of a generator's variables."""
-
+_OF_MACHINES = "machine."  # begin of a generator's variables
 _OF_THE_GRID = ("external_grid", "static_generation")
 """Begins of models with a port that stand for a part of the network."""
 
@@ -89,10 +86,7 @@ def groups_of(
 def by_group(shares: Mapping[str, float], groups: Mapping[str, str]) -> dict[str, float]:
     """The participation of every group in a mode, largest first; it sums to 1 as the components' does.
 
-    Parameters
-    ----------
-    groups
-        Of every component; one that is not there counts to `OTHERS`.
+    ``groups``: of every component; one that is not there counts to `OTHERS`.
     """
     found: dict[str, float] = {}
     for name, share in shares.items():

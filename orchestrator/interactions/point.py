@@ -27,18 +27,8 @@ from orchestrator.study.modes import ModesResult, compute_modes, running
 class SystemTask:
     """A scenario with the devices of one system.
 
-    Attributes
-    ----------
-    case, fingerprint, scenario, layers, step_size, frequency_range, trust_fmus
-        As in `orchestrator.sweep.point.SweepPointTask`.
-    exchanged
-        Tables of the devices that are other than the case's, by component, as their keys and values.
-    voltages
-        Real and imaginary part [pu] of every bus voltage of the power flow.
-    black_box
-        Whether components that hide their states are identified.
-    key
-        Name of the point's file.
+    ``case``, ``fingerprint``, ``scenario``, ``layers``, ``step_size``, ``frequency_range``, ``trust_fmus``: As in
+    `orchestrator.sweep.point.SweepPointTask`.
     """
 
     case: str
@@ -47,28 +37,20 @@ class SystemTask:
     layers: tuple[ParameterFile, ...]
     step_size: float | None
     frequency_range: tuple[float, float]
+    # tables of the devices that are other than the case's, by component, as their keys and values.
     exchanged: dict[str, dict[str, Any]]
-    voltages: dict[str, tuple[float, float]]
-    black_box: bool
-    key: str
+    voltages: dict[str, tuple[float, float]]  # real and imaginary part [pu] of every bus voltage of the power flow
+    black_box: bool  # whether components that hide their states are identified
+    key: str  # name of the point's file
     trust_fmus: bool = False
 
 
 @dataclass(frozen=True)
 class SharedMode:
-    """A mode with who takes part in it.
-
-    Attributes
-    ----------
-    real, imag
-        Of the eigenvalue [1/s, rad/s].
-    components
-        Participation of every component; the shares sum to 1.
-    """
-
+    # real, imag: of the eigenvalue [1/s, rad/s]
     real: float
     imag: float
-    components: dict[str, float]
+    components: dict[str, float]  # participation of every component; the shares sum to 1
 
     @classmethod
     def of(cls, mode: Mode) -> Self:
@@ -92,34 +74,18 @@ class SharedMode:
 
 @dataclass(frozen=True)
 class SystemRecord:
-    """What was found of one system.
-
-    Attributes
-    ----------
-    modes
-        Oscillations of the range, least damped first.
-    growing
-        The mode that grows fastest, at any frequency; None where nothing is known to grow.
-    stability, because
-        The verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in words; empty where it
-        failed.
-    identified
-        Components that hide their states and were identified.
-    residual
-        Of the steady state, as in `OperatingPoint`.
-    failure
-        Why there are no modes; None where there are.
-    """
-
-    modes: tuple[SharedMode, ...] = ()
+    modes: tuple[SharedMode, ...] = ()  # oscillations of the range, least damped first
+    # the mode that grows fastest, at any frequency; None where nothing is known to grow
     growing: SharedMode | None = None
+    # stability, because: the verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in
+    # words; empty where it failed
     stability: dict[str, Any] = field(default_factory=dict)
     because: str = ""
     warnings: tuple[str, ...] = ()
-    identified: tuple[str, ...] = ()
+    identified: tuple[str, ...] = ()  # components that hide their states and were identified
     states: int = 0
-    residual: float = float("nan")
-    failure: Failure | None = None
+    residual: float = float("nan")  # of the steady state, as in `OperatingPoint`
+    failure: Failure | None = None  # why there are no modes; None where there are
 
     @property
     def error(self) -> str | None:

@@ -12,12 +12,10 @@ from orchestrator.report.html.elements import Figures, damping, eigenvalue, numb
 from orchestrator.safe_files import write_text
 
 _CELL, _MARGIN = 96, 120
-_LONGEST = 13
-"""Characters that fit above a square, and left of it."""
+_LONGEST = 13  # characters that fit above a square, and left of it
 
 _GOOD, _MIDDLE, _BAD, _UNKNOWN = (86, 180, 233), (255, 255, 255), (213, 94, 0), "#d9d9d9"
-_FULL = 20.0
-"""Damping [%] with the full colour of good ones; −20 % has that of bad ones."""
+_FULL = 20.0  # damping [%] with the full colour of good ones; −20 % has that of bad ones
 
 
 def write_page(judgement: JudgedInteractions, path: Path) -> None:

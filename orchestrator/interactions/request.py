@@ -4,10 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from orchestrator.asked import FLAG, FREQUENCIES, NAME, NAMES, SHARE, asked
 from orchestrator.cases.schema import Value
-
-THRESHOLD = 0.05
-"""Share of a mode from which on a vendor takes part in it."""
 
 RANGE_HZ = (0.1, 100.0)
 """Frequencies of the modes that are compared [Hz]: swings, and what converters' controls do up to twice the rated
@@ -26,30 +24,19 @@ class GivenDevice:
 
 @dataclass(frozen=True)
 class InteractionsRequest:
-    """What is studied.
+    """What is studied; ``devices`` are tried beside those of the case."""
 
-    Attributes
-    ----------
-    threshold
-        Share of a mode from which on a vendor takes part in it.
-    frequency_range
-        Of the modes [Hz].
-    stand_in
-        Model of the catalogue at the places of the vendors that a system does without; None for the neutral one.
-    swap
-        Whether all devices are tried at all places.
-    devices
-        That are tried beside those of the case.
-    swapped
-        Places that are swapped; all where empty.
-    black_box
-        Whether components that hide their states are identified.
-    """
-
-    threshold: float = THRESHOLD
-    frequency_range: tuple[float, float] = RANGE_HZ
-    stand_in: str | None = None
-    swap: bool = False
+    threshold: float = asked(SHARE, 0.05, "share of a mode from which on a vendor takes part in it (default: 5)")
+    frequency_range: tuple[float, float] = asked(
+        FREQUENCIES, RANGE_HZ, "frequencies [Hz] (default: 0.1:100)", option="--range", keyword="frequencies"
+    )
+    stand_in: str | None = asked(
+        NAME, None, "model at the places of the vendors that a system does without (default: static_generation, a "
+        "current without dynamics; gfor is the reference converter)", "MODEL",
+    )  # fmt: skip
+    swap: bool = asked(FLAG, False, "each vendor's device at each place, in all ways")
     devices: tuple[GivenDevice, ...] = ()
-    swapped: tuple[str, ...] = ()
-    black_box: bool = False
+    swapped: tuple[str, ...] = asked(
+        NAMES, (), "swap only at this place (repeatable)", "COMPONENT", option="--place", keyword="places"
+    )
+    black_box: bool = asked(FLAG, False, "identify the components that hide their states from their inputs and outputs")

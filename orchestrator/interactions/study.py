@@ -25,39 +25,17 @@ Placed = Mapping[str, tuple[ComponentTable, Any]]
 
 @dataclass(frozen=True)
 class InteractionsPlan:
-    """What a study computes.
-
-    Attributes
-    ----------
-    layers
-        Parameter files, and after them the values of the command line; weakest first.
-    step_size
-        Communication step [s]; None for the case's.
-    places
-        The converters, by component.
-    groups
-        Group of every component: its vendor, or what else it is.
-    stand_in
-        Model at the places of the vendors that a system does without.
-    swapped
-        Places that are swapped; none without a swap.
-    systems
-        Devices that are other than the case's, of every system.
-    files
-        What stands for the files of such devices in keys, by model or file.
-    """
-
     case: Case
     prepared: PreparedScenario
-    layers: tuple[ParameterFile, ...]
-    step_size: float | None
+    layers: tuple[ParameterFile, ...]  # parameter files, and after them the values of the command line; weakest first
+    step_size: float | None  # communication step [s]; None for the case's
     request: InteractionsRequest
-    places: dict[str, Place]
-    groups: dict[str, str]
-    stand_in: str
-    swapped: tuple[str, ...]
-    systems: dict[SystemName, Exchanged]
-    files: dict[str, list[str]]
+    places: dict[str, Place]  # the converters, by component
+    groups: dict[str, str]  # group of every component: its vendor, or what else it is
+    stand_in: str  # model at the places of the vendors that a system does without
+    swapped: tuple[str, ...]  # places that are swapped; none without a swap
+    systems: dict[SystemName, Exchanged]  # devices that are other than the case's, of every system
+    files: dict[str, list[str]]  # what stands for the files of such devices in keys, by model or file
 
     @property
     def vendors(self) -> tuple[str, ...]:
@@ -92,16 +70,10 @@ class InteractionsPlan:
 
 @dataclass
 class InteractionsResult:
-    """All systems of a study.
-
-    Attributes
-    ----------
-    computed, stored
-        Number of systems computed now, and number read from an earlier start. Systems of the same devices count once.
-    """
-
     plan: InteractionsPlan
     records: dict[SystemName, SystemRecord] = field(default_factory=dict)
+    # computed, stored: Number of systems computed now, and number read from an earlier start. Systems of the same
+    # devices count once.
     computed: int = 0
     stored: int = 0
 
@@ -116,22 +88,12 @@ def plan_interactions(
 ) -> InteractionsPlan:
     """Check a study, and build the FMUs that it needs.
 
-    Parameters
-    ----------
-    scenario
-        Name of the scenario; None for the only one.
-    overrides
-        Values by ``component.variable``; they go before the parameter files.
-    step_size
-        Communication step [s]; the case's where None.
-    parameters
-        Parameter files; a later one goes before an earlier one.
-
-    Raises
-    ------
-    InputError
-        If the scenario, a place or a device is unknown, there are too many systems, or another device gives another
-        power flow.
+    ``scenario``: name of the scenario; None for the only one.
+    ``overrides``: values by ``component.variable``; they go before the parameter files.
+    ``step_size``: communication step [s]; the case's where None.
+    ``parameters``: parameter files; a later one goes before an earlier one.
+    Raises an `InputError` if the scenario, a place or a device is unknown, there are too many systems, or another
+    device gives another power flow.
     """
     name = _scenario(case, scenario)
     (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
@@ -157,17 +119,11 @@ def plan_interactions(
 
 
 def run_interactions(
-    plan: InteractionsPlan,
-    executor: Executor,
-    store: PointStore,
-    report: CountReport = lambda done, total: None,
+    plan: InteractionsPlan, executor: Executor, store: PointStore, report: CountReport = lambda done, total: None
 ) -> InteractionsResult:
     """Compute the systems that are not stored yet; systems of the same devices are computed once.
 
-    Parameters
-    ----------
-    plan
-        A plan that `plan_interactions` has checked.
+    ``plan``: A plan that `plan_interactions` has checked.
     """
     result = InteractionsResult(plan)
     tasks: dict[str, SystemTask] = {}

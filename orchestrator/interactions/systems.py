@@ -14,8 +14,7 @@ from orchestrator.interactions.request import GivenDevice
 MOST_ASSIGNMENTS = 64
 """So many assignments of devices to places are computed at most: all of three devices at three places, with room."""
 
-MOST_VENDORS = 12
-"""So many vendors are compared at most: 66 pairs."""
+MOST_VENDORS = 12  # so many vendors are compared at most: 66 pairs
 
 
 class Kind(StrEnum):
@@ -47,17 +46,13 @@ class SystemName:
 
 WHOLE, NONE = SystemName(Kind.WHOLE), SystemName(Kind.NONE)
 
-Exchanged = dict[str, ComponentTable]
-"""What stands at a place in place of the case's own device, by component."""
+Exchanged = dict[str, ComponentTable]  # what stands at a place in place of the case's own device, by component
 
 
 def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemName, Exchanged]:
     """The case as it is, without any vendor, with each alone and with each pair.
 
-    Raises
-    ------
-    InputError
-        If there are more than `MOST_VENDORS`.
+    Raises an `InputError` if there are more than `MOST_VENDORS`.
     """
     vendors = vendors_of(places)
     if len(vendors) > MOST_VENDORS:
@@ -80,10 +75,8 @@ def assignments(
 ) -> dict[SystemName, Exchanged]:
     """Each device at each of some places, in all ways.
 
-    Raises
-    ------
-    InputError
-        If there is nothing to swap, two devices have one name, or there are more than `MOST_ASSIGNMENTS`.
+    Raises an `InputError` if there is nothing to swap, two devices have one name, or there are more than
+    `MOST_ASSIGNMENTS`.
     """
     templates = first_of({name: places[name] for name in at})
     vendors = {place.vendor for place in places.values()}  # those at places that are not swapped as well

@@ -17,22 +17,24 @@ from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, m
 from orchestrator.results.mode_json import eigenvalue_json
 
 _LEAST_SHARE = 0.005
+_VERDICT = ("Verdict", "Least damping [%]", "Mode")
 
 
 def modes_table(judgement: JudgedInteractions) -> PlainTable:
     """The modes of the system as it is, with the participation of every group."""
     groups = groups_shown(judgement)
-    table = make_table("As in the case", "Mode [rad/s]", "f [Hz]", "Damping [%]", *groups, "Shared by", left=1)
-    for judged in judgement.modes:
-        mode = judged.mode
-        table.add_row(
-            eigenvalue_text(mode.eigenvalue),
-            f"{mode.frequency_hz:.4f}",
-            f"{mode.damping_percent:.2f}",
+    columns = ("Mode [rad/s]", "f [Hz]", "Damping [%]", *groups, "Shared by")
+    rows = [
+        (
+            eigenvalue_text(judged.mode.eigenvalue),
+            f"{judged.mode.frequency_hz:.4f}",
+            f"{judged.mode.damping_percent:.2f}",
             *(_share(judged.groups.get(group, 0.0)) for group in groups),
             ", ".join(judged.vendors) if judged.is_interaction else "",
         )
-    return table
+        for judged in judgement.modes
+    ]
+    return make_table("As in the case", *columns, rows=rows)
 
 
 def groups_shown(judgement: JudgedInteractions) -> list[str]:
@@ -47,25 +49,21 @@ def _share(share: float) -> str:
 
 def systems_table(judgement: JudgedInteractions) -> PlainTable:
     """Nobody, each vendor alone, and each pair, at the same power flow."""
-    columns = ("System", "Verdict", "Least damping [%]", "Mode", "Falls by [points]")
-    table = make_table("Vendors alone and in pairs", *columns, left=2)
-    table.add_row("no vendor", *_figures(judgement.none), "")
-    for vendor, system in judgement.alone.items():
-        table.add_row(f"{vendor} alone", *_figures(system), "")
-    for pair in judgement.pairs:
-        table.add_row(pair.text, *_figures(pair.joint), "–" if pair.fall is None else f"{pair.fall:+.2f}")
-    return table
+    columns = ("System", *_VERDICT, "Falls by [points]")
+    rows = [("no vendor", *_figures(judgement.none), "")]
+    rows += [(f"{vendor} alone", *_figures(system), "") for vendor, system in judgement.alone.items()]
+    rows += [
+        (pair.text, *_figures(pair.joint), "–" if pair.fall is None else f"{pair.fall:+.2f}")
+        for pair in judgement.pairs
+    ]
+    return make_table("Vendors alone and in pairs", *columns, left=2, rows=rows)
 
 
 def assignments_table(judgement: JudgedInteractions) -> PlainTable:
     """All assignments, the worst first."""
     swapped = judgement.result.plan.swapped
-    table = make_table(
-        "Each device at each place", *swapped, "Verdict", "Least damping [%]", "Mode", left=len(swapped) + 1
-    )
-    for system in judgement.assignments:
-        table.add_row(*system.name.names, *_figures(system))
-    return table
+    columns, rows = (*swapped, *_VERDICT), [(*one.name.names, *_figures(one)) for one in judgement.assignments]
+    return make_table("Each device at each place", *columns, left=len(swapped) + 1, rows=rows)
 
 
 def _figures(system: JudgedSystem) -> tuple[str, str, str]:

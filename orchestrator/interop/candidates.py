@@ -19,32 +19,17 @@ from orchestrator.coupling.system import System
 ORDERS = {"side by side": (("a", "b"),), "a, then b": (("a",), ("b",)), "b, then a": (("b",), ("a",))}
 EXTRAPOLATIONS = (0.0, 0.5, 1.0)
 SIGNALS = ("a.y", "b.y", "a.u_held", "b.u_held", "a.stepped", "b.stepped")
-LABELS = (0, 1, -1)
-"""How many steps a row's outputs are ahead of its time."""
+LABELS = (0, 1, -1)  # how many steps a row's outputs are ahead of its time
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One schedule.
-
-    Attributes
-    ----------
-    order
-        A key of `ORDERS`.
-    early_label
-        A row labelled t holds what t/H + ``early_label`` steps gave.
-    after_exchange
-        Outputs are read after the inputs of the next step were set.
-    wire_by_wire
-        See `Schedule`.
-    """
-
-    order: str
+    order: str  # a key of `ORDERS`
     first_inputs: FirstInputs
     extrapolation: float
-    early_label: int
-    after_exchange: bool
-    wire_by_wire: bool
+    early_label: int  # a row labelled t holds what t/H + ``early_label`` steps gave
+    after_exchange: bool  # outputs are read after the inputs of the next step were set
+    wire_by_wire: bool  # see `Schedule`
 
 
 def probe_system() -> System:

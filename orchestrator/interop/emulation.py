@@ -18,21 +18,9 @@ from orchestrator.interop.rules import MasterRules
 
 @dataclass(frozen=True)
 class Emulation:
-    """What the other master would have recorded.
-
-    Attributes
-    ----------
-    times
-        Times of the rows, as the other master labels them [s], shape (n,).
-    values
-        Shape (n, number of names).
-    names
-        ``component.variable``.
-    """
-
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    names: tuple[str, ...]
+    times: NDArray[np.float64]  # times of the rows, as the other master labels them [s], shape (n,)
+    values: NDArray[np.float64]  # shape (n, number of names)
+    names: tuple[str, ...]  # ``component.variable``
 
 
 def emulate(
@@ -48,20 +36,13 @@ def emulate(
 ) -> Emulation:
     """Run a system along another master's rules.
 
-    Parameters
-    ----------
-    step_size, stop_time
-        [s]
-    record
-        Names ``component.variable``.
-    every
-        Steps between two rows; the first row is that with label 0.
-    events
-        Each event happens before the step that starts at the event's time, as with our own schedules. Most other
-        masters do not support events.
-    order
-        Order in which the components step, for a master that steps them one after the other; by default the order of
-        the system.
+    ``step_size`` and ``stop_time``: [s]
+    ``record``: names ``component.variable``.
+    ``every``: steps between two rows; the first row is that with label 0.
+    ``events``: each event happens before the step that starts at the event's time, as with our own schedules. Most
+    other masters do not support events.
+    ``order``: order in which the components step, for a master that steps them one after the other; by default the
+    order of the system.
     """
     disturbed = [plan.name for plan in system.wires.values()] + [str(fault) for fault in faults_among(events)]
     if disturbed:

@@ -18,38 +18,21 @@ _NEEDED = ("a.y", "b.y")
 
 @dataclass(frozen=True)
 class ProbeResult:
-    """The recorded signals of the probe pair.
+    """The recorded signals of the probe pair."""
 
-    Attributes
-    ----------
-    times
-        Labels [s], shape (n,), rising.
-    values
-        Shape (n, number of `SIGNALS`); NaN where a signal was not recorded.
-    columns
-        Signal → heading of the column it was read from.
-    """
-
-    times: NDArray[np.float64]
-    values: NDArray[np.float64]
-    columns: dict[str, str]
+    times: NDArray[np.float64]  # labels [s], shape (n,), rising
+    values: NDArray[np.float64]  # shape (n, number of `SIGNALS`); NaN where a signal was not recorded
+    columns: dict[str, str]  # signal → heading of the column it was read from
 
 
 def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> ProbeResult:
     """Read a CSV file. The end of a heading says which signal the column holds (``a.y``, ``probe_a::y``, ``system/a/y
     [1]``).
 
-    Parameters
-    ----------
-    path
-        Separated by commas, semicolons or tabs; with a decimal comma where a semicolon or a tab separates.
-    named
-        Heading of the column for ``time`` or a signal, where the end of the heading does not show it.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, the time is missing, both a.y and b.y are missing, or an entry is not a number.
+    ``path``: separated by commas, semicolons or tabs; with a decimal comma where a semicolon or a tab separates.
+    ``named``: heading of the column for ``time`` or a signal, where the end of the heading does not show it.
+    Raises an `InputError` if the file cannot be read, the time is missing, both a.y and b.y are missing, or an entry is
+    not a number.
     """
     heads, lines = _table(path)
     columns = _columns(path, heads, dict(named or {}))

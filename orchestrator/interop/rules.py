@@ -20,56 +20,31 @@ the last label below the stop time, or at the last label that a step reaches wit
 
 @dataclass(frozen=True, slots=True)
 class MasterRules:
-    """The schedule of a master.
-
-    Attributes
-    ----------
-    name, title
-        ``name`` is the word on the command line. ``title`` is the name for people, with the version that was examined.
-    steps
-        Jacobi or Gauss-Seidel.
-    first_inputs
-        What connected inputs hold in the first step; see `FirstInputs`.
-    early_label
-        A row labelled t holds what t/H + ``early_label`` steps gave: 1 where the time is noted before the step and the
-        outputs after it.
-    after_exchange
-        Outputs are recorded after the inputs for the next step were handed over; else with the inputs of the step.
-    extrapolation, wire_by_wire, ticks_per_second
-        See `Schedule`.
-    last_label
-        See `LastLabel`.
-    source
-        Where in the master's source code or in the test results each choice can be seen.
-    """
-
+    # name, title: ``name`` is the word on the command line. ``title`` is the name for people, with the version that was
+    # examined.
     name: str
     title: str
-    steps: Steps
-    first_inputs: FirstInputs = "consistent"
+    steps: Steps  # jacobi or Gauss-Seidel
+    first_inputs: FirstInputs = "consistent"  # what connected inputs hold in the first step; see `FirstInputs`
+    # a row labelled t holds what t/H + ``early_label`` steps gave: 1 where the time is noted before the step and the
+    # outputs after it
     early_label: int = 0
+    # outputs are recorded after the inputs for the next step were handed over; else with the inputs of the step
     after_exchange: bool = False
+    # extrapolation, wire_by_wire, ticks_per_second: see `Schedule`
     extrapolation: float = 0.0
     wire_by_wire: bool = False
     ticks_per_second: int | None = None
-    last_label: LastLabel = "stop"
-    source: str = ""
+    last_label: LastLabel = "stop"  # see `LastLabel`
+    source: str = ""  # where in the master's source code or in the test results each choice can be seen
 
     def schedule(self, components: Sequence[str], order: Sequence[str] | None = None) -> Schedule:
         """The schedule for a system.
 
-        Parameters
-        ----------
-        components
-            Names of all components, in the order in which the master was given them.
-        order
-            Order in which the components step, if it differs from ``components``; only Gauss-Seidel has one.
-
-        Raises
-        ------
-        InputError
-            If the master steps all components side by side and an order is given, or the order does not list every
-            component once.
+        ``components``: names of all components, in the order in which the master was given them.
+        ``order``: order in which the components step, if it differs from ``components``; only Gauss-Seidel has one.
+        Raises an `InputError` if the master steps all components side by side and an order is given, or the order does
+        not list every component once.
         """
         if self.steps == "side by side":
             if order is not None:

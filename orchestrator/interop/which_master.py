@@ -12,13 +12,10 @@ from orchestrator.interop.masters import MASTERS
 from orchestrator.interop.probe_result import ProbeResult
 from orchestrator.interop.rules import MasterRules
 
-STEP_SIZE, STOP_TIME = 0.1, 2.0
-"""Step size and stop time that the instructions ask for [s]."""
+STEP_SIZE, STOP_TIME = 0.1, 2.0  # step size and stop time that the instructions ask for [s]
 
 _LEAST_ROWS = 4
-_ON_POINT = 1e-3
-"""How far a label may be from a communication point, in steps."""
-
+_ON_POINT = 1e-3  # how far a label may be from a communication point, in steps
 _FITS = 1e-3
 """A schedule fits if it differs by less than this from the record. Two schedules differ by more within a few rows; the
 signals are near 1."""
@@ -26,25 +23,14 @@ signals are near 1."""
 
 @dataclass(frozen=True)
 class Identified:
-    """The schedules that fit a record.
+    """The schedules that fit a record."""
 
-    Attributes
-    ----------
-    fits
-        Every schedule that gives the recorded values; empty if none does.
-    rows
-        How many rows were at communication points and so were compared.
-    last_row
-        Index of the last of them: it has the label ``last_row``·H.
-    step_size, stop_time
-        Step size and stop time with which the tool was run [s].
-    """
-
-    fits: tuple[Candidate, ...]
+    fits: tuple[Candidate, ...]  # every schedule that gives the recorded values; empty if none does
     nearest: Candidate
     difference: float
-    rows: int
-    last_row: int
+    rows: int  # how many rows were at communication points and so were compared
+    last_row: int  # index of the last of them: it has the label ``last_row``·H
+    # step_size, stop_time: step size and stop time with which the tool was run [s]
     step_size: float
     stop_time: float
 
@@ -76,15 +62,9 @@ PROPERTIES = tuple(field.name for field in fields(Candidate))
 def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float = STOP_TIME) -> Identified:
     """Compare a result with every schedule.
 
-    Parameters
-    ----------
-    step_size, stop_time
-        Step size and stop time with which the tool was run [s].
-
-    Raises
-    ------
-    InputError
-        If too few rows are at communication points, or the result shows that the steps had another size.
+    ``step_size`` and ``stop_time``: step size and stop time with which the tool was run [s].
+    Raises an `InputError` if too few rows are at communication points, or the result shows that the steps had another
+    size.
     """
     intervals = round(stop_time / step_size)
     if intervals < _LEAST_ROWS or abs(intervals * step_size - stop_time) > _ON_POINT * step_size:

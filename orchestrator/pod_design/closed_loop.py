@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.continuation import Eigenpair, follow_along
 from orchestrator.analysis.examination import Examination, examine
 from orchestrator.analysis.linear_model import LinearModel
@@ -54,12 +55,8 @@ class Placed:
 class PodLoop:
     """Gives one controller of several components a common setting, and linearises the system.
 
-    Parameters
-    ----------
-    controller
-        ``pod_p`` or ``pod_q``.
-    kept
-        Figures that an earlier start of the same design has left.
+    ``controller``: ``pod_p`` or ``pod_q``.
+    ``kept``: Figures that an earlier start of the same design has left.
     """
 
     def __init__(
@@ -79,6 +76,10 @@ class PodLoop:
         if setting.gain == 0:
             return self._off
         return self._model(setting)
+
+    def block(self, name: str) -> ComponentLinearization:
+        """One component as it was linearised last."""
+        return self._blocks.components[name]
 
     def examine(self, setting: PodSetting) -> Examination:
         """The verdict on the whole system with this setting, at any frequency, with its warnings."""
@@ -122,12 +123,8 @@ class PodLoop:
     def place(self, start: Placed, gain: float, filters: LeadLag | None = None) -> Placed:
         """Follow the target mode to another gain.
 
-        Parameters
-        ----------
-        start
-            A setting with its known mode. It must have the same lead/lag, or a gain of 0.
-        filters
-            The lead/lag at the new gain; by default that of ``start``.
+        ``start``: A setting with its known mode. It must have the same lead/lag, or a gain of 0.
+        ``filters``: The lead/lag at the new gain; by default that of ``start``.
         """
         setting = PodSetting(gain, filters or start.setting.filters)
         if start.setting.gain and start.setting.filters != setting.filters:
@@ -163,10 +160,7 @@ def _digest_of(pair: Eigenpair) -> str:
 def check_tunable(name: str, description: FmuDescription, controller: str) -> None:
     """A controller's gain and lead/lag must be tunable.
 
-    Parameters
-    ----------
-    controller
-        ``pod_p`` or ``pod_q``.
+    ``controller``: ``pod_p`` or ``pod_q``.
     """
     fixed = [v for v in (f"{controller}.{key}" for key in _TUNED) if description.variables[v].variability != "tunable"]
     if fixed:

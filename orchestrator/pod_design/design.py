@@ -13,6 +13,7 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio
 from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.asked import DAMPING, FLAG, GAIN, GAIN_BOUNDS, NAME, STAGES, asked
 from orchestrator.cases.case import Case
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.parameter_files import ParameterFile
@@ -42,41 +43,34 @@ from orchestrator.study.naming import named_modes
 StageReport = Callable[[str], None]
 
 _OFF = PodSetting(0.0, NO_COMPENSATION)
-
 _MET = 5e-4  # a requirement counts as met if the damping ratio falls short of it by less: 0.05 points
 
 
 @dataclass(frozen=True)
 class DesignRequest:
-    """The requirements of a design.
-
-    Attributes
-    ----------
-    damping, damping_increment
-        Required damping ratio of the target, or its required increase; the former goes first.
-    delta_gain
-        ΔK of the finite-difference sensitivity [pu of the converter's rating].
-    gain_bounds
-        [K_min, K_max] in the same unit.
-    compensated_gain
-        Compute the gain from the sensitivity with the lead/lag in place, instead of the one without it.
-    least_damping
-        The design may not push the damping ratio of any other mode below this value.
-    """
+    """The requirements of a design; a required damping goes before a required increase of it."""
 
     controller: str
-    component: str | None = None
+    component: str | None = asked(NAME, None, "the converter, or a pattern for several with one setting")
     scenario: str | None = None
-    mode: str | None = None
-    damping: float | None = None
-    damping_increment: float = 0.10
-    delta_gain: float = 50.0
-    gain_bounds: tuple[float, float] = (200.0, 400.0)
-    stages: int | None = None
-    compensated_gain: bool = False
-    least_damping: float = 0.05
-    refine: bool = False
-    margins: bool = True
+    mode: str | None = asked(NAME, None, "the case's mode to damp (default: its first)")
+    damping: float | None = asked(DAMPING, None, "required damping, such as 20")
+    damping_increment: float = asked(
+        DAMPING, 0.10, "required increase of the damping in points (default: 10)", "POINTS"
+    )
+    delta_gain: float = asked(GAIN, 50.0, "gain of the finite-difference sensitivity [pu] (default: 50)")
+    gain_bounds: tuple[float, float] = asked(
+        GAIN_BOUNDS, (200.0, 400.0), "bounds of the gain [pu] (default: 200:400; with --points 0:400)"
+    )
+    stages: int | None = asked(STAGES, None, "lead/lag stages (default: the component's own)")
+    compensated_gain: bool = asked(
+        FLAG, False, "compute the gain from the sensitivity with the lead/lag in place", option=None
+    )
+    least_damping: float = asked(
+        DAMPING, 0.05, "damping below which no other mode may be pushed (default: 5)", option="--min-damping"
+    )
+    refine: bool = asked(FLAG, False, "search gain and lead/lag on the closed loop as well")
+    margins: bool = asked(FLAG, True, "compute the margins, which take longest", option=None)
     overrides: Mapping[str, Value] = field(default_factory=dict)
     parameters: Sequence[ParameterFile] = ()
     step_size: float | None = None
@@ -103,20 +97,7 @@ class Sensitivities:
 class PodDesign:
     """A design with every figure on the way.
 
-    Attributes
-    ----------
-    initial, required_damping, predicted
-        λ_0 [rad/s], ζ_d, λ_d [rad/s].
-    filters, gain, designed
-        By the paper's equations, and the closed loop with them.
-    final
-        The closed loop with the final setting: the refined setting, or ``designed`` without refinement.
-    before, after
-        The other modes without the controller, and with the final setting.
-    broken
-        The prohibited effect of the final setting on other modes; empty if there is no such effect.
-    examined_before, examined
-        The verdict over the whole spectrum without the controller and with the final setting, and what it rests on.
+    ``filters``, ``gain``, ``designed``: By the paper's equations, and the closed loop with them.
     """
 
     request: DesignRequest
@@ -124,6 +105,7 @@ class PodDesign:
     target: Target
     prepared: PreparedScenario
     mode_name: str
+    # initial, required_damping, predicted: λ_0 [rad/s], ζ_d, λ_d [rad/s].
     initial: complex
     required_damping: float
     predicted: complex
@@ -134,11 +116,14 @@ class PodDesign:
     gain: float
     designed: Placed
     refinement: Refinement | None
-    final: Placed
+    final: Placed  # the closed loop with the final setting: the refined setting, or ``designed`` without refinement
+    # before, after: the other modes without the controller, and with the final setting.
     before: Surroundings
     after: Surroundings
-    broken: str | None
+    broken: str | None  # the prohibited effect of the final setting on other modes; empty if there is no such effect
     margins: Margins | None
+    # examined_before, examined: the verdict over the whole spectrum without the controller and with the final setting,
+    # and what it rests on.
     examined_before: Examination
     examined: Examination
 
@@ -202,12 +187,8 @@ def design_pod(
 ) -> PodDesign:
     """Design a controller and check it on the closed loop.
 
-    Parameters
-    ----------
-    store
-        Keeps figures on the way as soon as they are there; those that are there already are not computed again.
-    search
-        Gives a refinement settings to try; by default it surveys all itself.
+    ``store``: keeps figures on the way as soon as they are there; those that are there already are not computed again.
+    ``search``: gives a refinement settings to try; by default it surveys all itself.
     """
     report("preparing the case")
     target = find_target(

@@ -22,23 +22,13 @@ their size."""
 
 @dataclass(frozen=True)
 class Surroundings:
-    """All modes but the target.
+    """All modes but the target."""
 
-    Attributes
-    ----------
-    others
-        Those from 0.1 to 2 Hz, least damped first.
-    growth
-        Real part [1/s] of the eigenvalue that grows most, at any frequency, the target's included; 0 where none grows.
-    named
-        The mode to which the case's rule gives the target's name; normally the target itself.
-    followed
-        The target, as it was followed; None if it lies outside of 0.1 to 2 Hz or was not followed.
-    """
-
-    others: tuple[Mode, ...]
+    others: tuple[Mode, ...]  # those from 0.1 to 2 Hz, least damped first
+    # real part [1/s] of the eigenvalue that grows most, at any frequency, the target's included; 0 where none grows
     growth: float
-    named: Mode | None
+    named: Mode | None  # the mode to which the case's rule gives the target's name; normally the target itself
+    # the target, as it was followed; None if it lies outside of 0.1 to 2 Hz or was not followed
     followed: Mode | None = None
 
     @property

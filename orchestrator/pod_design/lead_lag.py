@@ -13,20 +13,14 @@ from orchestrator.errors import AnalysisError
 LARGEST_STAGE_ANGLE = 60.0
 """Usual limit for the angle of one lead/lag stage [°]; beyond this angle a_j grows out of proportion."""
 
-LARGEST_TURN = 85.0
-"""Absolute limit for the angle of one lead/lag stage, to either side [°]."""
+LARGEST_TURN = 85.0  # absolute limit for the angle of one lead/lag stage, to either side [°]
 
 
 @dataclass(frozen=True)
 class LeadLag:
-    """N_S equal stages (1 + s·T_S1)/(1 + s·T_S2).
+    """N_S equal stages (1 + s·T_S1)/(1 + s·T_S2)."""
 
-    Attributes
-    ----------
-    T_S1, T_S2
-        Lead and lag time constants [s]; both 0 for no compensation.
-    """
-
+    # T_S1, T_S2: lead and lag time constants [s]; both 0 for no compensation
     T_S1: float
     T_S2: float
     N_S: int
@@ -86,19 +80,10 @@ def lead_lag(phase_deg: float, centre: float, stages: int) -> LeadLag:
     φ = (π ∓ φ_NC)/N_S; a = (1 − sin φ)/(1 + sin φ) for lead, its inverse for lag;
     T_S1 = 1/(ω_0·√a), T_S2 = a·T_S1.
 
-    Parameters
-    ----------
-    phase_deg
-        Angle of the non-compensated sensitivity [°], in (−180, 180].
-    centre
-        ω_0 [rad/s].
-    stages
-        N_S; with 0 there is no compensation.
-
-    Raises
-    ------
-    AnalysisError
-        If a stage would have to turn by 90° or more, which is impossible.
+    ``phase_deg``: angle of the non-compensated sensitivity [°], in (−180, 180].
+    ``centre``: ω_0 [rad/s].
+    ``stages``: N_S; with 0 there is no compensation.
+    Raises an `AnalysisError` if a stage would have to turn by 90° or more, which is impossible.
     """
     if stages == 0:
         return NO_COMPENSATION

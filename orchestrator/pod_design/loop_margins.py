@@ -18,8 +18,7 @@ from orchestrator.analysis.modes import ZERO
 from orchestrator.arrays import Matrix, Vector
 from orchestrator.errors import AnalysisError
 
-_FREQUENCIES = (0.01, 500.0)
-"""Range of frequencies in which the loop is examined [Hz]."""
+_FREQUENCIES = (0.01, 500.0)  # range of frequencies in which the loop is examined [Hz]
 _POINTS_PER_DECADE = 150
 _NEGLIGIBLE = 1e-8
 """Singular values of A(K₂) − A(K₁) below this, relative to the largest, are rounding of the linearisation."""
@@ -27,31 +26,16 @@ _NEGLIGIBLE = 1e-8
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Least changes of a loop that make it unstable, and its largest sensitivity.
+    """Least changes of a loop that make it unstable, and its largest sensitivity."""
 
-    Attributes
-    ----------
-    phase_deg
-        Least phase shift [°], to either side, that makes the loop unstable; None if the gain around the loop is 1 at no
-        frequency.
-    phase_hz
-        Frequency of the oscillation that this phase shift sustains [Hz].
-    delay
-        Least delay that makes the loop unstable [s]; None as for ``phase_deg``.
-    delay_hz
-        Frequency of the oscillation that this delay sustains [Hz].
-    peak
-        Largest sensitivity 1/|1 + L|: 1 without feedback, above 2 is commonly held to be little robust.
-    peak_hz
-        Its frequency [Hz].
-    """
-
+    # least phase shift [°], to either side, that makes the loop unstable; None if the gain around the loop is 1 at no
+    # frequency
     phase_deg: float | None
-    phase_hz: float | None
-    delay: float | None
-    delay_hz: float | None
-    peak: float
-    peak_hz: float
+    phase_hz: float | None  # frequency of the oscillation that this phase shift sustains [Hz]
+    delay: float | None  # least delay that makes the loop unstable [s]; None as for ``phase_deg``
+    delay_hz: float | None  # frequency of the oscillation that this delay sustains [Hz]
+    peak: float  # largest sensitivity 1/|1 + L|: 1 without feedback, above 2 is commonly held to be little robust
+    peak_hz: float  # its frequency [Hz]
 
 
 def loop_margins(half: LinearModel, full: LinearModel) -> LoopMargins:

@@ -14,40 +14,28 @@ from orchestrator.pod_design.loop_margins import LoopMargins, loop_margins
 from orchestrator.points.store import Arrays
 
 _STRIDE = 2**0.5
-_REACH = 8.0
-"""Gains from 1/8 to 8 times the designed one are tried, a factor √2 apart."""
+_REACH = 8.0  # gains from 1/8 to 8 times the designed one are tried, a factor √2 apart
 _HALVINGS = 4
-VARIATION = 0.2
-"""Relative change of K, T_S1 and T_S2, one at a time."""
+VARIATION = 0.2  # relative change of K, T_S1 and T_S2, one at a time
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of gain, phase and delay, and variations.
+    """Margins of gain, phase and delay, and variations."""
 
-    Attributes
-    ----------
-    limit
-        Damping ratio below which a mode from 0.1 to 2 Hz, the target included, counts as lost.
-    lost_up, lost_down
-        The eigenvalue [rad/s] that is lost just beyond ``up`` or ``down``.
-    up, down
-        Factor on the gain up to which no mode is lost and no eigenvalue turns unstable; None where that
-        happens neither up to ``reach`` (up) nor down to a gain of 0 (down).
-    loop
-        Phase and delay margin of the loop, broken where the gain acts in all components at once. None if there is no
-        such margin; ``no_loop`` says why.
-    variations
-        Damping ratio of the target by name of the variation, such as ``T_S1 +20 %``; None where it cannot be followed.
-    """
-
-    limit: float
+    limit: float  # damping ratio below which a mode from 0.1 to 2 Hz, the target included, counts as lost
+    # up, down: factor on the gain up to which no mode is lost and no eigenvalue turns unstable; None where that happens
+    # neither up to ``reach`` (up) nor down to a gain of 0 (down)
     up: float | None
     down: float | None
+    # lost_up, lost_down: the eigenvalue [rad/s] that is lost just beyond ``up`` or ``down``
     lost_up: complex | None
     lost_down: complex | None
+    # Phase and delay margin of the loop, broken where the gain acts in all components at once. None if there is no such
+    # margin; ``no_loop`` says why.
     loop: LoopMargins | None
     no_loop: str
+    # damping ratio of the target by name of the variation, such as ``T_S1 +20 %``; None where it cannot be followed
     variations: dict[str, float]
     reach: float = _REACH
 

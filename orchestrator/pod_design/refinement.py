@@ -48,61 +48,37 @@ _TURN = 15.0
 """Step of the compensation's angle [°]. Once re-centring no longer helps, the angle is turned by this step to either
 side as long as that helps."""
 _ROUNDS = 5
-_WORTH = 5e-4
-"""The search ends when a round raises the damping ratio by less than this."""
-_SMALL_GAIN = 0.1
-"""Gain that stands for 0 in the sensitivity at a gain of 0 [pu]."""
-_TOLERANCE = 2e-4
-"""The search for a gain ends when the damping ratio differs by less than this from the required one."""
+_WORTH = 5e-4  # the search ends when a round raises the damping ratio by less than this
+_SMALL_GAIN = 0.1  # gain that stands for 0 in the sensitivity at a gain of 0 [pu]
+_TOLERANCE = 2e-4  # the search for a gain ends when the damping ratio differs by less than this from the required one
 
 
 @dataclass(frozen=True)
 class GainSweep:
-    """The target mode over the range of the gain, with one lead/lag.
-
-    Attributes
-    ----------
-    chosen
-        The smallest gain that meets the requirement, else the gain of the best damping.
-    unstable
-        The gains with which the system is unstable [pu]; empty for systems with more than `MOST_STATES` states, which
-        are not examined.
-    least
-        Least damping ratio of all modes from 0.1 to 2 Hz at each of the points; empty for such systems.
-    chosen_least
-        The same with ``chosen``; None where it is not known.
-    """
+    """The target mode over the range of the gain, with one lead/lag."""
 
     why: str
     filters: LeadLag
     points: tuple[Placed, ...]
-    chosen: Placed
+    chosen: Placed  # the smallest gain that meets the requirement, else the gain of the best damping
+    # the gains with which the system is unstable [pu]; empty for systems with more than `MOST_STATES` states, which are
+    # not examined
     unstable: tuple[float, ...] = ()
+    # least damping ratio of all modes from 0.1 to 2 Hz at each of the points; empty for such systems
     least: tuple[float, ...] = ()
-    chosen_least: float | None = None
+    chosen_least: float | None = None  # the same with ``chosen``; None where it is not known
 
 
 @dataclass
 class Refinement:
-    """The settings that the refinement tried, and its result.
-
-    Attributes
-    ----------
-    chosen
-        The best setting within the bounds that has no prohibited effect on other modes; None if no such setting exists.
-    score
-        Damping ratio of ``chosen`` that counts.
-    met
-        Whether ``chosen`` has the required damping.
-    even
-        The setting with the best least damping of all modes; None where it is not asked for.
-    """
+    """The settings that the refinement tried, and its result."""
 
     sweeps: list[GainSweep] = field(default_factory=list)
+    # the best setting within the bounds that has no prohibited effect on other modes; None if no such setting exists
     chosen: Placed | None = None
-    score: float = -1.0
-    met: bool = False
-    even: Placed | None = None
+    score: float = -1.0  # damping ratio of ``chosen`` that counts
+    met: bool = False  # whether ``chosen`` has the required damping
+    even: Placed | None = None  # the setting with the best least damping of all modes; None where it is not asked for
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -125,18 +101,12 @@ def refine(
 ) -> Refinement:
     """Search gain and lead/lag on the closed loop.
 
-    Parameters
-    ----------
-    required
-        Damping ratio of the target.
-    bounds
-        Of the gain [pu].
-    others
-        The other modes without the controller [rad/s].
-    search
-        Gives settings where nothing near the design meets the requirement; by default a survey does.
-    evenly
-        Whether, where no setting meets the requirement, that with the best least damping of all modes is chosen.
+    ``required``: damping ratio of the target.
+    ``bounds``: of the gain [pu].
+    ``others``: the other modes without the controller [rad/s].
+    ``search``: gives settings where nothing near the design meets the requirement; by default a survey does.
+    ``evenly``: whether, where no setting meets the requirement, that with the best least damping of all modes is
+    chosen.
     """
     result = Refinement()
     even = -1.0
@@ -186,18 +156,11 @@ def sweep(
 ) -> GainSweep:
     """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it.
 
-    Parameters
-    ----------
-    off
-        The target with the controller off; following begins there.
-    required
-        Damping ratio of the target.
-    bounds
-        Of the gain [pu of the converter's rating].
-    why
-        Where the lead/lag comes from, for people.
-    special
-        A gain within the bounds that the sweep always includes [pu].
+    ``off``: the target with the controller off; following begins there.
+    ``required``: damping ratio of the target.
+    ``bounds``: of the gain [pu of the converter's rating].
+    ``why``: where the lead/lag comes from, for people.
+    ``special``: A gain within the bounds that the sweep always includes [pu].
     """
     points: list[Placed] = []
     here = off

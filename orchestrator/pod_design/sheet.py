@@ -12,12 +12,10 @@ from orchestrator.pod_design.closed_loop import Placed
 from orchestrator.pod_design.design import PodDesign
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, angle_deg, compensation_deg
 from orchestrator.pod_design.margins import Margins
-from orchestrator.pod_design.refinement import Refinement
-from orchestrator.report.tables import PlainTable, eigenvalue_text
+from orchestrator.pod_design.refinement import GainSweep, Refinement
+from orchestrator.report.tables import eigenvalue_text, make_table
 
-_MARK = "†"
-"""Mark behind a swept gain with which the system is unstable."""
-
+_MARK = "†"  # mark behind a swept gain with which the system is unstable
 LABELS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
 
 
@@ -26,12 +24,8 @@ def sheet(d: PodDesign) -> Iterable[Table | str]:
     yield f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: " + escape(
         f"{d.case}, scenario {d.target.scenario}, mode {d.mode_name}, {_components(d.target.components)}"
     )
-    steps = PlainTable(header_style="bold")
-    for column in ("", "Step", "Formula", "Result"):
-        steps.add_column(column, overflow="fold")
-    for number, row in enumerate(_steps(d), start=1):
-        steps.add_row(str(number), *row)
-    yield steps
+    steps = [(str(number), *row) for number, row in enumerate(_steps(d), start=1)]
+    yield _table("", "", "Step", "Formula", "Result", rows=steps)
     if d.refinement:
         yield _refinement(d.refinement, d.required_damping)
         if any(s.unstable for s in d.refinement.sweeps):
@@ -107,38 +101,37 @@ def _requirement(d: PodDesign) -> str:
 
 
 def _refinement(r: Refinement, required: float) -> Table:
-    table = _table("Refinement on the closed loop", "Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gains swept [pu]",
-                   "Least damping of all modes over them [%]",
-                   f"Best, or first with {percent(required)}: the target", "the least of all")  # fmt: skip
-    for s in r.sweeps:
-        gains = [p.setting.gain for p in s.points]
-        marks = [_MARK * (gain in s.unstable) for gain in gains]
-        dampings = [f"{100 * least:.1f}{mark}" for least, mark in zip(s.least, marks, strict=False)]
-        table.add_row(
-            s.why,
-            f"{s.filters.T_S1:.4f}",
-            f"{s.filters.T_S2:.4f}",
-            f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
-            " ".join(dampings) or "–",
-            f"K = {s.chosen.setting.gain:.1f}: {percent(s.chosen.damping_ratio)}",
-            "–" if s.chosen_least is None else percent(s.chosen_least),
-        )
-    return table
+    columns = ("Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gains swept [pu]", "Least damping of all modes over them [%]",
+               f"Best, or first with {percent(required)}: the target", "the least of all")  # fmt: skip
+    return _table("Refinement on the closed loop", *columns, rows=map(_swept, r.sweeps))
+
+
+def _swept(s: GainSweep) -> tuple[str, ...]:
+    gains = [p.setting.gain for p in s.points]
+    marks = [_MARK * (gain in s.unstable) for gain in gains]
+    dampings = [f"{100 * least:.1f}{mark}" for least, mark in zip(s.least, marks, strict=False)]
+    return (
+        s.why, f"{s.filters.T_S1:.4f}", f"{s.filters.T_S2:.4f}", f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
+        " ".join(dampings) or "–", f"K = {s.chosen.setting.gain:.1f}: {percent(s.chosen.damping_ratio)}",
+        "–" if s.chosen_least is None else percent(s.chosen_least),
+    )  # fmt: skip
 
 
 def _result(d: PodDesign) -> Table:
     f = d.final.setting.filters
-    table = _table("Result", "", "Without POD", "With the final setting")
-    table.add_row("Setting", "off", f"K = {d.final.setting.gain:.2f} pu, N_S = {d.target.stages}, "
-                                    f"T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s")  # fmt: skip
-    table.add_row(f"Target mode {d.mode_name}", mode_text(d.initial), mode_text(d.achieved))
-    table.add_row("Worst other mode, 0.1 to 2 Hz", _other(d.before.worst), _other(d.worst_other))
-    table.add_row("Largest real part of all", *map(_growth, (d.stability_before, d.stability)))
-    return table
+    setting = (
+        f"K = {d.final.setting.gain:.2f} pu, N_S = {d.target.stages}, T_S1 = {f.T_S1:.4f} s, T_S2 = {f.T_S2:.4f} s"
+    )
+    rows = (
+        ("Setting", "off", setting),
+        (f"Target mode {d.mode_name}", mode_text(d.initial), mode_text(d.achieved)),
+        ("Worst other mode, 0.1 to 2 Hz", _other(d.before.worst), _other(d.worst_other)),
+        ("Largest real part of all", *map(_growth, (d.stability_before, d.stability))),
+    )
+    return _table("Result", "", "Without POD", "With the final setting", rows=rows)
 
 
 def _margins(m: Margins, d: PodDesign) -> Table:
-    table = _table("Margins of the final setting", "Quantity", "Value")
     gain = d.final.setting.gain
     lost = f"no eigenvalue unstable, no mode from 0.1 to 2 Hz below {percent(m.limit)}"
     up, down = f"more than × {m.reach:g}, the most tried", "down to 0"
@@ -146,13 +139,9 @@ def _margins(m: Margins, d: PodDesign) -> Table:
         up = f"× {m.up:.2f} (K = {m.up * gain:.0f}), then {mode_text(m.lost_up)} is lost"
     if m.down is not None and m.lost_down is not None:
         down = f"× {m.down:.2f} (K = {m.down * gain:.0f}), then {mode_text(m.lost_down)} is lost"
-    table.add_row(f"Gain up, {lost}", up)
-    table.add_row("Gain down, the same", down)
-    for name, value in _loop_rows(m):
-        table.add_row(name, value)
-    for name, damping in m.variations.items():
-        table.add_row(f"Damping of the target with {name}, the rest as it is", percent(damping))
-    return table
+    rows = [(f"Gain up, {lost}", up), ("Gain down, the same", down), *_loop_rows(m)]
+    rows += [(f"Damping of the target with {name}, the rest as it is", percent(z)) for name, z in m.variations.items()]
+    return _table("Margins of the final setting", "Quantity", "Value", rows=rows)
 
 
 def _loop_rows(m: Margins) -> Iterable[tuple[str, str]]:
@@ -246,8 +235,5 @@ def _components(names: Sequence[str]) -> str:
     return f"component {names[0]}" if len(names) == 1 else f"{len(names)} components with one setting"
 
 
-def _table(title: str, *columns: str) -> Table:
-    table = PlainTable(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
-    for column in columns:
-        table.add_column(escape(column), overflow="fold")
-    return table
+def _table(title: str, *columns: str, rows: Iterable[Sequence[str]] = ()) -> Table:
+    return make_table(title, *columns, left=len(columns), rows=rows)

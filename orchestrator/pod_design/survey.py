@@ -22,16 +22,12 @@ from orchestrator.pod_design.kept import digest
 from orchestrator.pod_design.lead_lag import LARGEST_TURN, LeadLag, lead_lag_turning
 from orchestrator.points.store import Arrays
 
-MOST_STATES = 500
-"""Systems with more states are not surveyed, because a survey would take too long."""
-CENTRES = (0.5, 4.0)
-"""Range of the lead/lag's centre, as parts of the mode's frequency."""
-
+MOST_STATES = 500  # systems with more states are not surveyed, because a survey would take too long
+CENTRES = (0.5, 4.0)  # range of the lead/lag's centre, as parts of the mode's frequency
 _TURNS, _CENTRES, _GAINS = 17, 7, 10
 _POLISHED = 3
 _EVALUATIONS = 150
-_UNMOVED = 0.02
-"""The survey ignores a mode that the controller moves by less than this fraction of its size."""
+_UNMOVED = 0.02  # the survey ignores a mode that the controller moves by less than this fraction of its size
 _HOPELESS = 1.0
 
 
@@ -47,14 +43,9 @@ def survey(
 ) -> Survey:
     """Rate settings over the whole range of gain, angle and centre.
 
-    Parameters
-    ----------
-    initial, others
-        The target and the other modes without the controller [rad/s].
-    stages
-        N_S of the lead/lag, at least 1.
-    bounds
-        Of the gain [pu].
+    ``initial`` and ``others``: the target and the other modes without the controller [rad/s].
+    ``stages``: N_S of the lead/lag, at least 1.
+    ``bounds``: of the gain [pu].
     """
     ground = _Ground(loop, initial, np.array(others, dtype=complex), stages, bounds)
     turns = np.linspace(-0.95, 0.95, _TURNS).tolist()

@@ -15,20 +15,13 @@ from orchestrator.errors import InputError
 
 @dataclass(frozen=True)
 class Target:
-    """A scenario, and those of its components that get one common setting.
-
-    Attributes
-    ----------
-    key
-        Names of the components in a parameter file: one pattern that fits exactly these components, or each name.
-    stages
-        N_S of the components' lead/lag.
-    """
+    """A scenario, and those of its components that get one common setting."""
 
     scenario: str
     components: tuple[str, ...]
+    # names of the components in a parameter file: one pattern that fits exactly these components, or each name
     key: tuple[str, ...]
-    stages: int
+    stages: int  # N_S of the components' lead/lag
 
 
 def find_target(
@@ -43,20 +36,12 @@ def find_target(
 ) -> Target:
     """Find the scenario and its components. By default it is the scenario in which all PODs exist and are off.
 
-    Parameters
-    ----------
-    controller
-        ``pod_p`` or ``pod_q``.
-    scenario
-        Name of the scenario; None for the one in which all PODs exist and are off.
-    pattern
-        Name or pattern of the components, such as ``gfor*``; all with the controller where None.
-    stages
-        N_S of the lead/lag; None for the components' own.
-    overrides
-        Values by ``component.variable``.
-    parameters
-        Parameter files; ``overrides`` go before them.
+    ``controller``: ``pod_p`` or ``pod_q``.
+    ``scenario``: name of the scenario; None for the one in which all PODs exist and are off.
+    ``pattern``: name or pattern of the components, such as ``gfor*``; all with the controller where None.
+    ``stages``: N_S of the lead/lag; None for the components' own.
+    ``overrides``: values by ``component.variable``.
+    ``parameters``: parameter files; ``overrides`` go before them.
     """
     if scenario is not None and scenario not in case.scenarios:
         raise InputError(f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}")

@@ -27,21 +27,16 @@ _LOG = logging.getLogger("gfor")
 TLS_FILES = ("ca.pem", "cert.pem", "key.pem")
 """In the folder with certificates: the authority's, the client's, and the client's private key."""
 
-_PATIENCE = 30
-"""Longest time to wait for a scheduler, for its first worker, and for another one when all are lost [s]."""
+_PATIENCE = 30  # longest time to wait for a scheduler, for its first worker, and for another one when all are lost [s]
 
 
 class DaskCluster:
     """Runs tasks on the workers of a Dask scheduler.
 
-    Parameters
-    ----------
-    address
-        Of the scheduler, such as ``tcp://host:8786`` or ``tls://host:8786``. Its workers need this project, in the
-        same version.
-    tls
-        Folder with the files of `TLS_FILES`, for an address with ``tls://``; where None, Dask's own configuration says
-        where they are.
+    ``address``: of the scheduler, such as ``tcp://host:8786`` or ``tls://host:8786``. Its workers need this project, in
+    the same version.
+    ``tls``: folder with the files of `TLS_FILES`, for an address with ``tls://``; where None, Dask's own configuration
+    says where they are.
     """
 
     def __init__(self, address: str, tls: Path | None = None) -> None:

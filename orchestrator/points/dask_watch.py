@@ -7,9 +7,7 @@ from typing import Any
 from orchestrator.errors import CosimError, ErrorKind, InputError
 
 _LOG = logging.getLogger("gfor")
-
-INTERVAL = 5.0
-"""Seconds between two looks at the workers."""
+INTERVAL = 5.0  # seconds between two looks at the workers
 
 _FINDS = "__import__('importlib.util').util.find_spec('orchestrator') is not None"
 """Evaluated on a worker, which needs nothing of ours for it."""
@@ -18,12 +16,8 @@ _FINDS = "__import__('importlib.util').util.find_spec('orchestrator') is not Non
 class ClusterWatch:
     """The workers of one run.
 
-    Parameters
-    ----------
-    client
-        Of `distributed`.
-    patience
-        Seconds without any worker after which the run ends.
+    ``client``: of `distributed`.
+    ``patience``: seconds without any worker after which the run ends.
     """
 
     def __init__(self, client: Any, address: str, patience: float) -> None:
@@ -44,10 +38,7 @@ class ClusterWatch:
     def look(self) -> None:
         """Tell which workers are lost.
 
-        Raises
-        ------
-        CosimError
-            If no usable worker was there for so long as the patience lasts, or the scheduler is gone.
+        Raises a `CosimError` if no usable worker was there for so long as the patience lasts, or the scheduler is gone.
         """
         now = time.monotonic()
         if now - self._looked < INTERVAL:

@@ -8,8 +8,7 @@ from orchestrator.errors import CosimError
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-ATTEMPTS = 3
-"""A task that has lost its worker this many times is given up."""
+ATTEMPTS = 3  # A task that has lost its worker this many times is given up
 
 
 class WorkerLostError(CosimError):

@@ -68,10 +68,7 @@ def reference_to(case: CaseDefinition) -> str:
 def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
     """The case of a task, as a worker sees it.
 
-    Parameters
-    ----------
-    reference, wanted
-        Name or path of the case, and its fingerprint.
+    ``reference`` and ``wanted``: name or path of the case, and its fingerprint.
     """
     case = load_case(reference, trust_fmus=trust_fmus)
     here = fingerprint(case)

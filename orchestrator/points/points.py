@@ -1,13 +1,13 @@
 """Many points of a study: those that are kept are read, the others computed, and kept as soon as they are there."""
 
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, Protocol, Self, TypeVar
 
 from orchestrator.points.executor import Executor, WorkerLostError
-from orchestrator.points.store import Arrays, PointStore
+from orchestrator.points.store import POINTS, Arrays, PointStore
 
-CountReport = Callable[[int, int], None]
-"""Callback: how many points are done, of how many."""
+CountReport = Callable[[int, int], None]  # callback: how many points are done, of how many
 
 
 class Keyed(Protocol):
@@ -69,3 +69,17 @@ def kept_or_computed(
         done += 1
         report(done, len(tasks))
         yield index, computed, False
+
+
+def all_points(
+    kind: type[Point],
+    compute: Callable[[Task], Point],
+    tasks: Sequence[Task],
+    executor: Executor,
+    folder: Path,
+    report: CountReport,
+) -> tuple[list[Point], int]:
+    """The points in the order of their tasks, kept in a study's folder, and how many of them were stored there."""
+    store = PointStore(folder / POINTS)
+    done = sorted(kept_or_computed(kind, compute, tasks, executor, store, report), key=lambda entry: entry[0])
+    return [point for _, point, _ in done], sum(was_stored for *_, was_stored in done)

@@ -35,11 +35,8 @@ _LONGEST = 60
 class Processes:
     """Runs tasks in ``workers`` fresh Python processes, which are replaced where they die.
 
-    Parameters
-    ----------
-    imports
-        Modules that the tasks need. Where the system allows it, one process imports them in the background, once for
-        all workers. Importing takes seconds, and the caller can prepare the tasks meanwhile.
+    ``imports``: modules that the tasks need. Where the system allows it, one process imports them in the background,
+    once for all workers. Importing takes seconds, and the caller can prepare the tasks meanwhile.
     """
 
     def __init__(self, workers: int, imports: Sequence[str] = ()) -> None:
@@ -171,8 +168,7 @@ class WorkerLeftError(Exception):
     """A worker was told to leave what it was at; it takes nothing more."""
 
 
-_ENDED = (BrokenProcessPool, WorkerLeftError, SystemExit)
-"""What a future says whose worker is gone, or was told to go."""
+_ENDED = (BrokenProcessPool, WorkerLeftError, SystemExit)  # what a future says whose worker is gone, or was told to go
 
 
 class _Work:

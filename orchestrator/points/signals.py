@@ -6,20 +6,14 @@ from orchestrator.arrays import Numbers
 from orchestrator.points.store import Arrays
 
 _TIMES = "times"
-
-_SIGNAL = "signal "
-"""Beginning of the names of signals."""
+_SIGNAL = "signal "  # beginning of the names of signals
 
 
 def signal_arrays(times: Numbers, signals: Mapping[str, Numbers]) -> Arrays:
     """Arrays for a `PointStore`.
 
-    Parameters
-    ----------
-    times
-        [s], shape (n,).
-    signals
-        By name, each of shape (n,), in units of their own.
+    ``times``: [s], shape (n,).
+    ``signals``: by name, each of shape (n,), in units of their own.
     """
     return {_TIMES: times, **{_SIGNAL + name: values for name, values in signals.items()}}
 

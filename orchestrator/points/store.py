@@ -15,9 +15,7 @@ from orchestrator.safe_files import PARTIAL, made_folder, replacing
 
 Arrays = dict[str, NDArray[Any]]
 
-POINTS = "points"
-"""Folder of the points in that of a study's results."""
-
+POINTS = "points"  # folder of the points in that of a study's results
 _KEPT = ".npz"
 
 

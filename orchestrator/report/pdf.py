@@ -8,8 +8,7 @@ from pathlib import Path
 from orchestrator.errors import InputError
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "msedge", "chrome")
-_PATIENCE = 120
-"""How long the browser may take [s]."""
+_PATIENCE = 120  # how long the browser may take [s]
 
 
 def find_browser() -> str | None:

@@ -26,8 +26,7 @@ STYLE: dict[Any, Any] = {
 _COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Distinguishable with any colour vision (Okabe and Ito); a scenario keeps its colour in every plot."""
 _DPI = 150
-_LEGEND_WIDTH = 96
-"""Characters that fit in a line of a legend, marks included."""
+_LEGEND_WIDTH = 96  # characters that fit in a line of a legend, marks included
 
 
 def add_legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) -> None:

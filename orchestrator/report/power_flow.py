@@ -16,9 +16,7 @@ COLUMNS = {
 }  # fmt: skip
 """Tables, and the heading of each column."""
 
-TEXTS = {"machines": 2, "buses": 1, "branches": 3}
-"""How many columns at the left of each table hold text."""
-
+TEXTS = {"machines": 2, "buses": 1, "branches": 3}  # how many columns at the left of each table hold text
 _DIGITS = {"v_pu": 4, "angle_deg": 2, "rating_mva": None, "losses_mw": 3}
 
 

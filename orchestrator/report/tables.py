@@ -1,17 +1,19 @@
 """What tables for a terminal have in common, with rich, and the table of an FMU's variables."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.values import as_text
 
-_ITEMS_SHOWN = 5
-"""How many of a long list are shown, largest first."""
+_ITEMS_SHOWN = 5  # how many of a long list are shown, largest first
+
+
+Cell = str | Text  # of a table: text that is shown to the letter, or text with a style
 
 
 class PlainTable(Table):
@@ -25,11 +27,15 @@ class PlainTable(Table):
         super().add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in cells), **options)
 
 
-def make_table(title: str, *columns: str, left: int = 1) -> PlainTable:
-    """A table whose title, headings and cells are shown as they are."""
+def make_table(title: str, *columns: str, left: int = 1, rows: Iterable[Sequence[Cell]] = ()) -> PlainTable:
+    """A table whose title, headings and cells are shown as they are; columns after the ``left`` first ones are of
+    figures.
+    """
     table = PlainTable(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
     for index, column in enumerate(columns):
         table.add_column(escape(column), justify="left" if index < left else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
     return table
 
 
@@ -38,6 +44,11 @@ def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
     items = list(items)
     shown = ", ".join(text(item) for item in items[:_ITEMS_SHOWN])
     return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")
+
+
+def short(text: str, longest: int) -> str:
+    """A remark, cut where it has more characters."""
+    return text if len(text) <= longest else f"{text[: longest - 2].rstrip()} …"
 
 
 def share_text(entry: tuple[str, float]) -> str:
@@ -52,27 +63,17 @@ def fmu_variables(description: FmuDescription) -> Iterable[Table]:
         ]
         if not variables:
             continue
-        table = make_table(
-            f"{causality} ({len(variables)})",
-            "Name",
-            "Unit",
-            "Start",
-            "Range",
-            "Variability",
-            "Description",
-            left=6,
-        )
-        for v in variables:
-            bounds = ["" if b is None else f"{b:g}" for b in (v.minimum, v.maximum)]
-            table.add_row(
-                v.name,
-                v.unit,
-                "" if v.start is None else as_text(v.start),
-                "…".join(bounds) if any(bounds) else "",
-                v.variability,
-                v.description,
-            )
-        yield table
+        columns = ("Name", "Unit", "Start", "Range", "Variability", "Description")
+        rows = [
+            (v.name, v.unit, "" if v.start is None else as_text(v.start), _bounds(v), v.variability, v.description)
+            for v in variables
+        ]
+        yield make_table(f"{causality} ({len(variables)})", *columns, left=6, rows=rows)
+
+
+def _bounds(variable: VariableInfo) -> str:
+    bounds = ["" if b is None else f"{b:g}" for b in (variable.minimum, variable.maximum)]
+    return "…".join(bounds) if any(bounds) else ""
 
 
 def eigenvalue_text(value: complex, digits: int = 4) -> str:

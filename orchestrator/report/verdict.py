@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from rich.markup import escape
 
-COLOURS = {True: "green", False: "red", None: "yellow"}
-"""Of a verdict that is good, bad or not known."""
+COLOURS = {True: "green", False: "red", None: "yellow"}  # of a verdict that is good, bad or not known
 
 
 @dataclass(frozen=True)

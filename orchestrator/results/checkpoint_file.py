@@ -17,12 +17,8 @@ from orchestrator.safe_files import replacing
 
 Arrays = Mapping[str, NDArray[Any]]
 
-CHECKPOINTS = ".checkpoints"
-"""Folder for them among the results of a run."""
-
-CHECKPOINT, PREVIOUS = ".checkpoint", ".previous"
-"""Ends of their names: of the newest one, and of the one before it."""
-
+CHECKPOINTS = ".checkpoints"  # folder for them among the results of a run
+CHECKPOINT, PREVIOUS = ".checkpoint", ".previous"  # ends of their names: of the newest one, and of the one before it
 _MARK = b"gfor-cosim checkpoint 1\n"
 _DIGEST = hashlib.sha256().digest_size
 _HEADER = "header"

@@ -51,12 +51,8 @@ def dataset_of(
 ) -> xr.Dataset:
     """Columns that are read when they are used, over the time.
 
-    Parameters
-    ----------
-    pieces
-        Files with the rows, in their order.
-    units
-        Attributes of columns, by name; those of ``time`` as well.
+    ``pieces``: files with the rows, in their order.
+    ``units``: attributes of columns, by name; those of ``time`` as well.
     """
     data = {
         name: ("time", xr.core.indexing.LazilyIndexedArray(_Column(pieces, name)), about)

@@ -14,8 +14,7 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-LOCK = ".lock"
-"""The file's name; it holds the number of the process that has it, and its machine's name."""
+LOCK = ".lock"  # the file's name; it holds the number of the process that has it, and its machine's name
 
 
 @contextmanager

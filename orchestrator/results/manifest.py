@@ -5,9 +5,11 @@ import json
 import warnings
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 
 from orchestrator.errors import InputError
+from orchestrator.results import origin
 from orchestrator.results.storage import save_json, versions_of
 
 MANIFEST = "manifest.json"
@@ -38,10 +40,7 @@ class Manifest:
     def check(self, names: Iterable[str]) -> None:
         """Compare files with what was written.
 
-        Parameters
-        ----------
-        names
-            Of the files; those that are not listed, and were written by nobody, are not looked at.
+        ``names``: of the files; those that are not listed, and were written by nobody, are not looked at.
         """
         for name in names:
             if name in self.files:
@@ -78,14 +77,9 @@ def write_manifest(
 ) -> None:
     """Write a folder's manifest, after its files.
 
-    Parameters
-    ----------
-    scenarios
-        Folders beside them that are of the same run.
-    before
-        What an earlier command said of the files' place: its files that are not written anew stay listed.
-    about
-        Of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so.
+    ``scenarios``: folders beside them that are of the same run.
+    ``before``: what an earlier command said of the files' place: its files that are not written anew stay listed.
+    ``about``: of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so.
     """
     paths = {name: folder / name for name in sorted(names)}
     files = {name: WrittenFile(run, sha256_of(path), path.stat().st_size) for name, path in paths.items()}
@@ -93,7 +87,8 @@ def write_manifest(
     beside = dict.fromkeys(scenarios, run) or (before.scenarios if before else {})
     entries = {name: asdict(listed[name]) for name in sorted(listed)}
     content = {"format": _FORMAT, "run": run, "made_by": versions_of(["gfor-cosim"]), "files": entries}
-    save_json(content | dict(about or {}) | {"scenarios": beside}, folder / MANIFEST)
+    made = {"date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", **(origin.said[-1]() if origin.said else {})}
+    save_json(content | made | dict(about or {}) | {"scenarios": beside}, folder / MANIFEST)
 
 
 def read_manifest(folder: Path) -> Manifest | None:

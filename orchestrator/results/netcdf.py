@@ -15,16 +15,12 @@ from numpy.typing import NDArray
 
 from orchestrator.safe_files import replacing
 
-LEVEL = 1
-"""Of the compression: higher ones take twice the time for three parts in a hundred."""
-
-_SLACK = 1_000_000
-"""What a file needs beside its columns, at most [bytes]."""
+LEVEL = 1  # of the compression: higher ones take twice the time for three parts in a hundred
+_SLACK = 1_000_000  # what a file needs beside its columns, at most [bytes]
 
 Attributes = Mapping[str, str | float]
 
-DAMAGED = (OSError, KeyError, RuntimeError, ValueError)
-"""What h5py raises on a file that is cut short or damaged."""
+DAMAGED = (OSError, KeyError, RuntimeError, ValueError)  # what h5py raises on a file that is cut short or damaged
 
 
 def stored_name(name: str) -> str:
@@ -47,14 +43,9 @@ def netcdf_image(
 ) -> bytes:
     """A NetCDF-4 file as bytes.
 
-    Parameters
-    ----------
-    times
-        [s], shape (n,).
-    values
-        Shape (n, number of names).
-    units
-        Attributes of columns, by name; those of ``time`` as well.
+    ``times``: [s], shape (n,).
+    ``values``: shape (n, number of names).
+    ``units``: attributes of columns, by name; those of ``time`` as well.
     """
     import h5py  # noqa: PLC0415 - a tenth of a second that only recordings need
 

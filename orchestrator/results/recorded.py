@@ -5,23 +5,16 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.late import Late
+from orchestrator.late import xr
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.results.netcdf import DAMAGED, name_of, stored_name
 from orchestrator.results.pieces import Piece, opened
 from orchestrator.results.recording import ENDED_EARLY, parts_of
 
-if TYPE_CHECKING:
-    import xarray as xr
-else:
-    xr = Late("xarray")
-
-IN_MEMORY = 256_000_000
-"""Size of a recording up to which it is read as a whole [bytes]."""
-
+IN_MEMORY = 256_000_000  # size of a recording up to which it is read as a whole [bytes]
 _SHOWN = ("units", "long_name")
 _OF_NETCDF = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_FillValue"}
 

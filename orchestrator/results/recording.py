@@ -22,15 +22,11 @@ from orchestrator.safe_files import flush, not_written, write_bytes
 if TYPE_CHECKING:
     from orchestrator.cases.prepare import PreparedScenario
 
-FOLDER = "recording"
-"""Of the files of a recording that is not finished, in its scenario's folder."""
+FOLDER = "recording"  # of the files of a recording that is not finished, in its scenario's folder
 
 
-TRAJECTORY = "trajectory.nc"
-"""A recording that is finished."""
-
-ENDED_EARLY = "ended_early"
-"""Attribute of a recording whose run ended before its stop time: the reason."""
+TRAJECTORY = "trajectory.nc"  # A recording that is finished
+ENDED_EARLY = "ended_early"  # attribute of a recording whose run ended before its stop time: the reason
 
 
 class RecordingFolder:
@@ -85,15 +81,9 @@ class RecordingFolder:
     def join(self, path: Path, further: Attributes | None = None) -> None:
         """Write all as one file, and remove the parts.
 
-        Parameters
-        ----------
-        further
-            More attributes of it, such as `ENDED_EARLY`.
-
-        Raises
-        ------
-        ResultsError
-            If it cannot be written, or the parts are not those that the run has written; the parts stay.
+        ``further``: more attributes of it, such as `ENDED_EARLY`.
+        Raises a `ResultsError` if it cannot be written, or the parts are not those that the run has written; the parts
+        stay.
         """
         parts = parts_of(self.folder)
         found = rows_in(parts)

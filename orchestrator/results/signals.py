@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from orchestrator.cases.names import variables_of
-from orchestrator.late import Late
+from orchestrator.late import xr
 
-if TYPE_CHECKING:
-    import xarray as xr
-else:
-    xr = Late("xarray")
-
-MOST_DRAWN = 200_000
-"""Rows up to which a signal is drawn as it is."""
-
-_AT_ONCE = 1_000_000
-"""Rows of a long signal that are read at once."""
+MOST_DRAWN = 200_000  # rows up to which a signal is drawn as it is
+_AT_ONCE = 1_000_000  # rows of a long signal that are read at once
 
 
 def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:

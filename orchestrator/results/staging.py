@@ -26,12 +26,8 @@ def new_run_id() -> str:
 class ScenarioFolder:
     """The folder of one scenario's results, filled as ``<scenario>.part-<run id>`` beside its place.
 
-    Attributes
-    ----------
-    path
-        Where files go until `publish`.
-    place
-        Where they are afterwards.
+    ``path``: Where files go until `publish`.
+    ``place``: Where they are afterwards.
     """
 
     def __init__(self, folder: Path, scenario: str, run: str) -> None:
@@ -51,10 +47,7 @@ class ScenarioFolder:
     def publish(self, ended_early: str | None = None) -> Path:
         """Put the folder in its place, whole; results of an earlier run that are there go.
 
-        Parameters
-        ----------
-        ended_early
-            Why the run ended before its stop time; None where it reached that.
+        ``ended_early``: why the run ended before its stop time; None where it reached that.
         """
         try:
             about = {"scenario": self.place.name} | ({} if ended_early is None else {ENDED_EARLY: ended_early})

@@ -16,19 +16,14 @@ from numpy.typing import NDArray
 
 from orchestrator.coupling.filtered_recorder import FILTER
 from orchestrator.coupling.recorder import BLOCK_ROWS
-from orchestrator.late import Late
+from orchestrator.late import xr
 from orchestrator.results.netcdf import netcdf_image, stored_name
 from orchestrator.safe_files import replacing, write_bytes, write_text
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from orchestrator.cases.prepare import PreparedScenario
-else:
-    xr = Late("xarray")
 
-_CSV_ROWS = 10_000
-"""Rows of a table that are written at a time."""
+_CSV_ROWS = 10_000  # rows of a table that are written at a time
 
 
 def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
@@ -62,7 +57,24 @@ def origin_of_rows(prepared: PreparedScenario) -> dict[str, str | float]:
         "record_interval_s": prepared.record_every * prepared.step_size,
         "record_every_steps": prepared.record_every,
         "record_filter": how,
+        "places": json.dumps(measuring_places(prepared)),
     }
+
+
+def measuring_places(prepared: PreparedScenario) -> dict[str, str]:
+    """The bus of each unit, and both of each line, as names of the recording without their last part."""
+    found = {
+        wire.target.component: str(wire.source).removesuffix(".v_re")
+        for wire in prepared.system.connections
+        if wire.target.variable == "v_re" and str(wire.source).endswith(".v_re")
+    }
+    network, grid = prepared.network, prepared.case.table.power_flow
+    if network is not None and grid is not None:
+        found |= {
+            f"{grid.grid}.{line.name}": f"{grid.grid}.{line.from_bus} {grid.grid}.{line.to_bus}"
+            for line in network.lines
+        }
+    return found
 
 
 def versions_of(packages: Iterable[str]) -> dict[str, str]:

@@ -19,8 +19,7 @@ from orchestrator.study.start_errors import start_error
 DRIVEN, OBSERVED = ("droop.delta_P_ref", "droop.delta_Q_ref"), ("omega",)
 """Of a converter: where damping controllers act, and what they measure."""
 
-_KEPT = 2000
-"""Linear models that are kept at once."""
+_KEPT = 2000  # linear models that are kept at once
 
 
 class ScreeningBench:
@@ -67,12 +66,7 @@ class ScreeningBench:
             driven, observed = (DRIVEN, OBSERVED) if is_converter(plan.description.variables) else ((), ())
             with other_step(master, name, 0.0):
                 found = linearize_slopes(
-                    exchange,
-                    master.time,
-                    master.clock.step_size,
-                    driven,
-                    observed,
-                    self._like.get(path),
+                    exchange, master.time, master.clock.step_size, driven, observed, self._like.get(path)
                 )
             self._models[key] = found
             known = self._like.setdefault(path, found)

@@ -55,31 +55,15 @@ class Elements:
 
 @dataclass(frozen=True)
 class Setting:
-    """What one cell sets.
-
-    Attributes
-    ----------
-    values
-        By ``component.variable``.
-    out
-        Elements that are out of service.
-    scale
-        Factor of all loads that the cell gives; None where it gives none.
-    fed
-        Units that together feed a power [MW].
-    drawn
-        Power that a load draws, by ``component.variable`` [MW, Mvar].
-    """
-
-    values: Mapping[str, Value] = field(default_factory=dict)
-    out: tuple[str, ...] = ()
-    scale: float | None = None
-    fed: tuple[tuple[str, ...], float] | None = None
+    values: Mapping[str, Value] = field(default_factory=dict)  # by ``component.variable``
+    out: tuple[str, ...] = ()  # elements that are out of service
+    scale: float | None = None  # factor of all loads that the cell gives; None where it gives none
+    fed: tuple[tuple[str, ...], float] | None = None  # units that together feed a power [MW]
+    # power that a load draws, by ``component.variable`` [MW, Mvar]
     drawn: Mapping[str, float] = field(default_factory=dict)
 
 
-_PERCENT = 10.0
-"""Factor of a power from which it looks like percent."""
+_PERCENT = 10.0  # factor of a power from which it looks like percent
 
 Reading = Callable[[str], Setting]
 """What the text of a cell sets.

@@ -29,11 +29,8 @@ _BESIDE_ZERO, _NEAREST = 1e-2, 6
 """Beside 0 [rad/s], where so many nearest eigenvalues are sought: those that are zero or grow slowly are among them."""
 
 _MOST = 0.9
-MOST_DAMPING = 0.6
-"""Damping ratio up to which modes are looked for."""
-
-UNSTABLE = 1e-6
-"""A real part above this [1/s] is growth and not rounding."""
+MOST_DAMPING = 0.6  # damping ratio up to which modes are looked for
+UNSTABLE = 1e-6  # A real part above this [1/s] is growth and not rounding
 
 
 @dataclass(frozen=True)
@@ -57,28 +54,17 @@ class CriticalRegion:
 
 @dataclass(frozen=True)
 class FoundModes:
-    """Modes of one operating point.
-
-    Attributes
-    ----------
-    searched
-        Whether they come from a search of their own rather than from a neighbour's.
-    growing_elsewhere
-        Number of growing eigenvalues that are none of these modes; None where they were not counted.
-    fastest
-        The one of them with the largest real part [rad/s]; None where there is none, or they were only counted.
-    zeros
-        Number of eigenvalues that are zero, where growth was counted: one may be the free angle.
-    slowest
-        Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0
-        only. 0 where all eigenvalues are known.
-    """
+    """Modes of one operating point."""
 
     modes: ModeSet
-    searched: bool
+    searched: bool  # whether they come from a search of their own rather than from a neighbour's
+    # number of growing eigenvalues that are none of these modes; None where they were not counted
     growing_elsewhere: int | None
+    # the one of them with the largest real part [rad/s]; None where there is none, or they were only counted
     fastest: complex | None = None
-    zeros: int = 0
+    zeros: int = 0  # number of eigenvalues that are zero, where growth was counted: one may be the free angle
+    # Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0 only.
+    # 0 where all eigenvalues are known.
     slowest: float = 0.0
 
     def critical(self, wanted: CriticalRegion) -> list[int]:
@@ -96,20 +82,11 @@ def find_modes_here(
 ) -> FoundModes:
     """The modes of an operating point.
 
-    Parameters
-    ----------
-    alone
-        Eigenvalues of the components alone [rad/s], as `count_growing` takes them.
-    neighbour
-        Modes of a similar operating point; None searches from scratch.
-    count
-        Whether all growing eigenvalues are counted, at any frequency. Small systems always are.
-
-    Raises
-    ------
-    AnalysisError
-        If neither the search nor the growth that is counted comes to an end, and the system is too large for all of
-        its eigenvalues.
+    ``alone``: eigenvalues of the components alone [rad/s], as `count_growing` takes them.
+    ``neighbour``: modes of a similar operating point; None searches from scratch.
+    ``count``: whether all growing eigenvalues are counted, at any frequency. Small systems always are.
+    Raises an `AnalysisError` if neither the search nor the growth that is counted comes to an end, and the system is
+    too large for all of its eigenvalues.
     """
     if len(model.names) <= DENSE:
         return _whole(model, wanted)
@@ -215,10 +192,7 @@ def _radians(wanted: CriticalRegion) -> tuple[float, float]:
 def residue(modes: ModeSet, entry: Vector, exit: Vector) -> NDArray[np.complex128]:
     """Residue of each mode in the transfer from an entry to an exit, shape (m,) [rad/s, by the units of both].
 
-    Parameters
-    ----------
-    entry, exit
-        Column of B and row of C for the whole system, shape (n,).
+    ``entry`` and ``exit``: column of B and row of C for the whole system, shape (n,).
     """
     norms = np.einsum("ij,ij->i", modes.left.conj(), modes.right)
     return np.asarray((modes.left.conj() @ entry) * (modes.right @ exit) / norms, dtype=complex)

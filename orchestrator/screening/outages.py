@@ -12,9 +12,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.screening.columns import Elements
 
-INTACT = "intact"
-"""Name of the network without an outage."""
-
+INTACT = "intact"  # name of the network without an outage
 _KINDS = ("n-1", "lines", "units")
 _SHOWN = 4
 _AUXILIARY = 0.05
@@ -34,11 +32,8 @@ class Outage:
 def read_outages(text: str | None, elements: Elements) -> list[Outage]:
     """The intact network, and the outages that a text names.
 
-    Parameters
-    ----------
-    text
-        ``n-1`` (each line, transformer and unit), ``lines``, ``units``, or names with commas between them, where
-        ``line_1_2+sg3`` loses two elements together; None for none.
+    ``text``: ``n-1`` (each line, transformer and unit), ``lines``, ``units``, or names with commas between them, where
+    ``line_1_2+sg3`` loses two elements together; None for none.
     """
     names: list[str] = []
     for part in (part.strip() for part in (text or "").split(",") if part.strip()):
@@ -63,26 +58,13 @@ def _of_kind(kind: str, elements: Elements) -> list[str]:
 
 @dataclass(frozen=True)
 class Remains:
-    """What outages leave of a network.
-
-    Attributes
-    ----------
-    none
-        Why no system remains; "" where one does.
-    units, loads, shunts
-        What is out of service or dead: without a way to the part that remains.
-    charging
-        The grid's variables of the charging of dead lines.
-    ties
-        Lost branches that stay closed, because a dead part hangs on each: nothing flows there.
-    """
-
-    none: str = ""
+    none: str = ""  # why no system remains; "" where one does
+    # units, loads, shunts: what is out of service or dead: without a way to the part that remains
     units: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     shunts: tuple[str, ...] = ()
-    charging: tuple[str, ...] = ()
-    ties: tuple[str, ...] = ()
+    charging: tuple[str, ...] = ()  # the grid's variables of the charging of dead lines
+    ties: tuple[str, ...] = ()  # lost branches that stay closed, because a dead part hangs on each: nothing flows there
     dead: tuple[str, ...] = ()
 
 

@@ -32,20 +32,8 @@ from orchestrator.study.modes import modes_from
 class StretchTask:
     """Operating points with outages that are computed together.
 
-    Attributes
-    ----------
-    case, fingerprint, scenario, layers, step_size, trust_fmus
-        As in `orchestrator.sweep.point.SweepPointTask`.
-    anchor
-        The intact network at the first point, from which the rest is reached.
-    items
-        What is computed, in this order.
-    key
-        Name of the stretch's file.
-    whole
-        Whether growing eigenvalues are counted at all items, rather than at the ends.
-    sharing
-        How units share an outage; as the case says where None.
+    ``case``, ``fingerprint``, ``scenario``, ``layers``, ``step_size``, ``trust_fmus``: As in
+    `orchestrator.sweep.point.SweepPointTask`.
     """
 
     case: str
@@ -54,12 +42,12 @@ class StretchTask:
     layers: tuple[ParameterFile, ...]
     step_size: float | None
     wanted: CriticalRegion
-    anchor: Item
-    items: tuple[Item, ...]
-    key: str
+    anchor: Item  # the intact network at the first point, from which the rest is reached
+    items: tuple[Item, ...]  # what is computed, in this order
+    key: str  # name of the stretch's file
     trust_fmus: bool = False
-    whole: bool = False
-    sharing: SharingRule | None = None
+    whole: bool = False  # whether growing eigenvalues are counted at all items, rather than at the ends
+    sharing: SharingRule | None = None  # how units share an outage; as the case says where None
 
 
 @dataclass

@@ -16,35 +16,18 @@ _LABELS = ("time", "name")
 
 @dataclass(frozen=True)
 class OperatingCase:
-    """One operating point.
-
-    Attributes
-    ----------
-    name
-        Time or name of the row.
-    hours
-        How long the point lasts [h]; the weight in duration curves.
-    values
-        By ``component.variable``.
-    out
-        Elements out of service.
-    """
-
-    name: str
-    hours: float
-    values: dict[str, Value]
-    out: tuple[str, ...]
+    name: str  # time or name of the row
+    hours: float  # how long the point lasts [h]; the weight in duration curves
+    values: dict[str, Value]  # by ``component.variable``
+    out: tuple[str, ...]  # elements out of service
     place: str
 
 
 def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> list[OperatingCase]:
     """The operating points of a file, for one scenario.
 
-    Raises
-    ------
-    InputError
-        With file and line: if a column or a cell has no meaning, a name is missing or repeated, two columns set one
-        value or switch one element, or there is no row.
+    Raises an `InputError` with file and line: if a column or a cell has no meaning, a name is missing or repeated, two
+    columns set one value or switch one element, or there is no row.
     """
     rows = rows_of(path, ())
     if not rows:

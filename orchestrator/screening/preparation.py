@@ -11,7 +11,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.cases.sharing import Dispatch, SharingRule
+from orchestrator.cases.sharing import Dispatch, SharingRule, in_words
 from orchestrator.coupling.system import System
 from orchestrator.errors import CosimError, ErrorKind, InputError, StartError
 from orchestrator.points.failure import Failure
@@ -20,13 +20,9 @@ from orchestrator.screening.outages import Remains, what_remains
 from orchestrator.screening.record import Item, Status
 from orchestrator.screening.service import switched_off, without_units
 
-ACCEPT = 1e-9
-"""Largest change of a state over a communication step with which the power flow's point is a steady state."""
+ACCEPT = 1e-9  # largest change of a state over a communication step with which the power flow's point is a steady state
 
 _PACKAGE = Path(__file__).parent.parent
-
-_LEAST_SHARE = 0.01
-"""Shares below this [MW] are not told."""
 
 _STATUS = {
     ErrorKind.ISLANDING: Status.ISLANDING,
@@ -65,12 +61,8 @@ class PreparedItem:
 class ItemPreparation:
     """Prepares a scenario with the values of an operating point and an outage.
 
-    Parameters
-    ----------
-    step_size
-        Communication step [s]; the case's where None.
-    sharing
-        How units share an outage; as the case says where None.
+    ``step_size``: Communication step [s]; the case's where None.
+    ``sharing``: How units share an outage; as the case says where None.
     """
 
     def __init__(
@@ -92,10 +84,7 @@ class ItemPreparation:
     def prepared(self, item: Item) -> PreparedItem:
         """The scenario at an item, without the units that are out of service.
 
-        Raises
-        ------
-        CosimError
-            If it cannot be prepared; `failure` says what that means.
+        Raises `CosimError` if it cannot be prepared; `failure` says what that means.
         """
         valued = self._valued(item)
         remains = what_remains(valued, self.elements, item.out)
@@ -130,7 +119,8 @@ class ItemPreparation:
         return tuple(str(question) for question in prepared.questions if str(question) not in self._asked)
 
     def _prepare(self, values: Mapping[str, Value], dispatch: Dispatch | None = None) -> PreparedScenario:
-        (prepared,) = self._case.prepare([self._scenario], dict(values), self._step_size, None, self._layers, dispatch)
+        case = replace(self._case, sharing=SharingRule.SLACK)  # what a point has out of service is in its generation
+        (prepared,) = case.prepare([self._scenario], dict(values), self._step_size, None, self._layers, dispatch)
         return prepared
 
     def _valued(self, item: Item) -> PreparedScenario:
@@ -166,15 +156,9 @@ def lost_and_shared(
     dispatch: Dispatch,
     after: PreparedScenario,
 ) -> str:
-    plans, flow = before.system.components, after.power_flow
-    assert flow is not None
-    rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}
-    parts = [f"{name} is lost, which fed {dispatch.powers[name].real * rating[name]:.4g} MW" for name in sorted(units)]
-    parts += [f"{_load_of(loads, before, grid):.4g} MW of load lost"] if loads else []
-    more = {n: (flow.powers[n] - dispatch.powers[n]).real * rating[n] for n in rating if n not in units}
-    most = sorted(more, key=lambda name: -abs(more[name]))[:_SHOWN]
-    shared = ", ".join(f"{name} {more[name]:+.4g} MW" for name in most if abs(more[name]) >= _LEAST_SHARE)
-    return "; ".join(parts) + (f"; shared: {shared}" if shared else "")
+    assert after.power_flow is not None
+    also = [f"{_load_of(loads, before, grid):.4g} MW of load lost"] if loads else []
+    return in_words(dispatch, after.power_flow.powers, before.system.components, units, also)
 
 
 def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:

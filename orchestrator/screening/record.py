@@ -29,23 +29,11 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class Item:
-    """An operating point with an outage.
-
-    Attributes
-    ----------
-    values
-        Of the operating point, by ``component.variable``.
-    out
-        Elements out of service: the point's own and the outage's.
-    lost
-        Those of them that only the outage takes.
-    """
-
     point: int
     outage: int
-    values: dict[str, Value]
-    out: tuple[str, ...]
-    lost: tuple[str, ...] = ()
+    values: dict[str, Value]  # of the operating point, by ``component.variable``
+    out: tuple[str, ...]  # elements out of service: the point's own and the outage's
+    lost: tuple[str, ...] = ()  # those of them that only the outage takes
 
     @property
     def intact(self) -> bool:
@@ -55,65 +43,40 @@ class Item:
 
 @dataclass(frozen=True)
 class ItemRecord:
-    """What was found at one operating point with one outage.
-
-    Attributes
-    ----------
-    status, text
-        What became of it, and why; of a computed one what was lost and who feeds it instead.
-    stable
-        Whether no mode grows; None where that is not known: nothing was computed, growth was not ``counted``, or a
-        limit is so close that the linear model is doubtful.
-    counted
-        Whether growing eigenvalues were counted at all frequencies.
-    growing_elsewhere
-        Number of growing eigenvalues outside of what was searched; a pair counts twice.
-    fastest
-        Real and imaginary part [rad/s] of the one of them that grows fastest; None where they were only counted.
-    searched
-        Whether the modes come from a search of their own rather than from a neighbour's.
-    zeros
-        Number of eigenvalues that are zero, where growth was counted: one may be the free angle, others are a frequency
-        or a voltage that nothing restores.
-    slowest
-        Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0
-        only. 0 where all eigenvalues are known.
-    eigenvalues
-        Of the modes that are followed [rad/s].
-    critical
-        Places of those that are within the range and below the damping, least damped first.
-    shares
-        Participation of every component, by its name.
-    residues
-        Of every converter, by its name: from its active and its reactive power reference to its frequency, shape
-        (2, m) [rad/s, by pu and pu].
-    reference, links
-        Place in the stretch of the item from which the modes are followed, and of each mode's predecessor there; −1
-        where there is none.
-    lasting
-        Whether computing it again would give the same.
-    map_steps
-        Communication steps of the map whose modes these are; 0 of the system without a communication step.
-    """
-
+    # status, text: what became of it, and why; of a computed one what was lost and who feeds it instead
     status: Status
     text: str = ""
     warnings: tuple[str, ...] = ()
     residual: float = float("nan")
+    # whether no mode grows; None where that is not known: nothing was computed, growth was not ``counted``, or a limit
+    # is so close that the linear model is doubtful
     stable: bool | None = None
-    counted: bool = False
-    growing_elsewhere: int = 0
+    counted: bool = False  # whether growing eigenvalues were counted at all frequencies
+    growing_elsewhere: int = 0  # number of growing eigenvalues outside of what was searched; a pair counts twice
+    # real and imaginary part [rad/s] of the one of them that grows fastest; None where they were only counted
     fastest: tuple[float, float] | None = None
-    searched: bool = False
+    searched: bool = False  # whether the modes come from a search of their own rather than from a neighbour's
+    # number of eigenvalues that are zero, where growth was counted: one may be the free angle, others are a frequency
+    # or a voltage that nothing restores
     zeros: int = 0
+    # Growth [1/s] from which it was counted at all frequencies; slower growth was sought in the range and near 0 only.
+    # 0 where all eigenvalues are known.
     slowest: float = 0.0
+    # of the modes that are followed [rad/s]
     eigenvalues: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    # places of those that are within the range and below the damping, least damped first
     critical: tuple[int, ...] = ()
+    # participation of every component, by its name
     shares: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+    # of every converter, by its name: from its active and its reactive power reference to its frequency, shape (2, m)
+    # [rad/s, by pu and pu]
     residues: dict[str, NDArray[np.complex64]] = field(default_factory=dict)
+    # reference, links: place in the stretch of the item from which the modes are followed, and of each mode's
+    # predecessor there; −1 where there is none
     reference: int = -1
     links: tuple[int, ...] = ()
-    lasting: bool = True
+    lasting: bool = True  # whether computing it again would give the same
+    # communication steps of the map whose modes these are; 0 of the system without a communication step
     map_steps: int = 0
 
 
@@ -122,25 +85,13 @@ _IN_ARRAYS = ("eigenvalues", "shares", "residues")
 
 @dataclass(frozen=True)
 class StretchRecord:
-    """A stretch: its anchor, and then its items.
-
-    Attributes
-    ----------
-    items
-        The anchor first, and then what was asked for.
-    first, last
-        Modes of the anchor and of the last intact item, by which neighbouring stretches are joined; None where these
-        have none.
-    last_place
-        Place of the last intact item.
-    perturbed, reused
-        Numbers of components that were perturbed, and of those whose linear model was there already.
-    """
-
-    items: tuple[ItemRecord, ...]
+    items: tuple[ItemRecord, ...]  # the anchor first, and then what was asked for
+    # first, last: modes of the anchor and of the last intact item, by which neighbouring stretches are joined; None
+    # where these have none
     first: ModeSet | None = None
     last: ModeSet | None = None
-    last_place: int = 0
+    last_place: int = 0  # place of the last intact item
+    # perturbed, reused: numbers of components that were perturbed, and of those whose linear model was there already
     perturbed: int = 0
     reused: int = 0
 

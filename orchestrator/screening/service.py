@@ -10,8 +10,7 @@ from orchestrator.coupling.system import System
 from orchestrator.screening.columns import Elements
 from orchestrator.screening.outages import Remains
 
-_DEAD_CHARGING = 1e-3
-"""Part of its charging that a dead line keeps: a bus without any has no voltage."""
+_DEAD_CHARGING = 1e-3  # part of its charging that a dead line keeps: a bus without any has no voltage
 
 
 def switched_off(out: Sequence[str], remains: Remains, prepared: PreparedScenario, grid: str) -> dict[str, Value]:

@@ -15,22 +15,10 @@ from orchestrator.screening.summary import ModeAt, Summary
 
 @dataclass(frozen=True)
 class OutageRow:
-    """An outage over all points.
-
-    Attributes
-    ----------
-    worst
-        The item with the least damping, or that grows; None where none has modes.
-    least
-        Its least damped mode; None where it has none in the range.
-    unjudged
-        Items without modes.
-    """
-
     name: str
-    worst: ScreenedItem | None
-    least: ModeAt | None
-    unjudged: tuple[ScreenedItem, ...]
+    worst: ScreenedItem | None  # the item with the least damping, or that grows; None where none has modes
+    least: ModeAt | None  # its least damped mode; None where it has none in the range
+    unjudged: tuple[ScreenedItem, ...]  # items without modes
     points: int
 
     @property

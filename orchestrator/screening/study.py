@@ -26,9 +26,7 @@ from orchestrator.screening.point import StretchTask, compute_stretch
 from orchestrator.screening.points_file import OperatingCase, read_points
 from orchestrator.screening.record import Item, ItemRecord, StretchRecord
 
-STRETCH = 48
-"""Operating points with outages that are computed one from the other before the next full search."""
-
+STRETCH = 48  # operating points with outages that are computed one from the other before the next full search
 _MOST = 1_000_000
 
 
@@ -54,21 +52,11 @@ class Shard:
 
 @dataclass(frozen=True)
 class ScreeningPlan:
-    """What a screening computes.
-
-    Attributes
-    ----------
-    case, prepared
-        The case, and its scenario as it is without the values of any point.
-    layers
-        As in `orchestrator.sweep.sweep.SweepPlan`.
-    points, outages
-        Operating points, and outages; the first outage is the intact network.
-    """
-
+    # case, prepared: the case, and its scenario as it is without the values of any point
     case: Case
     prepared: PreparedScenario
-    layers: tuple[ParameterFile, ...]
+    layers: tuple[ParameterFile, ...]  # as in `orchestrator.sweep.sweep.SweepPlan`
+    # points, outages: operating points, and outages; the first outage is the intact network
     points: tuple[OperatingCase, ...]
     outages: tuple[Outage, ...]
     wanted: CriticalRegion
@@ -95,24 +83,15 @@ def plan_screening(
 ) -> ScreeningPlan:
     """Check a screening, and build the FMUs that it needs.
 
-    Parameters
-    ----------
-    points
-        CSV file with the operating points; None for the case's own.
-    outages
-        As `read_outages` takes them.
-    scenario
-        Its name; the first one where None.
-    overrides
-        Values by ``component.variable`` that hold at every point.
-    step_size
-        Communication step [s]; the case's where None.
-    wanted
-        Which modes are critical; from 0.1 to 2 Hz with less than 20 % damping where None.
-    whole
-        Whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of stretches.
-    sharing
-        How units share an outage; as the case says where None.
+    ``points``: CSV file with the operating points; None for the case's own.
+    ``outages``: as `read_outages` takes them.
+    ``scenario``: its name; the first one where None.
+    ``overrides``: values by ``component.variable`` that hold at every point.
+    ``step_size``: communication step [s]; the case's where None.
+    ``wanted``: which modes are critical; from 0.1 to 2 Hz with less than 20 % damping where None.
+    ``whole``: whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of
+    stretches.
+    ``sharing``: how units share an outage; as the case says where None.
     """
     name = scenario or next(iter(case.scenarios))
     (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
@@ -184,22 +163,13 @@ class ScreenedItem:
 
 @dataclass
 class ScreeningResult:
-    """What a screening found.
-
-    Attributes
-    ----------
-    items
-        In the order of points and outages; of a part, only the part's.
-    computed, stored
-        Numbers of items computed now, and read from an earlier start.
-    perturbed, reused
-        Numbers of components perturbed, and taken from where they were alike.
-    """
-
     plan: ScreeningPlan
+    # in the order of points and outages; of a part, only the part's
     items: list[ScreenedItem] = field(default_factory=list)
+    # computed, stored: numbers of items computed now, and read from an earlier start
     computed: int = 0
     stored: int = 0
+    # perturbed, reused: numbers of components perturbed, and taken from where they were alike
     perturbed: int = 0
     reused: int = 0
 
@@ -217,12 +187,8 @@ def run_screening(
 ) -> ScreeningResult:
     """Compute the stretches that are not stored yet, and follow the modes over all of them.
 
-    Parameters
-    ----------
-    plan
-        As `plan_screening` gives it.
-    shard
-        The part to compute; all where None.
+    ``plan``: as `plan_screening` gives it.
+    ``shard``: the part to compute; all where None.
     """
     part = shard or Shard()
     places = [k for k in range(len(plan.tasks)) if part.has(k)]

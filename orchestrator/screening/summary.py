@@ -49,12 +49,9 @@ class ModeAt:
     def ranking(self, most: int | None = _SHOWN) -> list[tuple[str, complex, complex]]:
         """Converters by what a damping controller there would move the mode, the largest first.
 
-        Returns
-        -------
-        list of tuple
-            Name, and residues from its active and its reactive power reference to its frequency [rad/s by pu on its
-            rating]. Their size is the shift of the eigenvalue by unit gain of a controller whose phase is right, as
-            long as the gain is small.
+        Returns name, and residues from its active and its reactive power reference to its frequency [rad/s by pu on its
+        rating]. Their size is the shift of the eigenvalue by unit gain of a controller whose phase is right, as long as
+        the gain is small.
         """
         found = [
             (name, complex(values[0, self.place]), complex(values[1, self.place]))
@@ -168,10 +165,7 @@ def _likeness(known: Sequence[ModeAt], other: Sequence[ModeAt]) -> float:
 def duration(mode: ScreenedMode, *, outages: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A damping-duration curve: for how long the damping is at most so much.
 
-    Returns
-    -------
-    tuple of ndarray
-        Hours and damping ratios [%], both rising.
+    Returns hours and damping ratios [%], both rising.
     """
     least: dict[str, tuple[float, float]] = {}
     for one in mode.at:

@@ -4,10 +4,11 @@ from collections import Counter
 
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
-from orchestrator.report.tables import PlainTable
+from orchestrator.report.tables import Cell, make_table
 from orchestrator.screening.record import Status
-from orchestrator.screening.stress import by_outage
+from orchestrator.screening.stress import OutageRow, by_outage
 from orchestrator.screening.study import ScreenedItem
 from orchestrator.screening.summary import ModeAt, Summary
 from orchestrator.screening.words import verdict_of, what_was_counted, where
@@ -25,55 +26,45 @@ def overview(summary: Summary) -> Table:
     rows, plan = by_outage(summary), summary.result.plan
     few = 1 < len(plan.points) <= _FEW
     title = f"Least damping [%] below {100 * plan.wanted.damping:g} %, worst outage first"
-    table = PlainTable(title=title, title_justify="left", title_style="bold", header_style="bold")
-    table.add_column("Outage", overflow="fold")
     if few:
-        for point in plan.points:
-            table.add_column(escape(point.name), justify="right")
         at = {(item.outage.name, item.point.name): item for item in summary.result.items}
-        for row in rows[:_ROWS]:
-            table.add_row(escape(row.name), *(_cell(at.get((row.name, point.name))) for point in plan.points))
+        columns, left = [point.name for point in plan.points], 1
+        cells = [[row.name, *(_cell(at.get((row.name, name))) for name in columns)] for row in rows[:_ROWS]]
     else:
-        for column in ("Worst point", "Mode"):
-            table.add_column(column, overflow="fold")
-        for column in ("Damping [%]", "Not judged"):
-            table.add_column(escape(column), justify="right")
-        for row in rows[:_ROWS]:
-            least = row.least
-            names = "" if least is None else ", ".join(name for name, _ in least.participation(2))
-            who = "" if least is None else f"{least.frequency:.2f} Hz ({names})"
-            lost = f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
-            shown = row.worst or row.unjudged[0]
-            table.add_row(escape(row.name), escape(shown.point.name), escape(who), _cell(row.worst), lost)
+        columns, left = ["Worst point", "Mode", "Damping [%]", "Not judged"], 3
+        cells = [_at_worst(row) for row in rows[:_ROWS]]
+    table = make_table(title, "Outage", *columns, left=left, rows=cells)
     if len(rows) > _ROWS:
         table.caption = f"{len(rows) - _ROWS} more in items.csv"
     return table
 
 
-def _cell(item: ScreenedItem | None) -> str:
+def _at_worst(row: OutageRow) -> list[Cell]:
+    least = row.least
+    who = "" if least is None else f"{least.frequency:.2f} Hz ({', '.join(name for name, _ in least.participation(2))})"
+    lost = f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""
+    return [row.name, (row.worst or row.unjudged[0]).point.name, who, _cell(row.worst), lost]
+
+
+def _cell(item: ScreenedItem | None) -> Cell:
     """The least damping at an item, or what became of it."""
     if item is None or item.record.status is not Status.COMPUTED:
         return "–" if item is None else str(item.record.status)
     if item.record.stable is False:
-        return "[bold red]UNSTABLE[/]"
+        return Text("UNSTABLE", "bold red")
     return f"{ModeAt(item, item.record.critical[0]).damping:.2f}" if item.record.critical else "more"
 
 
 def modes(summary: Summary) -> Table:
     """Each mode where it is damped least, and the converter whose damping controller moves it most there."""
-    table = PlainTable(title="Modes, each where it is damped least", title_justify="left", title_style="bold",
-                       header_style="bold")  # fmt: skip
-    for column in ("Mode", "Point", "Outage"):
-        table.add_column(column, overflow="fold")
-    for column in ("Damping [%]", "Items", "Converter", "by gain [rad/s]"):
-        table.add_column(escape(column), justify="right")
+    columns = ("Mode", "Point", "Outage", "Damping [%]", "Items", "Converter", "by gain [rad/s]")
+    rows = []
     for mode in summary.modes[:_ROWS]:
-        best = mode.worst.ranking(1)
+        best, item = mode.worst.ranking(1), mode.worst.item
         name, size = (best[0][0], f"{max(abs(best[0][1]), abs(best[0][2])):.3g}") if best else ("–", "–")
-        item = mode.worst.item
-        table.add_row(escape(mode.name), escape(item.point.name), escape(item.outage.name),
-                      f"{mode.worst.damping:.2f}", str(len(mode.at)), name, size)  # fmt: skip
-    return table
+        figures = (f"{mode.worst.damping:.2f}", str(len(mode.at)), name, size)
+        rows.append((mode.name, item.point.name, item.outage.name, *figures))
+    return make_table("Modes, each where it is damped least", *columns, left=3, rows=rows)
 
 
 def remarks(summary: Summary) -> list[str]:

@@ -8,12 +8,8 @@ from orchestrator.sensitivities.parameters import SHARE, Parameter
 SIZES = (1e-2, 1e-3)
 """Differences are taken over this part of the parameter and over twice of it, and must agree; else over the second."""
 
-_AGREE = 0.02
-"""Two sizes agree within this part of the derivative."""
-
-_KINK = 0.1
-"""A derivative upwards and one downwards that differ by more than this part belong to a limit on one side."""
-
+_AGREE = 0.02  # two sizes agree within this part of the derivative
+_KINK = 0.1  # A derivative upwards and one downwards that differ by more than this part belong to a limit on one side
 _STAYS_APART = 0.75
 """In a smooth system twice the change doubles the difference between up and down; at a kink it stays."""
 
@@ -21,8 +17,7 @@ _FLOOR = 2e-6
 """What an effect of one percent is not judged below, as a part of |λ|, with the first size: blocks that are perturbed
 over a step of 100 µs give λ to about 1e-6 rad/s."""
 
-_SLOWEST = 0.5
-"""|λ| that the floor is at least related to [rad/s]."""
+_SLOWEST = 0.5  # |λ| that the floor is at least related to [rad/s]
 
 
 @dataclass(frozen=True)
@@ -49,12 +44,8 @@ class Derivative:
 def differentiate(parameter: Parameter, shift_at: Callable[[float], Shift], eigenvalue: complex) -> Derivative | None:
     """Central differences of two sizes; of one side where the parameter stands at a bound.
 
-    Parameters
-    ----------
-    shift_at
-        The shift of the eigenvalue for a changed value of the parameter.
-    eigenvalue
-        λ [rad/s].
+    ``shift_at``: The shift of the eigenvalue for a changed value of the parameter.
+    ``eigenvalue``: λ [rad/s].
 
     Returns
     -------

@@ -9,31 +9,17 @@ from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 
-SHARE = 0.01
-"""Part of a parameter for which effects "per percent" are given."""
+SHARE = 0.01  # part of a parameter for which effects "per percent" are given
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A Real parameter of a component.
-
-    Attributes
-    ----------
-    unit
-        As the FMU declares it; "1" for a plain number.
-    value
-        At the operating point, in ``unit``.
-    tunable
-        Whether the FMU takes a change while it runs; a fixed one is set before the start only.
-    minimum, maximum
-        Declared bounds; None without.
-    """
-
     component: str
     variable: str
-    unit: str
-    value: float
-    tunable: bool
+    unit: str  # as the FMU declares it; "1" for a plain number
+    value: float  # at the operating point, in ``unit``
+    tunable: bool  # whether the FMU takes a change while it runs; a fixed one is set before the start only
+    # minimum, maximum: declared bounds; None without
     minimum: float | None = None
     maximum: float | None = None
 
@@ -57,13 +43,9 @@ class Parameter:
 def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool = False) -> list[Parameter]:
     """The Real parameters of all components that are asked for.
 
-    Parameters
-    ----------
-    patterns
-        Names ``component.variable``, also with ``*``; fixed parameters that fit are taken too. Without patterns all
-        tunable ones are taken.
-    fixed
-        Without patterns, take the fixed ones as well.
+    ``patterns``: names ``component.variable``, also with ``*``; fixed parameters that fit are taken too. Without
+    patterns all tunable ones are taken.
+    ``fixed``: without patterns, take the fixed ones as well.
     """
     descriptions = {name: running.description for name, running in master.components.items()}
     return parameters_in(
@@ -80,10 +62,7 @@ def parameters_in(
 ) -> list[Parameter]:
     """As `parameters_of`, of components that need not run.
 
-    Parameters
-    ----------
-    value_of
-        Value of a component's variable, in its unit; asked for the chosen ones only.
+    ``value_of``: value of a component's variable, in its unit; asked for the chosen ones only.
     """
     everything = {
         f"{component}.{info.name}": (component, info)

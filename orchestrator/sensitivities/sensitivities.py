@@ -31,9 +31,7 @@ from orchestrator.sensitivities.limits_here import limits_that_act
 from orchestrator.sensitivities.parameters import SHARE, Parameter, parameters_of
 from orchestrator.study.modes import ModesResult, changed, modes_from, running
 
-CRITICAL = "critical"
-"""Stands for the least damped mode of the range."""
-
+CRITICAL = "critical"  # stands for the least damped mode of the range
 _STAYS = 1e-13
 """A component stays where it is if no state and no output changes by more than this part of max(1, |value|), which is
 rounding, after a step with a parameter changed by `_TRIED`."""
@@ -47,8 +45,7 @@ defective pair is split this far by the perturbation's rounding."""
 _SAME = 0.1
 """The step map's mode and that of the continuous model differ by less than this part of |λ|; see `resolution`."""
 
-_FAR = 0.1
-"""Step map and continuous model disagree on a derivative from this part on."""
+_FAR = 0.1  # step map and continuous model disagree on a derivative from this part on
 
 _NO_STEADY_STATE = (
     "with another value the system has no steady state at rated frequency; --held gives the effect at the held "
@@ -61,26 +58,15 @@ Again = Callable[[Mapping[str, float]], PreparedScenario]
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The effect of one parameter on the mode.
-
-    Attributes
-    ----------
-    derivative
-        ∂λ/∂p [rad/s per unit of the parameter] of the step map; None where there is none, for ``reason``.
-    continuous
-        The same of the model without a communication step; None where a component gives no derivatives.
-    operating_point
-        ``stays`` or ``moves`` with the parameter; ``held`` where the derivative leaves it where it is.
-    doubts
-        Why the figure may be wrong; empty if it is trusted.
-    """
-
     parameter: Parameter
     eigenvalue: complex
+    # ∂λ/∂p [rad/s per unit of the parameter] of the step map; None where there is none, for ``reason``
     derivative: complex | None
+    # the same of the model without a communication step; None where a component gives no derivatives
     continuous: complex | None
+    # ``stays`` or ``moves`` with the parameter; ``held`` where the derivative leaves it where it is
     operating_point: str
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # why the figure may be wrong; empty if it is trusted
     reason: str = ""
 
     @property
@@ -143,17 +129,11 @@ def find_sensitivities(
 ) -> SensitivityResult:
     """Differentiate one mode by parameters.
 
-    Parameters
-    ----------
-    mode
-        Name of one of the case's modes, or ``critical`` for the least damped one of the range; by default the first
-        named one, else the critical one.
-    held
-        Hold the operating point, which leaves the tunable parameters alone.
-    directional
-        Linearise with the FMUs' own directional derivatives instead of by perturbation.
-    frequency_range
-        In which the mode is [Hz].
+    ``mode``: name of one of the case's modes, or ``critical`` for the least damped one of the range; by default the
+    first named one, else the critical one.
+    ``held``: hold the operating point, which leaves the tunable parameters alone.
+    ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation.
+    ``frequency_range``: in which the mode is [Hz].
     """
     with running(prepared) as master:
         point = find_operating_point(master)

@@ -55,29 +55,21 @@ def as_json(result: SensitivityResult) -> dict[str, Any]:
 def sensitivity_table(result: SensitivityResult, shown: int | None = None) -> Table:
     """The table for a terminal.
 
-    Parameters
-    ----------
-    shown
-        Number of rows; all where None.
+    ``shown``: number of rows; all where None.
     """
     mode = result.mode
     name = result.modes.name_of(mode) or "critical"
     kind = "the operating point held" if result.held else "total: the operating point moves with the parameter"
-    table = make_table(
-        f"{result.modes.prepared.title}, {name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %; {kind}",
-        "Parameter", "Value", "Hz per unit", "Points per unit", "Hz per %", "Points per %", "Point",
-    )  # fmt: skip
+    title = f"{result.modes.prepared.title}, {name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %; {kind}"
+    columns = ("Parameter", "Value", "Hz per unit", "Points per unit", "Hz per %", "Points per %", "Point")
+    table = make_table(title, *columns)
     table.add_column("Doubt", overflow="fold")
     for row in result.rows[:shown]:
         unit = "" if row.parameter.unit == "1" else f" {row.parameter.unit}"
         figures = (row.frequency_per_unit, row.damping_per_unit, row.frequency_per_percent, row.damping_per_percent)
-        table.add_row(
-            row.parameter.name,
-            f"{row.parameter.value:.5g}{unit}",
-            *(_text(figure) for figure in figures),
-            row.operating_point,
-            row.reason or "; ".join(row.doubts),
-        )
+        why = row.reason or "; ".join(row.doubts)
+        value = f"{row.parameter.value:.5g}{unit}"
+        table.add_row(row.parameter.name, value, *map(_text, figures), row.operating_point, why)
     return table
 
 

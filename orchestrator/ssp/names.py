@@ -15,8 +15,7 @@ PARAMETER_MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 STUDY_TYPE = f"{REVERSE_DOMAIN}.study"
 """Type of our annotation, which holds the parts of a scenario that SSP cannot express."""
 
-OSP_TYPE = "com.opensimulationplatform"
-"""Type of libcosim's annotation, which carries the communication step."""
+OSP_TYPE = "com.opensimulationplatform"  # type of libcosim's annotation, which carries the communication step
 
 NAMESPACES = {
     "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",

@@ -8,8 +8,7 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 from orchestrator.ssp.names import SSP_VERSION, children, tag
 
-SET_NAME = "initialValues"
-"""One name for the sets of all components: some tools ask by name which to apply."""
+SET_NAME = "initialValues"  # one name for the sets of all components: some tools ask by name which to apply
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +48,9 @@ def write_parameter_set(name: str, plan: ComponentPlan, tool: str) -> Element:
 def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[str, Mapping[str, str]]) -> None:
     """Define the units that a file uses; a file without units gets no definitions.
 
-    Parameters
-    ----------
-    parent
-        Takes the group of units as its last element.
-    name
-        Name of the group of units, with its namespace.
-    known
-        Attributes of ``BaseUnit`` by unit; a unit that is missing here gets no attributes.
+    ``parent``: takes the group of units as its last element.
+    ``name``: name of the group of units, with its namespace.
+    ``known``: attributes of ``BaseUnit`` by unit; a unit that is missing here gets no attributes.
     """
     units = [(unit, known.get(unit, {})) for unit in used]
     if units:

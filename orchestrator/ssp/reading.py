@@ -16,21 +16,9 @@ from orchestrator.ssp.study import SspStudy, foreign_step, read_study
 
 @dataclass(frozen=True)
 class SspCase:
-    """The contents of an SSP as tables of a case file.
-
-    Attributes
-    ----------
-    tables
-        Contents of a case file, without keys that would need another program.
-    folder
-        Folder into which the FMUs are unpacked; paths in the tables are relative to it.
-    digest
-        SHA-256 of the archive.
-    """
-
-    tables: dict[str, Any]
-    folder: Path
-    digest: str
+    tables: dict[str, Any]  # contents of a case file, without keys that would need another program
+    folder: Path  # folder into which the FMUs are unpacked; paths in the tables are relative to it
+    digest: str  # SHA-256 of the archive
 
 
 def read_ssp(path: Path, cache: Path) -> SspCase:

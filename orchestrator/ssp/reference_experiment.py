@@ -17,15 +17,9 @@ from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import open_component
 from orchestrator.ssp.names import PARAMETER_SET_TYPE, SSP_VERSION, tag
 
-FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
-"""Where LS-REF has its files."""
-
-VERSION = "1.0.0-beta.1"
-"""Of LS-REF."""
-
-TOLERANCE = 1e-9
-"""Relative to the largest value of an output: what another compiler's mathematics may change."""
-
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"  # where LS-REF has its files
+VERSION = "1.0.0-beta.1"  # of LS-REF
+TOLERANCE = 1e-9  # relative to the largest value of an output: what another compiler's mathematics may change
 _LS = "http://fmi-standard.org/fmi-ls-manifest"
 _STEP, _STEPS, _JUMP_AT, _JUMP = 1e-4, 200, 50, 0.01
 
@@ -35,11 +29,8 @@ register_namespace("fmi-ls", _LS)
 def reference_members(path: Path) -> dict[str, bytes]:
     """Run a smoke test of an FMU for this machine, and return its files by their path in the archive.
 
-    Parameters
-    ----------
-    path
-        The FMU, which starts from its own start values. 5 ms later its first continuous input is 1 % (of 1 at least)
-        higher.
+    ``path``: the FMU, which starts from its own start values. 5 ms later its first continuous input is 1 % (of 1 at
+    least) higher.
     """
     description = read_description(path)
     stimuli, references, state = _run(description)

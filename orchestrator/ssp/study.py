@@ -21,26 +21,16 @@ _OMS_TYPE = "org.openmodelica"
 
 @dataclass(frozen=True)
 class SspStudy:
-    """A scenario without its system.
-
-    Attributes
-    ----------
-    step_size
-        Communication step [s].
-    groups
-        Groups of components of the schedule, in the order of stepping.
-    settings
-        The changes by events, in order: time [s], component, variable, value.
-    tables
-        Tables of the case file that only this project knows, such as ``analysis`` and ``plots``.
-    """
+    """A scenario without its system."""
 
     scenario: str
     title: str
-    step_size: float
+    step_size: float  # communication step [s]
     schedule: str
-    groups: tuple[tuple[str, ...], ...]
+    groups: tuple[tuple[str, ...], ...]  # groups of components of the schedule, in the order of stepping
+    # the changes by events, in order: time [s], component, variable, value
     settings: tuple[tuple[float, str, str, float | bool], ...]
+    # tables of the case file that only this project knows, such as ``analysis`` and ``plots``
     tables: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -49,16 +39,10 @@ def study_of(
 ) -> SspStudy:
     """The study of a scenario. Each event is written as the variables that it sets.
 
-    Parameters
-    ----------
-    step_size
-        Communication step [s].
-    schedule
-        The order in which the components are stepped.
-    events
-        Events of the scenario, whose order is kept.
-    tables
-        Tables of the case file that only this project knows.
+    ``step_size``: communication step [s].
+    ``schedule``: the order in which the components are stepped.
+    ``events``: events of the scenario, whose order is kept.
+    ``tables``: tables of the case file that only this project knows.
     """
     if faults := faults_among(events):
         raise InputError(f"an SSP cannot hold faults ({faults[0]}); remove them from the scenario to export it")
@@ -98,10 +82,7 @@ def write_osp_step(annotations: Element, step_size: float) -> None:
 def read_study(description: Element) -> SspStudy | None:
     """Read our annotation from a system structure description; None if it has no such annotation.
 
-    Raises
-    ------
-    InputError
-        If the annotation has another form than `write_study` gives it.
+    Raises an `InputError` if the annotation has another form than `write_study` gives it.
     """
     for annotation in children(description, "ssd:Annotations/ssc:Annotation"):
         if annotation.get("type") == STUDY_TYPE:

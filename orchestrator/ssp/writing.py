@@ -17,19 +17,11 @@ from orchestrator.ssp.study import SspStudy, write_osp_step, write_study
 def ssp_members(name: str, title: str, system: System, stop_time: float, study: SspStudy) -> dict[str, bytes]:
     """Members of the archive by path: the structure, the components' values and their FMUs.
 
-    Parameters
-    ----------
-    name, title
-        Name and title of the system, as tools show them.
-    stop_time
-        Stop time of the default experiment [s].
-    study
-        The parts of the scenario that SSP cannot express.
-
-    Raises
-    ------
-    InputError
-        If a value is of a type that cannot be written, or a connection does more than carry its value.
+    ``name`` and ``title``: name and title of the system, as tools show them.
+    ``stop_time``: stop time of the default experiment [s].
+    ``study``: the parts of the scenario that SSP cannot express.
+    Raises an `InputError` if a value is of a type that cannot be written, or a connection does more than carry its
+    value.
     """
     if disturbed := described(system.wires):
         raise InputError(

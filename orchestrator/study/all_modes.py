@@ -26,10 +26,7 @@ def compute_all_modes(
 
     FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file.
 
-    Raises
-    ------
-    CosimError
-        As `compute_modes`, of the first scenario that cannot be computed.
+    Raises a `CosimError`: As `compute_modes`, of the first scenario that cannot be computed.
     """
     if len(scenarios) < 2 or not all(_all_ours(prepared) for prepared in scenarios):
         return [compute_modes(one, frequency_range, critical, directional=directional) for one in scenarios]

@@ -10,13 +10,12 @@ from rich.text import Text
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Cause
 from orchestrator.errors import RunInterruptedError
-from orchestrator.report.tables import first_few, make_table
+from orchestrator.report.tables import first_few, make_table, short
 from orchestrator.report.verdict import COLOURS
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 
-_LONGEST = 120
-"""Of a remark [characters]; the whole text stands among the details."""
+_LONGEST = 120  # of a remark [characters]; the whole text stands among the details
 
 KINDS = {
     "growth": "grows", "growing_oscillation": "an oscillation grows", "sustained_oscillation": "oscillates on",
@@ -28,20 +27,12 @@ KINDS = {
 
 @dataclass(frozen=True)
 class ScenarioAnswer:
-    """One line of the first table.
-
-    Attributes
-    ----------
-    good
-        Whether that is good; None where it is not known.
-    mode
-        The least damped mode of the range.
-    """
+    """One line of the first table."""
 
     subject: str
-    good: bool | None
+    good: bool | None  # whether that is good; None where it is not known
     verdict: str
-    mode: Mode | None
+    mode: Mode | None  # the least damped mode of the range
     remark: str
 
     def as_json(self) -> dict[str, Any]:
@@ -59,7 +50,7 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
     swing = "" if mode is None else _swing(result, mode)
     remark = swing
     if verdict.stable is None:
-        remark = verdict.reason
+        remark = swing if result.misfits else verdict.reason
     elif verdict.stable is False and verdict.mode is not None:
         low, high = (0.0, 0.0) if result.hidden is None else result.hidden.frequency_range
         hertz = verdict.mode.frequency_hz
@@ -89,32 +80,38 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     by_modes = of_modes(result.modes)
     title, mode = by_modes.subject, by_modes.mode
     if isinstance(result.failure, RunInterruptedError):
-        return ScenarioAnswer(title, None, "interrupted", mode, _short(str(result.failure)))
+        return ScenarioAnswer(title, None, "interrupted", mode, short(str(result.failure), _LONGEST))
     if result.went_unstable:
         worst = result.went_unstable[0]
         what = f"{worst.component}: {KINDS[worst.kind]} from {worst.time:.4g} s"
         return ScenarioAnswer(title, False, "UNSTABLE", mode, _with_misfits(result.modes, what))
     if result.failure is not None:
-        return ScenarioAnswer(title, False, "failed", mode, _short(str(result.failure)))
+        return ScenarioAnswer(title, False, "failed", mode, short(str(result.failure), _LONGEST))
     if by_modes.good is False:
         return by_modes
     if missing := result.missing_limits:
         names = ", ".join(dict.fromkeys(finding.component for finding in missing))
         remark = f"the current limit of {names} would act, which the model lacks: repeat with EMT models"
-        return ScenarioAnswer(title, None, "not known", mode, _short(remark))
+        return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
+    end = result.modes.prepared.stop_time
+    later = ", ".join(f"{time:g} s" for time in result.modes.prepared.not_reached)
+    if result.before_its_events:
+        remark = f"the run ends at {end:g} s, before its events (t = {later}): without --stop it reaches them"
+        return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     if result.stable_in_simulation is None:
         return ScenarioAnswer(title, None, "not known", mode, "not judged throughout; the findings say where and why")
     if by_modes.good is None or not result.modes.prepared.events:
         return by_modes
-    rest = f"; {by_modes.remark}" if by_modes.remark else ""
-    end = result.modes.prepared.stop_time
-    return ScenarioAnswer(title, True, "stable", mode, _short(f"keeps synchronism and settles until {end:g} s{rest}"))
+    rest = f", before the events at {later}" if later else ""
+    rest += f"; {by_modes.remark}" if by_modes.remark else ""
+    said = f"keeps synchronism and settles until {end:g} s{rest}"
+    return ScenarioAnswer(title, True, "stable", mode, short(said, _LONGEST))
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:
     """A remark behind what does not fit between devices and their bindings."""
     faults = [f"{name}: {', '.join(m.fault for m in found)}" for name, found in result.misfits.items()]
-    return _short("; ".join([*faults, remark] if remark else faults))
+    return short("; ".join([*faults, remark] if remark else faults), _LONGEST)
 
 
 def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[float, float]) -> Table:
@@ -147,7 +144,3 @@ def _swing(result: ModesResult, mode: Mode) -> str:
     if all(sides):
         return f"{sides[0]} against {sides[1]}"
     return sides[0] or sides[1] or ", ".join(state for state, _ in mode.participation[:2])
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 2].rstrip()} …"

@@ -20,8 +20,7 @@ Keys = tuple[str, ...]
 
 _CASE, _EVENTS = "the case", "the events"
 _KERNEL = "GFOR_COSIM_KERNEL"
-_SHOWN = 4
-"""So many differences are named."""
+_SHOWN = 4  # so many differences are named
 
 
 def mark_of(prepared: PreparedScenario) -> dict[str, str]:

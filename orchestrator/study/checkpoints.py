@@ -22,17 +22,10 @@ from orchestrator.results.taken_back import take_back
 from orchestrator.safe_files import write_text
 from orchestrator.study.checkpoint_mark import differences, mark_of
 
-CASE = "case.toml"
-"""Among the checkpoints: the case's text when the run began."""
-
-EVERY = 60.0
-"""Wall-clock time between two checkpoints [s]."""
-
-_SHARE = 0.02
-"""Most of a run's time that may go into checkpoints: where one takes long, the next waits longer."""
-
-_SHORT = 10.0
-"""A scenario that was done in less wall-clock time [s] is run again: to keep it would cost a part of that."""
+CASE = "case.toml"  # among the checkpoints: the case's text when the run began
+EVERY = 60.0  # wall-clock time between two checkpoints [s]
+_SHARE = 0.02  # most of a run's time that may go into checkpoints: where one takes long, the next waits longer
+_SHORT = 10.0  # A scenario that was done in less wall-clock time [s] is run again: to keep it would cost a part of that
 
 
 def not_kept(prepared: PreparedScenario) -> dict[str, str]:
@@ -52,24 +45,13 @@ def not_kept(prepared: PreparedScenario) -> dict[str, str]:
 class Checkpoints:
     """Keeps the run of one scenario; given to `Master.run` as its keeper.
 
-    Parameters
-    ----------
-    every
-        Wall-clock time between two of them [s].
-    resume
-        Go on from the newest that is there, instead of beginning anew.
-    say
-        Told, in one line each, what a user should know.
+    ``every``: wall-clock time between two of them [s].
+    ``resume``: go on from the newest that is there, instead of beginning anew.
+    ``say``: told, in one line each, what a user should know.
     """
 
     def __init__(
-        self,
-        prepared: PreparedScenario,
-        folder: Path,
-        every: float,
-        *,
-        resume: bool,
-        say: Callable[[str], None],
+        self, prepared: PreparedScenario, folder: Path, every: float, *, resume: bool, say: Callable[[str], None]
     ) -> None:
         self._name, self._say, self._every = prepared.name, say, every
         self._mark, self._step_size, self._recorded = mark_of(prepared), prepared.step_size, prepared.record

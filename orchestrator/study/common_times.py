@@ -7,36 +7,23 @@ import numpy as np
 from orchestrator.arrays import Numbers, Vector
 from orchestrator.errors import InputError
 
-_NOISE = 1e-6
-"""Times that differ by less than this part of the shorter interval are one time, rounded in two ways."""
+_NOISE = 1e-6  # times that differ by less than this part of the shorter interval are one time, rounded in two ways
 
 
 @dataclass(frozen=True)
 class CommonTimes:
-    """Times of the run with the longer interval, within the time that both runs have.
+    """Times of the run with the longer interval, within the time that both runs have."""
 
-    Attributes
-    ----------
-    times
-        Shape (n,) [s].
-    remark
-        Sentence on runs with different intervals; empty where both have the same times.
-    """
-
-    times: Numbers
-    remark: str
+    times: Numbers  # shape (n,) [s]
+    remark: str  # sentence on runs with different intervals; empty where both have the same times
     _rows: tuple[Vector | None, Vector | None]
     _recorded: tuple[Numbers, Numbers]
 
     def values(self, run: int, signal: Numbers) -> Numbers:
         """Values at the common times, shape (n,).
 
-        Parameters
-        ----------
-        run
-            0 for the first run, 1 for the second.
-        signal
-            All values that this run has recorded, shape (times of the run,).
+        ``run``: 0 for the first run, 1 for the second.
+        ``signal``: all values that this run has recorded, shape (times of the run,).
         """
         rows = self._rows[run]
         found = signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)

@@ -28,35 +28,23 @@ from orchestrator.study.measured import is_measured, measured_modes
 if TYPE_CHECKING:
     import xarray as xr
 
-_SHOWN = 40
-"""Largest number of signals that an error names; the others are counted."""
-
+_SHOWN = 40  # largest number of signals that an error names; the others are counted
 _WEAKEST = 1e-3
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One signal of two runs over the time that both have.
-
-    Attributes
-    ----------
-    deviations
-        Largest deviation of each run from its own start [unit of the signal].
-    largest, rms
-        Difference between the runs at the times of the run with the longer interval [unit of the signal]; see
-        `common_times`.
-    at
-        Time of the largest difference [s].
-    modes
-        Strongest oscillation in each run from ``start`` on; None where none is found.
-    """
+    """One signal of two runs over the time that both have."""
 
     expression: str
     unit: str
-    deviations: tuple[float, float]
+    deviations: tuple[float, float]  # largest deviation of each run from its own start [unit of the signal]
+    # largest, rms: difference between the runs at the times of the run with the longer interval [unit of the signal];
+    # see `common_times`
     largest: float
     rms: float
-    at: float
+    at: float  # time of the largest difference [s]
+    # strongest oscillation in each run from ``start`` on; None where none is found
     modes: tuple[IdentifiedMode | None, IdentifiedMode | None]
 
 
@@ -174,14 +162,9 @@ def _modes_of(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode
 def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels: tuple[str, str]) -> Comparison:
     """Compare one signal of two runs; oscillations are looked for from ``start`` [s] on.
 
-    Parameters
-    ----------
-    expression
-        The signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
-    start
-        Oscillations are looked for from this time on [s].
-    labels
-        Names of the two runs for tables and errors.
+    ``expression``: the signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
+    ``start``: oscillations are looked for from this time on [s].
+    ``labels``: names of the two runs for tables and errors.
     """
     first, second = (recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True))
     for curve, label in zip((first, second), labels, strict=True):
@@ -212,10 +195,7 @@ def most_different(
 ) -> list[str]:
     """Signals that both runs have, those first whose difference is largest beside their own deviation.
 
-    Parameters
-    ----------
-    a, b
-        Trajectories of the two runs, compared at the times of `common_times`.
+    ``a`` and ``b``: trajectories of the two runs, compared at the times of `common_times`.
     """
     times = common_times(a["time"].values, b["time"].values, labels)
 

@@ -25,8 +25,7 @@ from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 from orchestrator.study.signal_plots import plot_signals
 
-_LEAST_PARTICIPATION = 1e-3
-"""Smaller factors are left out of the files."""
+_LEAST_PARTICIPATION = 1e-3  # smaller factors are left out of the files
 
 
 def save_run(result: RunResult, scenario: ScenarioFolder, *, csv: bool = True) -> None:

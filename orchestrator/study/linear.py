@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,13 +19,8 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.events import faults_among
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
-from orchestrator.late import Late
+from orchestrator.late import xr
 from orchestrator.study.modes import running
-
-if TYPE_CHECKING:
-    import xarray as xr
-else:
-    xr = Late("xarray")
 
 
 def default_inputs(prepared: PreparedScenario) -> list[str]:
@@ -64,12 +58,8 @@ def linear_model(
 
     The verdict on the continuous model is its own; beside it stands what is to be said of the step map.
 
-    Parameters
-    ----------
-    inputs, outputs
-        Names ``component.variable``.
-    as_continuous
-        A model in continuous time instead of the map over one communication step.
+    ``inputs`` and ``outputs``: names ``component.variable``.
+    ``as_continuous``: A model in continuous time instead of the map over one communication step.
     """
     with running(prepared) as master:
         point = find_operating_point(master)
@@ -98,7 +88,7 @@ def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
         if any(isinstance(value, bool) for value in settings.values())
     ]
     if faults := faults_among(prepared.events):
-        raise InputError(f"a linear model cannot follow a fault ({faults[0]}); leave --linear out")
+        raise InputError(f"a linear model cannot follow a fault or a forcing ({faults[0]}); leave --linear out")
     if switching:
         raise InputError(f"a linear model cannot follow a switching event ({switching[0]}); leave --linear out")
     inputs = default_inputs(prepared)

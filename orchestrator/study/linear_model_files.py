@@ -14,11 +14,7 @@ from orchestrator.results.storage import provenance, save_json, save_matrices, s
 
 
 def save_linear_model(
-    model: StateSpace,
-    point: OperatingPoint,
-    stability: Stability,
-    prepared: PreparedScenario,
-    folder: Path,
+    model: StateSpace, point: OperatingPoint, stability: Stability, prepared: PreparedScenario, folder: Path
 ) -> list[Path]:
     """Write A, B, C, D with names, operating point and verdict: ``linear_model.mat`` for MATLAB, one CSV a matrix."""
     matrices = {"A": model.A, "B": model.B, "C": model.C, "D": model.D}

@@ -9,8 +9,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import CosimError
 from orchestrator.study.modes import ModesResult, compute_modes
 
-_MOST_STATES = 200
-"""Of a system whose modes are computed a second time."""
+_MOST_STATES = 200  # of a system whose modes are computed a second time
 
 
 class Choosable(Protocol):

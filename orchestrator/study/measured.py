@@ -14,15 +14,12 @@ from orchestrator.results.comtrade.reading import LINE_FREQUENCY
 if TYPE_CHECKING:
     import xarray as xr
 
-_UNEVEN = 0.01
-"""Part of the interval by which samples may be off."""
-
+_UNEVEN = 0.01  # part of the interval by which samples may be off
 _WAVEFORM = 0.5
 """Part of a signal's power near the line's frequency from which it is an instantaneous value of the grid."""
 
 _NEAR = 0.15
-_LEAST_NOISE = 1e-5
-"""Singular values below this part of the largest are noise: the resolution of 16 bits."""
+_LEAST_NOISE = 1e-5  # singular values below this part of the largest are noise: the resolution of 16 bits
 
 
 def is_measured(curve: xr.DataArray) -> bool:

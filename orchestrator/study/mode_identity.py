@@ -34,20 +34,11 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.fmi.instance import is_isolated, is_ours
 
-_STAYS = 1e-6
-"""A state that changes by less than this part of max(1, |value|) stays where it is."""
-
-_MOST_STATES = 600
-"""Of a system that is started on the way, or whose clear names are looked at again."""
-
-_MOST_STARTS = 12
-"""Systems that are started on one way at most."""
-
-_MOST_FITTED = 6
-"""The same where each of them has a component to identify."""
-
-_SAME = 1e-6
-"""Two eigenvalues that differ by less than this part of their size are one, computed in two ways."""
+_STAYS = 1e-6  # A state that changes by less than this part of max(1, |value|) stays where it is
+_MOST_STATES = 600  # of a system that is started on the way, or whose clear names are looked at again
+_MOST_STARTS = 12  # systems that are started on one way at most
+_MOST_FITTED = 6  # the same where each of them has a component to identify
+_SAME = 1e-6  # two eigenvalues that differ by less than this part of their size are one, computed in two ways
 
 
 @dataclass(frozen=True)
@@ -64,8 +55,7 @@ class NamedSystem:
 Computed = Callable[[PreparedScenario], NamedSystem]
 """Gives the model of a scenario, with the names that its shapes give."""
 
-Undamped = Callable[[Mapping[str, float]], NamedSystem]
-"""Gives the system itself with other gains."""
+Undamped = Callable[[Mapping[str, float]], NamedSystem]  # gives the system itself with other gains
 
 
 def settled(
@@ -78,14 +68,9 @@ def settled(
 ) -> NamedSystem:
     """A scenario's names, where shapes do not tell by following the mode that it was.
 
-    Parameters
-    ----------
-    known
-        Scenarios that are settled already, by name, with the values that hold for all.
-    undamped
-        Gives it with other gains, where it still runs.
-    far
-        Whether to look beyond earlier scenarios where no mode would get a name.
+    ``known``: scenarios that are settled already, by name, with the values that hold for all.
+    ``undamped``: gives it with other gains, where it still runs.
+    ``far``: whether to look beyond earlier scenarios where no mode would get a name.
     """
     others = _Others(system, computed, known, undamped)
     for name in dict.fromkeys((*system.naming.contested, *system.naming.named)):
@@ -180,12 +165,8 @@ def _figures(eigenvalue: complex) -> str:
 class _Others:
     """Where else a scenario's names may be clear; each is computed once at most.
 
-    Attributes
-    ----------
-    checked
-        Whether even a clear name is to be followed: something acts that may have made the shape.
-    lost
-        Where the name last looked for is borne by a mode from which no way leads here; empty if nowhere.
+    ``checked``: Whether even a clear name is to be followed: something acts that may have made the shape.
+    ``lost``: Where the name last looked for is borne by a mode from which no way leads here; empty if nowhere.
     """
 
     def __init__(

@@ -12,18 +12,12 @@ from orchestrator.cases.schema import ReferenceModeTable
 from orchestrator.report.plot_style import STYLE, add_legend, colour, save_figure
 from orchestrator.study.modes import ModesResult
 
-_BARS = 10
-"""Components with a bar in each mode, those that take part most."""
-
-_NAMED = 4
-"""Components of each side of a mode shape that are named, largest first."""
+_BARS = 10  # components with a bar in each mode, those that take part most
+_NAMED = 4  # components of each side of a mode shape that are named, largest first
 
 
-_RAY = "damping ray"
-"""Marks what belongs to a ray."""
-
-_RAY_LABEL = (0.055, 0.05)
-"""Room for a ray's label, in parts of the Axes' width and height."""
+_RAY = "damping ray"  # marks what belongs to a ray
+_RAY_LABEL = (0.055, 0.05)  # room for a ray's label, in parts of the Axes' width and height
 
 
 def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> None:

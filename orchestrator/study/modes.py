@@ -48,8 +48,7 @@ from orchestrator.study.mode_identity import NamedSystem, settled
 from orchestrator.study.naming import named_modes
 from orchestrator.study.start_errors import start_error
 
-_LEADING = 3
-"""Of the states of an electromechanical mode: angle and speed of one machine, and the speed of another."""
+_LEADING = 3  # of the states of an electromechanical mode: angle and speed of one machine, and the speed of another
 
 BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
 """Identifies components of a running system that hide their states."""
@@ -57,40 +56,25 @@ BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
 
 @dataclass(frozen=True)
 class ModesResult:
-    """Steady state and modes of one scenario.
-
-    Attributes
-    ----------
-    named
-        The modes that the case looks for by their shape, as far as they are in range.
-    references
-        Somebody else's figures for them, where their conditions hold.
-    swing
-        States that show who swings against whom, mostly speeds.
-    hidden
-        The oscillatory modes outside of the range; None where the system is too large for all its eigenvalues.
-    system
-        The continuous model, without a communication step; None where a component gives no derivatives.
-    fit_errors
-        Of the components that were identified: largest relative difference of model and measured response.
-    unnamed
-        Why no mode bears a name that the case gives, by name.
-    """
+    """Steady state and modes of one scenario."""
 
     prepared: PreparedScenario
     operating_point: OperatingPoint
     model: LinearModel
     modes: list[Mode]
-    named: dict[str, Mode]
-    references: dict[str, ReferenceModeTable]
+    named: dict[str, Mode]  # the modes that the case looks for by their shape, as far as they are in range
+    references: dict[str, ReferenceModeTable]  # somebody else's figures for them, where their conditions hold
     warnings: tuple[str, ...]
-    swing: tuple[str, ...]
+    swing: tuple[str, ...]  # states that show who swings against whom, mostly speeds
     areas: dict[str, str]
     stability: Stability
+    # the oscillatory modes outside of the range; None where the system is too large for all its eigenvalues
     hidden: Hidden | None
+    # the continuous model, without a communication step; None where a component gives no derivatives
     system: LinearModel | None
+    # of the components that were identified: largest relative difference of model and measured response
     fit_errors: dict[str, float] = field(default_factory=dict)
-    unnamed: Mapping[str, str] = field(default_factory=dict)
+    unnamed: Mapping[str, str] = field(default_factory=dict)  # why no mode bears a name that the case gives, by name
     misfits: Mapping[str, list[Misfit]] = field(default_factory=dict)
 
     @property
@@ -133,13 +117,9 @@ def compute_modes(
 ) -> ModesResult:
     """Initialise a scenario's FMUs, verify their steady state, and linearise around it.
 
-    Parameters
-    ----------
-    critical
-        Damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The search
-        knows too little to give modes their names.
-    directional
-        Linearise with the FMUs' own directional derivatives instead of by perturbation.
+    ``critical``: damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The
+    search knows too little to give modes their names.
+    ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation.
     """
     with running(prepared) as master:
         return modes_of(prepared, master, frequency_range, critical, directional=directional)
@@ -303,7 +283,7 @@ class Linearised:
             ),
             swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
             areas=areas_of(analysis.areas, prepared.system),
-            stability=examined.stability,
+            stability=examined.stability.doubted(_faults(self._misfits)),
             hidden=None
             if spectrum is None
             else replace(
@@ -320,6 +300,10 @@ class Linearised:
         )
 
 
+def _faults(misfits: Mapping[str, list[Misfit]]) -> list[str]:
+    return [f"{name} does not fit its binding: {m.fault}" for name, found in misfits.items() for m in found]
+
+
 def identified(
     prepared: PreparedScenario,
     point: OperatingPoint,
@@ -334,14 +318,9 @@ def identified(
 ) -> NamedSystem:
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 
-    Parameters
-    ----------
-    at_gains
-        The linear model with other gains of damping controllers, where the scenario still runs.
-    directional
-        As `modes_of`, for scenarios that have to be computed.
-    black_boxes
-        Identifies components of such a scenario that hide their states.
+    ``at_gains``: the linear model with other gains of damping controllers, where the scenario still runs.
+    ``directional``: as `modes_of`, for scenarios that have to be computed.
+    ``black_boxes``: identifies components of such a scenario that hide their states.
     """
     first, last = _named_range(frequency_range)
 

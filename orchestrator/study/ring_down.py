@@ -15,17 +15,13 @@ from orchestrator.watch.finding import Finding, Kind
 if TYPE_CHECKING:
     import xarray as xr
 
-_COARSEST = 0.25
-"""Record interval [periods of the mode] up to which a ring-down is shown."""
-
-LEAST_PERIODS = 1
-"""Least number of the mode's periods in the window of a ring-down."""
+_COARSEST = 0.25  # record interval [periods of the mode] up to which a ring-down is shown
+LEAST_PERIODS = 1  # least number of the mode's periods in the window of a ring-down
 
 _ENDS: frozenset[Kind] = frozenset({"run_away", "loss_of_synchronism", "not_finite", "failure"})
 """Findings after which the response is no swing around the operating point."""
 
-_SAME = 0.2
-"""Relative difference of frequency up to which an oscillation that is found is the mode itself."""
+_SAME = 0.2  # relative difference of frequency up to which an oscillation that is found is the mode itself
 
 
 def ring_down_of(

@@ -69,17 +69,7 @@ class ModeShift:
 
 @dataclass
 class RunResult:
-    """A scenario's modes and its simulated response.
-
-    Attributes
-    ----------
-    failure
-        The error that ended the run before its time.
-    findings
-        What the run did wrong, each said once, in the order of its beginning.
-    protections
-        What kept each foreign FMU from the rest of the machine, by component.
-    """
+    """A scenario's modes and its simulated response."""
 
     modes: ModesResult
     dataset: xr.Dataset
@@ -87,8 +77,10 @@ class RunResult:
     ring_down: IdentifiedMode | None = None
     shifts: list[ModeShift] = field(default_factory=list)
     linear: xr.Dataset | None = None
-    failure: CosimError | None = None
+    failure: CosimError | None = None  # the error that ended the run before its time
+    # what the run did wrong, each said once, in the order of its beginning
     findings: list[Finding] = field(default_factory=list)
+    # what kept each foreign FMU from the rest of the machine, by component
     protections: dict[str, tuple[Protection, ...]] = field(default_factory=dict)
 
     @property
@@ -102,10 +94,19 @@ class RunResult:
         return [finding for finding in self.findings if not finding.represented]
 
     @property
+    def before_its_events(self) -> bool:
+        """Whether it ended before the first of its events."""
+        return bool(self.modes.prepared.not_reached) and not self.modes.prepared.events
+
+    @property
     def stable_in_simulation(self) -> bool | None:
-        """None where a part was not judged or a limit would act that the model lacks, and nothing else was wrong."""
+        """None where a part was not judged or not reached, or a limit would act that the model lacks, and nothing else
+        was wrong.
+        """
         if self.went_unstable:
             return False
+        if self.before_its_events:
+            return None
         return None if any(finding.kind == NOT_JUDGED or not finding.represented for finding in self.findings) else True
 
 
@@ -126,18 +127,11 @@ def run_scenario(
     A component that fails in the middle ends the run, and so do Ctrl-C and SIGTERM; what was recorded until then is in
     the result.
 
-    Parameters
-    ----------
-    frequency_range
-        Modes of these frequencies are shown [Hz].
-    observers
-        What else looks on at every step, such as a recorder.
-    linear
-        Compute the linear model's response as well.
-    recording
-        Where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
-    checkpoints
-        Keep the run while it goes on, and go on from the newest where one was left; not with federates.
+    ``frequency_range``: modes of these frequencies are shown [Hz].
+    ``observers``: what else looks on at every step, such as a recorder.
+    ``linear``: compute the linear model's response as well.
+    ``recording``: where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
+    ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates.
     """
     if federates is not None:
         if federates.announce is not None:
@@ -207,17 +201,7 @@ def _run(
     )
     about_run = (*map(str, prepared.about_rows), *([why_none] if why_none else []), *unprotected, *inside)
     modes = replace(modes, warnings=(*modes.warnings, *about_run))
-    return RunResult(
-        modes,
-        dataset,
-        statistics,
-        ring_down,
-        shifts,
-        follows,
-        failure,
-        findings,
-        protections,
-    )
+    return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure, findings, protections)
 
 
 def _diverging(master: Master) -> list[str]:

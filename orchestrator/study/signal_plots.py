@@ -24,7 +24,13 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
         figure = Figure(figsize=(7.2, 1.3 + 1.9 * len(table.panels)), layout="constrained")
         axes = figure.subplots(len(table.panels), 1, sharex=True, squeeze=False)[:, 0]
         for axis, panel in zip(axes, table.panels, strict=True):
-            draw_signal(axis, results, panel.signal, panel.scale)
+            several = len(results) == 1 and bool(panel.also)
+            for k, expression in enumerate((panel.signal, *panel.also)):
+                draw_signal(
+                    axis, results, expression, panel.scale, k if several else 0, expression if several else None
+                )
+            if several and axis.lines:
+                axis.legend(loc="best", fontsize="x-small")
             axis.set_ylabel(panel.label)
             if not axis.lines:
                 said = f"{panel.signal} was not recorded"
@@ -34,27 +40,32 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
         axes[-1].set_xlabel("Time [s]")
         full = next(axis for axis in axes if axis.lines)
         handles, labels = full.get_legend_handles_labels()
-        add_legend(figure, handles, labels)
+        first = dict(zip(labels, handles, strict=True))
+        if len(results) > 1 or not any(panel.also for panel in table.panels):
+            add_legend(figure, [*first.values()], [*first])
         save_figure(figure, path)
     return True
 
 
-def draw_signal(axis: Any, results: Sequence[RunResult], expression: str, scale: float = 1.0, first: int = 0) -> None:
+def draw_signal(
+    axis: Any,
+    results: Sequence[RunResult],
+    expression: str,
+    scale: float = 1.0,
+    first: int = 0,
+    label: str | None = None,
+) -> None:
     """One signal of all runs that recorded it; dashed, the linear model's response where there is one.
 
-    Parameters
-    ----------
-    axis
-        Matplotlib Axes.
-    expression
-        ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
-    first
-        Index of the first run's colour: the number of runs that the Axes show already.
+    ``axis``: Matplotlib Axes.
+    ``expression``: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
+    ``first``: Index of the first run's colour: the number of runs that the Axes show already.
+    ``label``: Of the curves; each run's own by default.
     """
     for index, result in enumerate(results, start=first):
         data = outline(result.dataset, expression)
         if data is not None:
-            axis.plot(data["time"], scale * data, color=colour(index), label=result.modes.label)
+            axis.plot(data["time"], scale * data, color=colour(index), label=label or result.modes.label)
         follows = outline(result.linear, expression) if result.linear is not None else None
         if follows is not None:
             axis.plot(follows["time"], scale * follows, color="black", linewidth=0.8, linestyle="--")

@@ -6,10 +6,8 @@ from orchestrator.errors import ComponentError, ErrorKind, Problem, StartError
 from orchestrator.fmi.instance import is_ours
 
 _INITIALISATION = "InitializationMode"
-_PREFACE = "parameters cannot be used: "
-"""Begins what our models say of values that do not fit together."""
-_FULL = 1.0
-"""Apparent power [pu] beyond which a unit is asked for more than its rating."""
+_PREFACE = "parameters cannot be used: "  # begins what our models say of values that do not fit together
+_FULL = 1.0  # apparent power [pu] beyond which a unit is asked for more than its rating
 
 
 def start_error(prepared: PreparedScenario, error: ComponentError) -> StartError | None:

@@ -21,24 +21,17 @@ from orchestrator.coupling.schedule import SECOND_ORDER, Schedule, ScheduleName
 from orchestrator.errors import AnalysisError, CosimError, InputError
 from orchestrator.study.modes import running
 
-MULTIPLES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 20.0, 50.0)
-"""Steps that are tried, in parts of the case's own."""
+MULTIPLES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 20.0, 50.0)  # steps that are tried, in parts of the case's own
 
-TRIED: tuple[ScheduleName, ...] = ("gauss-seidel", "midpoint", "newton")
-"""Schedules that are tried where none is named."""
+TRIED: tuple[ScheduleName, ...] = ("gauss-seidel", "midpoint", "newton")  # schedules that are tried where none is named
 
-LEAST_DAMPED = 6
-"""So many modes are compared, least damped first."""
-
-SWINGING = 0.5
-"""Largest damping ratio of a compared mode."""
-
+LEAST_DAMPED = 6  # so many modes are compared, least damped first
+SWINGING = 0.5  # largest damping ratio of a compared mode
 _COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0
 """As in `orchestrator.analysis.stability`: growth beyond the first figure times the continuous system's plus the second
 [1/s] is the coupling's."""
 
-_AFTER_THE_FIRST = 2
-"""So many steps in turn that are not within the error end the search with a schedule."""
+_AFTER_THE_FIRST = 2  # so many steps in turn that are not within the error end the search with a schedule
 
 
 @dataclass(frozen=True)
@@ -51,35 +44,19 @@ class Allowed:
 
 @dataclass(frozen=True)
 class TriedStep:
-    """What one schedule does at one step.
-
-    Attributes
-    ----------
-    schedule, step_size
-        Name, and communication step [s].
-    hertz, points
-        Errors of the critical modes' frequencies [Hz] and damping ratios [points], shape (modes,), in their order.
-    eigenvalues
-        The critical modes in the step map [rad/s].
-    growth
-        Largest growth rate of the step map [1/s]; 0 where nothing grows.
-    stable
-        Whether the step makes nothing grow that does not grow in the continuous system, and hides no growth.
-    refused
-        Why nothing could be computed; else empty.
-    doubts
-        Why the figures may be none of the run's, such as a limit at the operating point.
-    """
-
+    # schedule, step_size: name, and communication step [s]
     schedule: ScheduleName
     step_size: float
+    # hertz, points: errors of the critical modes' frequencies [Hz] and damping ratios [points], shape (modes,), in
+    # their order
     hertz: NDArray[np.float64]
     points: NDArray[np.float64]
-    eigenvalues: NDArray[np.complex128]
-    growth: float = 0.0
+    eigenvalues: NDArray[np.complex128]  # the critical modes in the step map [rad/s]
+    growth: float = 0.0  # largest growth rate of the step map [1/s]; 0 where nothing grows
+    # whether the step makes nothing grow that does not grow in the continuous system, and hides no growth
     stable: bool = False
-    refused: str = ""
-    doubts: tuple[str, ...] = ()
+    refused: str = ""  # why nothing could be computed; else empty
+    doubts: tuple[str, ...] = ()  # why the figures may be none of the run's, such as a limit at the operating point
 
     def is_within(self, allowed: Allowed) -> bool:
         """Whether the step is stable, beyond doubt, and moves no critical mode by more than is allowed."""
@@ -90,23 +67,12 @@ class TriedStep:
 
 @dataclass(frozen=True)
 class StepChoice:
-    """All trials of a scenario.
-
-    Attributes
-    ----------
-    critical
-        The continuous system's critical modes [rad/s], least damped first.
-    growth
-        Largest growth rate of the continuous system [1/s]; 0 where nothing grows.
-    left_out
-        Steps [s] that were not tried, as an event of the case or its end does not fall on them.
-    """
-
     prepared: PreparedScenario
     allowed: Allowed
-    critical: NDArray[np.complex128]
-    growth: float
+    critical: NDArray[np.complex128]  # the continuous system's critical modes [rad/s], least damped first
+    growth: float  # largest growth rate of the continuous system [1/s]; 0 where nothing grows
     trials: tuple[TriedStep, ...]
+    # steps [s] that were not tried, as an event of the case or its end does not fall on them
     left_out: tuple[float, ...] = ()
 
     @property
@@ -142,22 +108,12 @@ def choose_step(
 ) -> StepChoice:
     """What schedules do to a scenario's critical modes at several steps, against the continuous system.
 
-    Parameters
-    ----------
-    steps
-        Communication steps [s]; by default `MULTIPLES` of the case's own.
-    schedules
-        By default `TRIED`.
-    frequency_range
-        Of the critical modes [Hz].
-
-    Raises
-    ------
-    AnalysisError
-        If a component gives no derivatives, so that there is no continuous system to compare with; if no mode is in
-        range; or if the system is too large for all its eigenvalues.
-    InputError
-        If no step fits the case's events.
+    ``steps``: communication steps [s]; by default `MULTIPLES` of the case's own.
+    ``schedules``: by default `TRIED`.
+    ``frequency_range``: of the critical modes [Hz].
+    Raises an `AnalysisError` if a component gives no derivatives, so that there is no continuous system to compare
+    with; if no mode is in range; or if the system is too large for all its eigenvalues.
+    Raises an `InputError` if no step fits the case's events.
     """
     lengths, left_out = _fitting(prepared, steps)
     with running(prepared.rescheduled("gauss-seidel")) as master:
@@ -279,12 +235,9 @@ def _trial(
 def keeps_stability(rate: float, growth: float, seen: NDArray[np.complex128], critical: NDArray[np.complex128]) -> bool:
     """Whether a step makes nothing grow by itself, and leaves each critical mode on its side of the imaginary axis.
 
-    Parameters
-    ----------
-    rate, growth
-        Largest growth rates [1/s] of the step map and of the continuous system; 0 where nothing grows.
-    seen, critical
-        The critical modes in both [rad/s].
+    ``rate`` and ``growth``: largest growth rates [1/s] of the step map and of the continuous system; 0 where nothing
+    grows.
+    ``seen`` and ``critical``: the critical modes in both [rad/s].
     """
     grown = rate > (_COUPLING_FACTOR * growth + _COUPLING_RATE if growth else 0.0)
     crossed = bool(np.any((seen.real > 0) != (critical.real > 0)))

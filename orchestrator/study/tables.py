@@ -8,7 +8,7 @@ from rich.table import Table
 
 from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.report import power_flow
-from orchestrator.report.tables import PlainTable, eigenvalue_text, first_few, make_table, share_text
+from orchestrator.report.tables import eigenvalue_text, first_few, make_table, share_text
 from orchestrator.results.signals import relative_difference, signal
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
@@ -16,18 +16,14 @@ from orchestrator.study.run import RunResult
 
 def steady_states(results: Sequence[ModesResult]) -> Table:
     """Residual of the coupled steady state, scenario by scenario."""
-    table = make_table(
-        "Steady state", "Scenario", "States", "Residual per step", "Drift [1/s]", "Power-flow residual [pu]"
-    )
-    for r in results:
-        flow = r.prepared.power_flow
-        table.add_row(
-            r.prepared.title,
-            str(r.model.number_of_states),
-            *("–" if math.isnan(v) else f"{v:.1e}" for v in (r.operating_point.residual, r.operating_point.drift)),
-            f"{flow.residual:.1e}" if flow else "–",
-        )
-    return table
+    columns = ("Scenario", "States", "Residual per step", "Drift [1/s]", "Power-flow residual [pu]")
+    rows = [
+        (r.prepared.title, str(r.model.number_of_states),
+         *("–" if math.isnan(v) else f"{v:.1e}" for v in (r.operating_point.residual, r.operating_point.drift)),
+         f"{r.prepared.power_flow.residual:.1e}" if r.prepared.power_flow else "–")
+        for r in results
+    ]  # fmt: skip
+    return make_table("Steady state", *columns, rows=rows)
 
 
 def named_modes(results: Sequence[ModesResult], reference_title: str | None) -> Table:
@@ -62,24 +58,17 @@ def all_modes(result: ModesResult) -> Table:
     table.add_column("Most associated states (participation)", overflow="fold")
     for mode in result.modes:
         associated = ", ".join(f"{name} ({factor:.2f})" for name, factor in mode.participation[:3])
-        table.add_row(
-            eigenvalue_text(mode.eigenvalue),
-            f"{mode.frequency_hz:.4f}",
-            f"{mode.damping_percent:.2f}",
-            result.name_of(mode) or "",
-            associated,
-            style="bold" if result.name_of(mode) else None,
-        )
+        name, figures = result.name_of(mode) or "", (f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.2f}")
+        style = "bold" if name else None
+        table.add_row(eigenvalue_text(mode.eigenvalue), *figures, name, associated, style=style)
     return table
 
 
 def mode_shapes(results: Sequence[ModesResult]) -> Table:
     """Who swings against whom in the modes with a name, or in all where none has one, and who takes part."""
-    table = PlainTable(title="Mode shapes", title_justify="left", title_style="bold", header_style="bold")
     columns = ["Mode", "Swing together", "Against", "Participation by component"]
     columns += ["By area"] if any(r.areas for r in results) else []
-    for column in columns:
-        table.add_column(column, overflow="fold")
+    table = make_table("Mode shapes", *columns, left=len(columns))
     names = list(dict.fromkeys(name for r in results for name in r.named))
     entries = [(name, r, r.named[name]) for name in names for r in results if name in r.named]
     if not names:
@@ -103,33 +92,22 @@ def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
             flows[f"{same}, {r.prepared.title}" if same else r.prepared.title] = flow
     for titles, flow in flows.items():
         for kind, columns in power_flow.COLUMNS.items():
-            table = make_table(f"{kind.capitalize()}: {titles}", *columns.values(), left=power_flow.TEXTS[kind])
-            for row in power_flow.cells(flow[kind], kind):
-                table.add_row(*row)
-            yield table
-        table = make_table(f"Power flow: {titles}", "What", "Value")
-        for what, value in power_flow.totals(flow):
-            table.add_row(what, value)
-        yield table
+            cells = power_flow.cells(flow[kind], kind)
+            title, left = f"{kind.capitalize()}: {titles}", power_flow.TEXTS[kind]
+            yield make_table(title, *columns.values(), left=left, rows=cells)
+        yield make_table(f"Power flow: {titles}", "What", "Value", rows=power_flow.totals(flow))
 
 
 def ring_downs(results: Sequence[RunResult]) -> Table:
     """Frequency and damping of the simulated response against the eigenvalue."""
-    table = make_table(
-        "Ring-down of the simulated response against the eigenvalue",
-        "Scenario", "f simulated [Hz]", "f mode [Hz]", "Damping simulated [%]", "Damping mode [%]",
-    )  # fmt: skip
-    for r in results:
-        mode, seen = r.modes.electromechanical, r.ring_down
-        if mode and seen:
-            table.add_row(
-                r.modes.prepared.title,
-                f"{seen.frequency_hz:.4f}",
-                f"{mode.frequency_hz:.4f}",
-                f"{seen.damping_percent:.2f}",
-                f"{mode.damping_percent:.2f}",
-            )
-    return table
+    columns = ("Scenario", "f simulated [Hz]", "f mode [Hz]", "Damping simulated [%]", "Damping mode [%]")
+    rows = [
+        (r.modes.prepared.title, f"{seen.frequency_hz:.4f}", f"{mode.frequency_hz:.4f}",
+         f"{seen.damping_percent:.2f}", f"{mode.damping_percent:.2f}")
+        for r in results
+        if (mode := r.modes.electromechanical) and (seen := r.ring_down)
+    ]  # fmt: skip
+    return make_table("Ring-down of the simulated response against the eigenvalue", *columns, rows=rows)
 
 
 def linear_differences(results: Sequence[RunResult]) -> Table:
@@ -152,14 +130,8 @@ def linear_differences(results: Sequence[RunResult]) -> Table:
 def mode_shifts(results: Sequence[RunResult]) -> Table:
     """|λ(H) − λ(continuous)| of the electromechanical mode."""
     steps = sorted({s.step_size for r in results for s in r.shifts})
-    columns = [f"{h * 1e6:g} µs" for h in steps]
-    table = make_table(
-        "Shift of the electromechanical mode by the communication step [rad/s]",
-        "Scenario",
-        "Schedule",
-        *columns,
-        left=2,
-    )
+    columns = ("Scenario", "Schedule", *(f"{h * 1e6:g} µs" for h in steps))
+    table = make_table("Shift of the electromechanical mode by the communication step [rad/s]", *columns, left=2)
     for r in results:
         for schedule in sorted({s.schedule for s in r.shifts}):
             values = {s.step_size: s.shift for s in r.shifts if s.schedule == schedule}
@@ -171,16 +143,9 @@ def run_statistics(results: Sequence[RunResult]) -> Table:
     """Speed, and where the time went."""
     table = make_table("Run", "Scenario", "Steps", "Steps/s", "× real time", "Threads", "Inside FMUs", "Of each FMU")
     for r in results:
-        if r.statistics:
-            s = r.statistics
+        if s := r.statistics:
             shares = sorted(((c.name, c.share) for c in s.components), key=lambda entry: -entry[1])
-            table.add_row(
-                r.modes.prepared.title,
-                str(s.steps),
-                f"{s.steps_per_second:,.0f}",
-                f"{s.real_time_factor:.3g}",
-                str(s.threads),
-                f"{s.share_in_fmus:.0%}",
-                first_few(shares, share_text),
-            )
+            speed = (f"{s.steps_per_second:,.0f}", f"{s.real_time_factor:.3g}", str(s.threads))
+            inside = (f"{s.share_in_fmus:.0%}", first_few(shares, share_text))
+            table.add_row(r.modes.prepared.title, str(s.steps), *speed, *inside)
     return table

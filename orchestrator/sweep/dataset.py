@@ -25,17 +25,12 @@ _FIGURES = {
     "damping": ("%", "Damping ratio"),
     "similarity": ("1", "Similarity to the same trajectory at the point before"),
 }
-_IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}
-"""xarray's own attributes have the short names."""
-
-_SEPARATOR = "; "
-"""Between the warnings of one point."""
-
+_IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}  # xarray's own attributes have the short names
+_SEPARATOR = "; "  # between the warnings of one point
 _BEGINNINGS = "start followed refined entered broken"
 
 
-Curve = list[tuple[GridPlace, dict[str, Any]]]
-"""A trajectory's figures by place."""
+Curve = list[tuple[GridPlace, dict[str, Any]]]  # A trajectory's figures by place
 
 
 def swing_states(sweep: ScenarioSweep, patterns: list[str]) -> list[str]:
@@ -236,7 +231,9 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
     failed: dict[str, list[dict[str, Any]]] = {s.prepared.name: [] for s in result.scenarios}
     for sweep, place, error in result.failures():
         failed[sweep.prepared.name].append({"values": samples.setting(place), "error": error})
-    return {
+    limits = [limit.as_json() for limit in result.limits]
+    found = {} if not limits else (limits[0] if len(limits) == 1 else {}) | {"limits": limits}
+    return found | {
         "case": result.plan.case.name,
         "parameters": [{"name": a.key, "unit": a.unit, "values": list(a.values)} for a in samples.axes],
         "step_size_s": result.plan.scenarios[0].step_size,
@@ -281,7 +278,12 @@ def _point_json(setting: dict[str, float | bool], sample: dict[str, Any]) -> dic
     }
 
 
-def save_sweep(samples: Samples, folder: Path) -> None:
-    """Write sweep.nc and sweep.csv."""
+def save_sweep(samples: Samples, folder: Path) -> list[str]:
+    """Write sweep.nc and sweep.csv, and limits.json where limits were searched for; returns their names."""
     save_netcdf(sweep_dataset(samples), folder / "sweep.nc")
     save_table(sweep_rows(samples), folder / "sweep.csv")
+    if not samples.result.limits:
+        return ["sweep.nc", "sweep.csv"]
+    found = json.dumps([limit.as_json() for limit in samples.result.limits], indent=1, ensure_ascii=False)
+    (folder / "limits.json").write_text(found, encoding="utf-8")
+    return ["sweep.nc", "sweep.csv", "limits.json"]

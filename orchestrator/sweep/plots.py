@@ -15,8 +15,7 @@ from orchestrator.sweep.dataset import Curve, Samples
 from orchestrator.sweep.sweep import ScenarioSweep
 from orchestrator.sweep.trajectories import Trajectory
 
-_LEAST_DAMPED = 75.0
-"""The complex plane leaves out modes whose damping stays above this [%] at all points."""
+_LEAST_DAMPED = 75.0  # the complex plane leaves out modes whose damping stays above this [%] at all points
 
 _DASHES = ("-", "--", ":", "-.")
 

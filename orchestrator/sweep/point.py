@@ -21,66 +21,30 @@ from orchestrator.study.modes import ModesResult, compute_modes
 
 @dataclass(frozen=True)
 class SweepPointTask:
-    """A scenario with the values of one point.
-
-    Attributes
-    ----------
-    case
-        Name of a built-in case, or path of a file that every worker can read.
-    fingerprint
-        Hash of the case file's text and of the code. A worker whose hash differs refuses the task.
-    layers
-        Parameter files and values of the command line, weakest first; each is assigned as a whole, as in a scenario.
-    overrides
-        The varied values by ``component.variable``, which override all layers.
-    step_size
-        Communication step [s]; None for the case's.
-    frequency_range
-        Of the modes [Hz].
-    key
-        Name of the point's file: a hash of everything that the result depends on.
-    trust_fmus
-        As `load_case`: the user's word holds in every worker.
-    """
-
-    case: str
-    fingerprint: str
+    case: str  # name of a built-in case, or path of a file that every worker can read
+    fingerprint: str  # Hash of the case file's text and of the code. A worker whose hash differs refuses the task.
     scenario: str
+    # parameter files and values of the command line, weakest first; each is assigned as a whole, as in a scenario
     layers: tuple[ParameterFile, ...]
-    overrides: dict[str, Value]
-    step_size: float | None
-    frequency_range: tuple[float, float]
-    key: str
-    trust_fmus: bool = False
+    overrides: dict[str, Value]  # the varied values by ``component.variable``, which override all layers
+    step_size: float | None  # communication step [s]; None for the case's
+    frequency_range: tuple[float, float]  # of the modes [Hz]
+    key: str  # name of the point's file: a hash of everything that the result depends on
+    trust_fmus: bool = False  # as `load_case`: the user's word holds in every worker
 
 
 @dataclass(frozen=True)
 class PointRecord:
-    """The modes of a point, or the reason why it has no modes.
+    """The modes of a point, or the reason why it has no modes."""
 
-    Attributes
-    ----------
-    modes
-        Least damped first.
-    named
-        Names that the case gives to some of these modes, by index.
-    failure
-        Why there are none; None for a point with modes.
-    residual
-        Of the steady state, as in `OperatingPoint`.
-    linearised
-        How the linear model of every component was found.
-    stability, because
-        The verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in words; empty where the
-        point failed.
-    """
-
-    modes: ModeSet | None = None
-    named: dict[str, int] = field(default_factory=dict)
-    failure: Failure | None = None
-    residual: float = float("nan")
+    modes: ModeSet | None = None  # least damped first
+    named: dict[str, int] = field(default_factory=dict)  # names that the case gives to some of these modes, by index
+    failure: Failure | None = None  # why there are none; None for a point with modes
+    residual: float = float("nan")  # of the steady state, as in `OperatingPoint`
     warnings: tuple[str, ...] = ()
-    linearised: dict[str, str] = field(default_factory=dict)
+    linearised: dict[str, str] = field(default_factory=dict)  # how the linear model of every component was found
+    # stability, because: the verdict over the whole spectrum, as `Stability.as_json` gives it, and its figures in
+    # words; empty where the point failed
     stability: dict[str, Any] = field(default_factory=dict)
     because: str = ""
 
@@ -130,18 +94,11 @@ def make_task(
 ) -> SweepPointTask:
     """The task of one point.
 
-    Parameters
-    ----------
-    prepared
-        The scenario without what is varied: its FMUs and values go into the key.
-    layers
-        Parameter files and values of the command line that hold at every point, weakest first.
-    varied
-        Values by ``component.variable``. They have priority over every layer.
-    step_size
-        Communication step [s]; the case's where None.
-    frequency_range
-        Modes of these frequencies are kept [Hz].
+    ``prepared``: the scenario without what is varied: its FMUs and values go into the key.
+    ``layers``: parameter files and values of the command line that hold at every point, weakest first.
+    ``varied``: values by ``component.variable``. They have priority over every layer.
+    ``step_size``: communication step [s]; the case's where None.
+    ``frequency_range``: modes of these frequencies are kept [Hz].
     """
     content = {
         "case": prepared.case.text,

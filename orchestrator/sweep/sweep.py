@@ -15,45 +15,29 @@ from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.errors import CaseError, Problem
+from orchestrator.errors import CaseError, InputError, Problem
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, kept_or_computed
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import Axis, Vary, grid_places, refuse_doubles, resolve
+from orchestrator.sweep.limit import COARSE, Ending, ParameterLimit, Until, least_damping, mode_behind, search
 from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point, make_task
 from orchestrator.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
-REFINEMENTS = 5
-"""How often the way between two points is halved where a mode is not recognised from one to the other."""
+REFINEMENTS = 5  # how often the way between two points is halved where a mode is not recognised from one to the other
 
 
 @dataclass(frozen=True)
 class SweepPlan:
-    """The points that a sweep computes.
-
-    Attributes
-    ----------
-    axes
-        Varied parameters; the last one runs fastest, and modes are followed along it.
-    scenarios
-        The scenarios, prepared without the varied values.
-    layers
-        Parameter files, and after them the values of the command line, that hold for all points; weakest first.
-    step_size
-        Communication step [s]; None for the case's.
-    frequency_range
-        [Hz]
-    idle
-        Questions about values that act in no scenario.
-    """
-
     case: Case
-    axes: tuple[Axis, ...]
-    scenarios: tuple[PreparedScenario, ...]
+    axes: tuple[Axis, ...]  # varied parameters; the last one runs fastest, and modes are followed along it
+    scenarios: tuple[PreparedScenario, ...]  # the scenarios, prepared without the varied values
+    # parameter files, and after them the values of the command line, that hold for all points; weakest first.
     layers: tuple[ParameterFile, ...]
-    step_size: float | None
-    frequency_range: tuple[float, float]
-    idle: tuple[Problem, ...] = ()
+    step_size: float | None  # communication step [s]; None for the case's
+    frequency_range: tuple[float, float]  # [Hz]
+    idle: tuple[Problem, ...] = ()  # questions about values that act in no scenario
+    until: Until | None = None  # what is searched for along the only axis; None for a sweep alone
 
     @property
     def overrides(self) -> dict[str, Value]:
@@ -67,7 +51,8 @@ class SweepPlan:
 
     def values(self, place: GridPlace) -> dict[str, Value]:
         """The varied values at a place. A place between two grid points of the last axis has an interpolated value."""
-        return {axis.key: _value_at(axis, position) for axis, position in zip(self.axes, place, strict=True)}
+        given = [axis.sets(_value_at(axis, position)) for axis, position in zip(self.axes, place, strict=True)]
+        return {key: value for one in given for key, value in one.items()}
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
         varied = self.values(place)
@@ -85,18 +70,10 @@ def _value_at(axis: Axis, position: float) -> Value:
 
 @dataclass
 class ScenarioSweep:
-    """One scenario over the grid.
-
-    Attributes
-    ----------
-    points
-        Points by place, including the refining points between two places of the grid.
-    trajectories
-        Modes followed over the grid, those with a name first.
-    """
-
     prepared: PreparedScenario
+    # points by place, including the refining points between two places of the grid.
     points: dict[GridPlace, PointRecord] = field(default_factory=dict)
+    # modes followed over the grid, those with a name first.
     trajectories: list[Trajectory] = field(default_factory=list)
 
     def unstable(self, axes: Sequence[Axis]) -> list[GridPlace]:
@@ -119,21 +96,13 @@ class ScenarioSweep:
 
 @dataclass
 class SweepResult:
-    """All points of a sweep.
-
-    Attributes
-    ----------
-    computed, stored
-        Number of points computed now, and number of points read from an earlier start.
-    refined
-        Number of refining points between grid points; both numbers above include them.
-    """
-
     plan: SweepPlan
     scenarios: list[ScenarioSweep]
+    # computed, stored: number of points computed now, and number of points read from an earlier start.
     computed: int = 0
     stored: int = 0
-    refined: int = 0
+    refined: int = 0  # number of refining points between grid points; both numbers above include them
+    limits: list[ParameterLimit] = field(default_factory=list)  # of each scenario, where they are searched for
 
     def failures(self) -> Iterator[tuple[ScenarioSweep, GridPlace, str]]:
         """Points of the grid that have no modes, and why."""
@@ -152,32 +121,39 @@ def plan_sweep(
     step_size: float | None = None,
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
     parameters: Sequence[ParameterFile] = (),
+    until: Until | None = None,
 ) -> SweepPlan:
     """Check a sweep, and build the FMUs that it needs.
 
-    Parameters
-    ----------
-    vary
-        The varied parameters, one for each axis. Modes are followed along the last axis.
-    scenarios
-        Names; all of them where empty.
-    overrides
-        Values by ``component.variable`` that hold at every point; they go before the parameter files.
-    step_size
-        Communication step [s]; the case's where None.
-    frequency_range
-        Modes of these frequencies are followed [Hz].
-    parameters
-        Parameter files whose values hold at every point; a later one goes before an earlier one.
+    ``vary``: The varied parameters, one for each axis. Modes are followed along the last axis.
+    ``scenarios``: Names; all of them where empty.
+    ``overrides``: Values by ``component.variable`` that hold at every point; they go before the parameter files.
+    ``step_size``: Communication step [s]; the case's where None.
+    ``frequency_range``: Modes of these frequencies are followed [Hz].
+    ``parameters``: Parameter files whose values hold at every point; a later one goes before an earlier one.
+    ``until``: Search for the limit along the range of the only parameter.
     """
+    vary = vary if until is None else [_searched(vary)]
     prepared = case.prepare(scenarios, overrides, step_size, None, parameters)
     layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
     axes = tuple(resolve(one, prepared) for one in vary)
-    plan = SweepPlan(case, axes, tuple(prepared), layers, step_size, frequency_range)
+    plan = SweepPlan(case, axes, tuple(prepared), layers, step_size, frequency_range, until=until)
     refuse_doubles(axes, prepared)
-    ends = [{axis.key: axis.values[end] for axis in axes} for end in (0, -1)]
+    ends = [plan.values(tuple(end % len(axis.values) for axis in axes)) for end in (0, -1)]
     idle = [_check_end(plan, varied) for varied in (ends if any(axis.key == ALPHA for axis in axes) else ends[:1])]
     return replace(plan, idle=tuple(idle[0]))
+
+
+def _searched(vary: Sequence[Vary]) -> Vary:
+    """The one range along which a limit is searched for."""
+    if len(vary) != 1:
+        raise InputError(
+            f"--until searches along one range, and {len(vary)} are varied; give one --vary (several parameters that "
+            "move together stand in it with commas)"
+        )
+    if vary[0].limits is None:
+        raise InputError(f"--vary {vary[0].key}: --until needs a range such as {vary[0].key}=0.1:1.0, not a list")
+    return vary[0] if vary[0].count else replace(vary[0], count=COARSE)
 
 
 def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
@@ -206,23 +182,19 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
 
 
 def run_sweep(
-    plan: SweepPlan,
-    executor: Executor,
-    store: PointStore,
-    report: CountReport = lambda done, total: None,
+    plan: SweepPlan, executor: Executor, store: PointStore, report: CountReport = lambda done, total: None
 ) -> SweepResult:
     """Compute the points that are not stored yet, then follow the modes. Further points are added where a mode is not
     recognised.
 
-    Parameters
-    ----------
-    plan
-        A plan that `plan_sweep` has checked.
+    ``plan``: A plan that `plan_sweep` has checked.
     """
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
     wanted: list[tuple[ScenarioSweep, GridPlace]] = [(sweep, place) for sweep in result.scenarios for place in grid]
     _fill(result, wanted, executor, store, report)
+    if plan.until is not None:
+        result.limits = [_limit(result, sweep, executor, store, report) for sweep in result.scenarios]
     for depth in range(1, REFINEMENTS + 1):
         gaps = [(s, place) for s in result.scenarios for place in _gaps(plan, s, 0.5 ** (depth - 1))]
         if not gaps:
@@ -253,6 +225,49 @@ def _fill(
         sweep.points[place] = record
         result.stored += stored
         result.computed += not stored
+
+
+def _limit(
+    result: SweepResult, sweep: ScenarioSweep, executor: Executor, store: PointStore, report: CountReport
+) -> ParameterLimit:
+    plan, (axis,) = result.plan, result.plan.axes
+    until = plan.until or Until()
+    count = len(axis.values)
+
+    def kind_at(place: float) -> Ending:
+        if (place,) not in sweep.points:
+            _fill(result, [(sweep, (place,))], executor, store, report)
+            result.refined += 1
+        return until.kind(sweep.points[(place,)])
+
+    def between(low: float, high: float) -> bool:
+        return _value_at(axis, (low + high) / 2) not in (_value_at(axis, low), _value_at(axis, high))
+
+    def value(place: float | None) -> float | None:
+        return None if place is None else float(_value_at(axis, place))
+
+    grid = [sweep.points[(k,)] for k in range(count)]
+    holds, beyond, again = search([until.kind(record) for record in grid], kind_at, between)
+    end = Ending.HOLDS if beyond is None else kind_at(beyond)
+    worst = min(range(count), key=lambda k: _margin(grid[k]))
+    shown = sweep.points[(float(worst) if beyond is None else beyond,)]
+    mode, who = mode_behind(shown, plan.case.table.analysis.swing)
+    tried = [
+        {"value": float(axis.values[k]), "kind": str(until.kind(record)), "damping_percent": least_damping(record),
+         "largest_growth_rate": record.stability.get("largest_growth_rate"), "error": record.error}
+        for k, record in enumerate(grid)
+    ]  # fmt: skip
+    why = shown.error or (str(shown.stability.get("reason", "")) if end is Ending.NOT_KNOWN else "")
+    return ParameterLimit(
+        axis.key, axis.unit, sweep.prepared.name, sweep.prepared.title, until, end, value(holds), value(beyond), mode,
+        who, tuple(tried), tuple(float(axis.values[k]) for k in again), why, float(axis.values[worst]),
+    )  # fmt: skip
+
+
+def _margin(record: PointRecord) -> float:
+    rate = record.stability.get("largest_growth_rate")
+    least = least_damping(record)
+    return least if least is not None else np.inf if rate is None else -rate
 
 
 def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[GridPlace]:

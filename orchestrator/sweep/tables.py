@@ -6,25 +6,25 @@ import re
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.report.tables import PlainTable
+from orchestrator.report.tables import make_table
+from orchestrator.sweep.axes import grid_places
 from orchestrator.sweep.dataset import Samples
+from orchestrator.sweep.limit import Ending
 from orchestrator.sweep.plots import axis_label
+from orchestrator.sweep.sweep import ScenarioSweep
 from orchestrator.sweep.trajectories import GridPlace
 
-_FAILURES_SHOWN = 5
+_FAILURES_SHOWN, _TURNS = 5, 3
 _FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 
 
 def trajectories(samples: Samples) -> Table:
-    """The ends of each trajectory, its least damping and its least similarity from point to point.
+    """The ends of each trajectory, its least and its most damping, and its least similarity from point to point.
 
     The table shows the trajectories with a name, or all trajectories if the case names no mode.
     """
-    title = escape(f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}")
-    table = PlainTable(title=title, title_justify="left", title_style="bold", header_style="bold")
-    table.add_column("Mode", overflow="fold")
-    for column in ("f [Hz]", "Damping [%]", "Least [%]", "Points", "Similarity"):
-        table.add_column(escape(column), justify="right")
+    title = f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}"
+    table = make_table(title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Similarity")
     anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
     for sweep in samples.result.scenarios:
         for trajectory in sweep.trajectories:
@@ -33,6 +33,7 @@ def trajectories(samples: Samples) -> Table:
                 continue
             (_, first), (_, last) = curve[0], curve[-1]
             where, least = min(curve, key=lambda entry: float(entry[1]["damping"]))
+            top, most = max(curve, key=lambda entry: float(entry[1]["damping"]))
             alike = [f["similarity"] for _, f in curve if f["similarity"] == f["similarity"]]
             named = sum(f["named"] for _, f in curve)
             table.add_row(
@@ -40,6 +41,7 @@ def trajectories(samples: Samples) -> Table:
                 f"{first['frequency']:.3f} → {last['frequency']:.3f}",
                 f"{first['damping']:.2f} → {last['damping']:.2f}",
                 f"{least['damping']:.2f} at {_values(samples, where)}",
+                f"{most['damping']:.2f} at {_values(samples, top)}",
                 f"{len(curve)}" if named in (0, len(curve)) else f"{len(curve)}, named at {named}",
                 f"{min(alike):.2f}" if alike else "–",
             )
@@ -59,6 +61,7 @@ def stability(samples: Samples) -> list[str]:
             worst = sweep.points[places[0]].because
             where = escape(
                 f"at {len(places)} of {total} points{rest}; worst at {place_text(samples, places[0])}: {worst}"
+                f"{_turns(samples, sweep)}"
             )
             lines.append(f"[bold red]UNSTABLE[/]: {title}: {where}")
         elif sweep.stable is False:
@@ -73,9 +76,35 @@ def stability(samples: Samples) -> list[str]:
     return lines
 
 
+def limits(samples: Samples) -> list[str]:
+    """How far the parameter may go, a line each scenario, as rich markup."""
+    colours = {Ending.HOLDS: "green", Ending.FAILS: "red"}
+    return [
+        f"[bold {colours.get(limit.kind, 'yellow')}]{escape(limit.title)}[/]: {escape(limit.sentence)}"
+        for limit in samples.result.limits
+    ]
+
+
+def _turns(samples: Samples, sweep: ScenarioSweep) -> str:
+    """Between which neighbours of a sweep over one parameter the verdict changes."""
+    if len([axis for axis in samples.axes if len(axis.values) > 1]) != 1:
+        return ""
+    places = sorted(grid_places(samples.axes), key=lambda place: [float(v) for v in samples.setting(place).values()])
+    words = {True: "stable", False: "unstable", None: "not known"}
+    verdicts = [sweep.points[place].stability.get("stable") for place in places]
+    turns = [
+        f"{words[one]} at {place_text(samples, here)}, {words[other]} at {place_text(samples, there)}"
+        for here, there, one, other in zip(places, places[1:], verdicts, verdicts[1:], strict=False)
+        if one is not other
+    ]
+    more = f"; {len(turns) - _TURNS} more changes" if len(turns) > _TURNS else ""
+    return f"; {'; '.join(turns[:_TURNS])}{more}" if turns else ""
+
+
 def remarks(samples: Samples) -> list[str]:
     """Sentences on points that failed, on trajectories that break, and on refining points."""
     result, texts = samples.result, [f"question: {question}" for question in samples.result.plan.idle]
+    texts += [text for limit in result.limits for text in limit.remarks]
     failures = list(result.failures())
     if failures:
         texts.append(f"{_count(len(failures), 'point')} of {result.plan.number_of_points} failed:")
@@ -99,7 +128,7 @@ def remarks(samples: Samples) -> list[str]:
         )
     more = len(breaks) - _FAILURES_SHOWN
     texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
-    if result.refined:
+    if result.refined and not result.limits:
         texts.append(
             f"{_count(result.refined, 'point')} between those of the grid served to recognise modes "
             "(where, is marked 'refined' in sweep.csv)"

@@ -14,15 +14,11 @@ GridPlace = tuple[float, ...]
 
 
 class Beginning(IntEnum):
-    START = 0
-    """The first point of the grid, or the first after points that failed."""
+    START = 0  # the first point of the grid, or the first after points that failed
     FOLLOWED = 1
-    REFINED = 2
-    """The mode was recognised only with refining points in between."""
-    ENTERED = 3
-    """The mode entered the range of frequencies here."""
-    BROKEN = 4
-    """The mode was not recognised in the previous point, and begins a new trajectory."""
+    REFINED = 2  # the mode was recognised only with refining points in between
+    ENTERED = 3  # the mode entered the range of frequencies here
+    BROKEN = 4  # the mode was not recognised in the previous point, and begins a new trajectory
 
 
 @dataclass(frozen=True)
@@ -35,19 +31,12 @@ class TrajectoryPoint:
 
 @dataclass
 class Trajectory:
-    """One mode that was followed over the grid.
+    """One mode that was followed over the grid."""
 
-    Attributes
-    ----------
-    name
-        The case's name for the mode, with a number if several trajectories carry this name in turn; otherwise "mode"
-        and a number.
-    carries
-        The case's name.
-    """
-
+    # the case's name for the mode, with a number if several trajectories carry this name in turn; otherwise "mode" and
+    # a number
     name: str = ""
-    carries: str | None = None
+    carries: str | None = None  # the case's name
     points: dict[GridPlace, TrajectoryPoint] = field(default_factory=dict)
 
 
@@ -59,14 +48,9 @@ def find_trajectories(
     The first point of a row is linked to the first point of the previous row. A mode without predecessor in its own row
     is linked to the previous row as well.
 
-    Parameters
-    ----------
-    points
-        Points by place; failed points are skipped.
-    names
-        Names of the modes that the case looks for, most important first.
-    frequency_range
-        [Hz]
+    ``points``: points by place; failed points are skipped.
+    ``names``: names of the modes that the case looks for, most important first.
+    ``frequency_range``: [Hz]
     """
     modes = {place: record.modes for place, record in points.items() if record.modes is not None}
     route = list(_route(modes))

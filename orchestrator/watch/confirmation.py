@@ -21,12 +21,8 @@ PERIODS = 4.5
 from a beat with a mode of a similar frequency: of eleven faults on nine buses, each watched until 50 different times,
 those that seemed to grow in every part of the response had 4 at most."""
 
-SAME = 0.05
-"""Largest relative difference of frequency between the judged part and the whole response."""
-
-AGREE = 2.0
-"""Largest factor between the growth rates of the judged part and of the whole response."""
-
+SAME = 0.05  # largest relative difference of frequency between the judged part and the whole response
+AGREE = 2.0  # largest factor between the growth rates of the judged part and of the whole response
 FAR_ABOVE, RISING = 10.0, 1.3
 """A swing of any shape grows if it rises by the first factor from the first to the last quarter, and by the second one
 at least from each quarter to the next."""

@@ -1,37 +1,41 @@
-"""Disturbances that never rest: where noise or quantisation is in force, and what is then judged no more."""
+"""Disturbances that never rest: where noise, quantisation or a forcing is in force, and what is then judged no more."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from orchestrator.coupling.events import Event, WireFault, WireRecovery
+from orchestrator.coupling.events import Event, Forcing, WireFault, WireRecovery
 from orchestrator.coupling.imperfections import Imperfection, Noise, Quantisation
 from orchestrator.coupling.system import System
 from orchestrator.watch.finding import Finding
 from orchestrator.watch.stretches import Stretch
 
-_SHOWN = 3
-"""Largest number of connections that a remark names."""
+_SAME = 0.05  # relative difference within which an oscillation has the frequency of a forcing
+_SHOWN = 3  # largest number of connections that a remark names
 
 
 @dataclass(frozen=True)
 class Unrest:
-    """Noise or quantisation on one connection, from ``begin`` to ``end`` [s]."""
+    """Noise or quantisation on one connection, or a forcing of a variable, from ``begin`` to ``end`` [s]."""
 
     begin: float
     end: float
     connection: str
     kind: str
+    frequency: float | None = None
+
+    def explains(self, finding: Finding) -> bool:
+        """Whether a forcing makes an oscillation: it has its frequency, or a multiple of it."""
+        if self.frequency is None or finding.kind not in ("sustained_oscillation", "growing_oscillation"):
+            return False
+        order = finding.figures["frequency_hz"] / self.frequency
+        return order > 0.5 and abs(order - round(order)) < _SAME
 
 
 def disturbances(system: System, events: Sequence[Event], end: float) -> list[Unrest]:
     """When noise or quantisation is in force on each connection.
 
-    Parameters
-    ----------
-    events
-        Those of the run; some begin or end an imperfection.
-    end
-        Of the run [s].
+    ``events``: Those of the run; some begin or end an imperfection.
+    ``end``: Of the run [s].
     """
     found: list[Unrest] = []
     since: dict[tuple[str, str], float] = {}
@@ -41,6 +45,11 @@ def disturbances(system: System, events: Sequence[Event], end: float) -> list[Un
             if kind := _kind(imperfection):
                 permanent.add((plan.name, kind))
                 since[plan.name, kind] = 0.0
+    for event in events:
+        if isinstance(event, Forcing) and event.time < end:
+            until = end if event.end is None else min(event.end, end)
+            name = f"{event.component}.{event.variable}"
+            found.append(Unrest(event.time, until, name, "forcing", event.frequency))
     for event in sorted(events, key=lambda e: e.time):
         if event.time >= end or not isinstance(event, WireFault | WireRecovery):
             continue
@@ -91,7 +100,7 @@ def not_judged(masked: Mapping[Stretch, Sequence[Unrest]]) -> list[Finding]:
         f"growth and lasting oscillations are not judged {when}: {kinds} on {named} can explain the motion there; "
         "run without it to judge the response"
     )
-    target = connections[0].partition(" -> ")[2]
+    target = connections[0].rpartition(" -> ")[2]
     component, _, variable = target.partition(".")
     until = None if order[-1].last else spans[-1][1]
     return [Finding("not_judged", spans[0][0], component, variable, message, until)]

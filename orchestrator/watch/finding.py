@@ -28,30 +28,18 @@ NOT_JUDGED: Kind = "not_judged"
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One fault of a run, with its place and time.
-
-    Attributes
-    ----------
-    time
-        When it began [s].
-    component, variable
-        The component and variable that show the fault most, or whose limit acts.
-    until
-        Its end [s]; None if it lasts to the end of the run, or has no duration.
-    figures
-        By name, with the unit in it or in the variable's: growth rates, frequencies, amplitudes, durations.
-    represented
-        False of a limit that would act and that the model lacks.
-    """
+    """One fault of a run, with its place and time."""
 
     kind: Kind
-    time: float
+    time: float  # when it began [s]
+    # component, variable: the component and variable that show the fault most, or whose limit acts
     component: str
     variable: str
     message: str
-    until: float | None = None
+    until: float | None = None  # its end [s]; None if it lasts to the end of the run, or has no duration
+    # by name, with the unit in it or in the variable's: growth rates, frequencies, amplitudes, durations
     figures: Mapping[str, float] = field(default_factory=dict)
-    represented: bool = True
+    represented: bool = True  # False of a limit that would act and that the model lacks
 
     def as_json(self) -> dict[str, Any]:
         return {

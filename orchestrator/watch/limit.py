@@ -11,54 +11,33 @@ BYPASS_TIME = 0.01
 class Lead:
     """The limited quantity, reconstructed as signal + T/gain·(d state/dt) from the state of a block or of a control's
     integrator.
-
-    Attributes
-    ----------
-    time, gain
-        Parameters with T [s] and the gain; None stands for 1.
-    lag
-        Parameter with the lag of a lead/lag, whose block is left out where it is 0; its state then follows the input
-        with `BYPASS_TIME`, and T is that time.
     """
 
     state: str
+    # time, gain: parameters with T [s] and the gain; None stands for 1
     time: str
     gain: str | None = None
+    # parameter with the lag of a lead/lag, whose block is left out where it is 0; its state then follows the input with
+    # `BYPASS_TIME`, and T is that time
     lag: str | None = None
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The variables of an FMU that show an active limit. The limit is watched if the FMU has all of them.
-
-    Attributes
-    ----------
-    limit
-        Parameter with the limit of the magnitude, or the upper one where there is a lower one; None if the signal is
-        given as a part of the limit.
-    low
-        Parameter with the lower limit; None if the magnitude is limited.
-    lead
-        Reconstruction of the limited quantity from a derivative, if the signal only follows this quantity.
-    enabled
-        Switch that must be on for the limited signal to have an effect.
-    represented
-        Whether the model has the limit. Otherwise the FMU only shows when the limit would act.
-    scale
-        Signal that both limits are multiplied by.
-    unless
-        Parameter that is above 0 where another limit acts instead. An FMU need not have it.
-    """
+    """The variables of an FMU that show an active limit. The limit is watched if the FMU has all of them."""
 
     name: str
     signal: str
+    # parameter with the limit of the magnitude, or the upper one where there is a lower one; None if the signal is
+    # given as a part of the limit
     limit: str | None
+    # reconstruction of the limited quantity from a derivative, if the signal only follows this quantity
     lead: Lead | None = None
-    enabled: str | None = None
-    represented: bool = True
-    low: str | None = None
-    scale: str | None = None
-    unless: str | None = None
+    enabled: str | None = None  # switch that must be on for the limited signal to have an effect
+    represented: bool = True  # Whether the model has the limit. Otherwise the FMU only shows when the limit would act.
+    low: str | None = None  # parameter with the lower limit; None if the magnitude is limited
+    scale: str | None = None  # signal that both limits are multiplied by
+    unless: str | None = None  # Parameter that is above 0 where another limit acts instead. An FMU need not have it.
     knows: tuple[str, ...] = ()
     lacks: tuple[str, ...] = ()
 

@@ -17,8 +17,7 @@ LEAST_DURATION = 0.1
 """Shortest total time of a limit's action that is reported [s]. A limit that acts for less, as in a short dip, works as
 intended."""
 
-LEAST_MISSING = 0.02
-"""The same for a limit that the model lacks [s]: from one cycle on, the course after it is another."""
+LEAST_MISSING = 0.02  # the same for a limit that the model lacks [s]: from one cycle on, the course after it is another
 
 AT_LIMIT = 1 - 1e-9
 """A signal is at its limit from this part of the limit on: a saturated signal equals its limit except for the last
@@ -122,12 +121,7 @@ def _lead_time(name: str, lead: Lead, settings: Settings) -> Numbers:
 
 
 def _finding(
-    times: Numbers,
-    name: str,
-    limit: Limit,
-    acting: NDArray[np.bool_],
-    duration: float,
-    of_each: Mapping[str, float],
+    times: Numbers, name: str, limit: Limit, acting: NDArray[np.bool_], duration: float, of_each: Mapping[str, float]
 ) -> Finding:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], acting, [False]]).astype(np.int8)))
     # A look shows what acted since the one before, which is how the duration counts.

@@ -9,19 +9,12 @@ from orchestrator.analysis.identification import identify_modes
 from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError
 
-LEAST_PERIODS = 2
-"""Number of periods that an oscillation needs to be recognised."""
-
-_HIGHEST_HZ = 10.0
-"""A signal is thinned to show frequencies up to this one [Hz], unless it turns more often."""
-
-_PER_PERIOD = 5
-"""Least number of samples in a period of an oscillation that can be recognised."""
+LEAST_PERIODS = 2  # number of periods that an oscillation needs to be recognised
+_HIGHEST_HZ = 10.0  # A signal is thinned to show frequencies up to this one [Hz], unless it turns more often
+_PER_PERIOD = 5  # least number of samples in a period of an oscillation that can be recognised
 
 
-_MOST_SAMPLES = 600
-"""A long stretch of a fast oscillation is judged by this number of samples at its end."""
-
+_MOST_SAMPLES = 600  # A long stretch of a fast oscillation is judged by this number of samples at its end
 _ENOUGH_SAMPLES, _BEYOND = 300, 3
 """A slow oscillation is thinned to the first number of samples, but must keep frequencies up to the second number times
 its own."""

@@ -35,31 +35,17 @@ FEWEST_LOOKS = 60
 """Least number of looks in the judged part: the last three quarters of the time from one event to the next, or to the
 end."""
 
-SMALLEST = 1e-7
-"""Smallest oscillation that is reported, as a part of 1 or of the signal's start."""
-
-SMALLEST_FAST = 1e-5
-"""Smallest reported oscillation that is too fast for the looks; only its extent is known."""
-
-SMALLEST_PART = 0.01
-"""Smallest reported oscillation, as a part of the signal's largest deviation since the event."""
-
+SMALLEST = 1e-7  # smallest oscillation that is reported, as a part of 1 or of the signal's start
+SMALLEST_FAST = 1e-5  # smallest reported oscillation that is too fast for the looks; only its extent is known
+SMALLEST_PART = 0.01  # smallest reported oscillation, as a part of the signal's largest deviation since the event
 SAME_FREQUENCY = 0.05
 """An oscillation is confirmed if the stretch and its second half show the same frequency, with at most this relative
 difference."""
 
-EXPLAINED = 0.5
-"""A swing consists of one oscillation if the oscillation makes at least this part of it."""
-
-IRREGULAR = 1e-3
-"""Smallest reported swing without a single oscillation, as a part of 1 or of the signal's start."""
-
-_PASSES = 8
-"""Least number of crossings of an irregular swing with its trend within the last third."""
-
-_FAST = 0.25
-"""Number of turns between two looks from which an output is judged by its extremes between the looks."""
-
+EXPLAINED = 0.5  # A swing consists of one oscillation if the oscillation makes at least this part of it
+IRREGULAR = 1e-3  # smallest reported swing without a single oscillation, as a part of 1 or of the signal's start
+_PASSES = 8  # least number of crossings of an irregular swing with its trend within the last third
+_FAST = 0.25  # number of turns between two looks from which an output is judged by its extremes between the looks
 _RESOLVED = 4.0
 """An output is judged by its looks, however often it turns, if it moves by this factor more over several turns than
 between two looks: a small ripple makes the turns, and a swing that the looks resolve makes the motion."""
@@ -75,9 +61,7 @@ that noise excites wanders in amplitude and phase, and leaves more."""
 _SMOOTHEST = 3
 """Number of signals in which a clean oscillation is searched in a stretch with noise: those that noise moves least."""
 
-_TRIED = 8
-"""Number of signals in which oscillations are searched: those that swing most at the end."""
-
+_TRIED = 8  # number of signals in which oscillations are searched: those that swing most at the end
 ONE = 0.3
 """An oscillation continues over events if it explains the swing between any two of them except for less than this
 part."""

@@ -13,9 +13,7 @@ from orchestrator.watch.seen import Seen, unit
 from orchestrator.watch.settings import Settings
 from orchestrator.watch.stretches import Stretch
 
-SPEED = "omega"
-"""Output with a unit's speed or frequency."""
-
+SPEED = "omega"  # output with a unit's speed or frequency
 ALLOWED = (0.95, 1.03)
 """Band of a frequency, as parts of the rated one: 47.5 to 51.5 Hz, outside of which generators of the continental
 synchronous area need not stay connected (Regulation (EU) 2016/631, article 13, table 2), and 57 to 61.8 Hz, the widest
@@ -36,9 +34,7 @@ LEAST_AWAY = 0.004
 """A frequency that moves away is told in a short stretch from this distance from the rated one on, as a part of it:
 200 mHz of 50 Hz, the largest steady deviation in continental Europe (Regulation (EU) 2017/1485, annex III)."""
 
-SHORTEST = 1.0
-"""Shortest stretch at a run's end in which a frequency that moves away is told [s]."""
-
+SHORTEST = 1.0  # shortest stretch at a run's end in which a frequency that moves away is told [s]
 LONG = 10.0
 """Shortest stretch in which a drift is a fault [s]: in a shorter one a turbine's control may still act, so that only a
 remark is made."""
@@ -55,14 +51,11 @@ control (20 mHz)."""
 LEAST_VOLTAGE = 0.01
 """Smallest drift of a voltage in half of the stretch, as a part of 1 or of the start: one step of a tap changer."""
 
-SMOOTH = 0.15
-"""The swing around a drift, as root mean square, must be less than this part of the drift."""
-
+SMOOTH = 0.15  # the swing around a drift, as root mean square, must be less than this part of the drift
 HELD = 0.5
 """Part of the ratings on the grid from which on governors at their limits leave nothing that stops a frequency."""
 
-_RATE_TIME = 1.0
-"""The reported rate is the mean over this time at the end [s]."""
+_RATE_TIME = 1.0  # the reported rate is the mean over this time at the end [s]
 
 
 @dataclass(frozen=True)
@@ -123,10 +116,8 @@ def run_away(
 ) -> Iterator[Finding]:
     """At most one speed outside of its band or drifting, and one drifting voltage: those that go farthest.
 
-    Parameters
-    ----------
-    slipped
-        Whether units lost synchronism. In this case a speed must be outside of `BAND` at the end to be reported.
+    ``slipped``: whether units lost synchronism. In this case a speed must be outside of `BAND` at the end to be
+    reported.
     """
     speeds = list(_speeds(seen, system, settings))
     yield from _farthest(seen.times, speeds, stretches, system, allowed=np.inf if slipped else OUTSIDE)
@@ -199,10 +190,7 @@ def still_moving_away(
     Nothing is remarked if its last rates lead to a near rest inside of `ALLOWED`, or, where governors of `HELD` of the
     ratings are at their limits, within `LEAST_AWAY`.
 
-    Parameters
-    ----------
-    limits
-        The findings on limits; those of governors that act at the end count.
+    ``limits``: the findings on limits; those of governors that act at the end count.
     """
     speeds = list(_speeds(seen, system, settings))
     if not speeds or last.end - last.begin < SHORTEST:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.binding.misfits import Misfit
+from orchestrator.binding.misfits import FREQUENCY_APART, Misfit
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.system import System
@@ -18,32 +18,25 @@ from orchestrator.errors import InputError
 LOOK_INTERVAL = 5e-3
 """Approximate time between two looks [s]. The extremes of coupled outputs show what happens between two looks."""
 
-MOST_LOOKS = 20_000
-"""Largest number of looks; in longer runs the looks are farther apart."""
+MOST_LOOKS = 20_000  # largest number of looks; in longer runs the looks are farther apart
 
 
 _AT_REST, _STILL = 0.05, 0.2
 """Time at the start in which a slip moves the current [s], and the part of it by which it moves it at least."""
 
+_SETTLED = 1e-4  # distance of omega from its rest [pu] at which a meter has settled
+
 
 @dataclass(frozen=True)
 class Seen:
-    """Signals of a run.
+    """Signals of a run."""
 
-    Attributes
-    ----------
-    times
-        Of the looks [s], shape (n,).
-    values
-        Signals by ``component.variable``, each of shape (n,): the recorded signals, and those that the watch reads in
-        addition.
-    last, low, high, turns
-        Arrays of shape (n,) by coupled output: its value, its extremes over all communication steps since the previous
-        look, and the number of its turns.
-    """
-
-    times: Numbers
+    times: Numbers  # of the looks [s], shape (n,)
+    # signals by ``component.variable``, each of shape (n,): the recorded signals, and those that the watch reads in
+    # addition.
     values: Mapping[str, Numbers]
+    # last, low, high, turns: arrays of shape (n,) by coupled output: its value, its extremes over all communication
+    # steps since the previous look, and the number of its turns.
     last: Mapping[str, Numbers]
     low: Mapping[str, Numbers]
     high: Mapping[str, Numbers]
@@ -64,20 +57,26 @@ class Seen:
 
 
 def rescaled(seen: Seen, misfits: Mapping[str, Sequence[Misfit]]) -> Seen:
-    """With a frequency that was scaled for another one as the device has it, in pu of its own: it is 1 at rest.
+    """With a frequency that was scaled for another one as the device has it, in pu of its own: it is 1 at rest. While a
+    meter settles that begins far from there, it is 1 as well.
 
     A device that slips from the start stays as it is: its current moves, and at rest it does not.
     """
     values = dict(seen.values)
-    for name, found in misfits.items():
-        rest = next((m.figures["omega"] for m in found if "omega" in m.figures), None)
-        signal, current = values.get(f"{name}.omega"), seen.last.get(f"{name}.i_re")
-        if rest is None or signal is None or current is None:
+    for name in (signal.removesuffix(".omega") for signal in seen.values if signal.endswith(".omega")):
+        rest = next((m.figures["omega"] for m in misfits.get(name, ()) if "omega" in m.figures), 1.0)
+        current = seen.last.get(f"{name}.i_re")
+        signal: Numbers = values[f"{name}.omega"] / rest
+        if current is None or (rest == 1 and abs(signal[0] - 1) <= FREQUENCY_APART):
             continue
         looks = max(2, int(_AT_REST / seen.interval) if seen.interval else 2)
         size = np.hypot(current, seen.last[f"{name}.i_im"])
-        if np.ptp(size[:looks]) < _STILL * max(size[0], _STILL):
-            values[f"{name}.omega"] = signal / rest
+        most = _STILL * max(size[0], _STILL)
+        if np.ptp(size[:looks]) < most:
+            moved, apart = np.logical_or.accumulate(np.abs(size - size[0]) >= most), np.abs(signal - 1)
+            if np.any(~moved & (apart <= FREQUENCY_APART / 2)):
+                signal = np.where(moved | np.logical_or.accumulate(apart <= _SETTLED), signal, 1.0)
+            values[f"{name}.omega"] = signal
     return replace(seen, values=values)
 
 
@@ -103,12 +102,8 @@ def look_every(step_size: float, record_every: int, stop_time: float) -> int:
 class Watcher:
     """An observer that collects the data for the watch.
 
-    Parameters
-    ----------
-    names
-        Signals ``component.variable`` that are read at every look.
-    every
-        Communication steps between two looks.
+    ``names``: Signals ``component.variable`` that are read at every look.
+    ``every``: Communication steps between two looks.
     """
 
     def __init__(self, names: Sequence[str], every: int) -> None:

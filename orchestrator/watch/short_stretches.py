@@ -21,11 +21,8 @@ SHORTEST_BETWEEN = 1.0
 LEAST_DEPARTURE, LEAST_SHARE = 1e-3, 0.1
 """Least motion that is told, as a part of 1 or of the signal's start, and as a part of all its motion."""
 
-MORE = 1.2
-"""A signal departs if it moves by this factor more in the last quarter than in each quarter before."""
-
-_FEWEST = 40
-"""Least number of looks by which a departure is judged."""
+MORE = 1.2  # A signal departs if it moves by this factor more in the last quarter than in each quarter before
+_FEWEST = 40  # least number of looks by which a departure is judged
 
 
 def is_short(stretch: Stretch) -> bool:

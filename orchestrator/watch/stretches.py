@@ -12,30 +12,21 @@ from orchestrator.watch.seen import Seen
 NOTICED = 0.01
 """An event is noticed if it bends a signal by this part of the signal's range since the last noticed event."""
 
-_KINK_LOOKS = 4
-"""Number of looks after an event that show its immediate effect."""
-
+_KINK_LOOKS = 4  # number of looks after an event that show its immediate effect
 _USUAL_LOOKS, _USUAL = 20, 2.0
 """A bend counts if it exceeds the first number times the signal's own motion in the second number of looks before the
 event."""
 
-_ROUNDING = 1e-12
-"""Rounding, as a part of 1 or of the signal."""
+_ROUNDING = 1e-12  # rounding, as a part of 1 or of the signal
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """The time from one noticed event, or the start, to the next one, or the end [s].
-
-    Attributes
-    ----------
-    breaks
-        Times of unnoticed events inside the stretch [s].
-    """
+    """The time from one noticed event, or the start, to the next one, or the end [s]."""
 
     begin: float
     end: float
-    breaks: tuple[float, ...] = ()
+    breaks: tuple[float, ...] = ()  # times of unnoticed events inside the stretch [s]
     last: bool = False
 
     def parts(self) -> Iterator["Stretch"]:
@@ -48,10 +39,7 @@ class Stretch:
 def stretches(seen: Seen, signals: Mapping[str, Numbers], times: Sequence[float]) -> list[Stretch]:
     """The stretch after each noticed event.
 
-    Parameters
-    ----------
-    times
-        Of the events [s].
+    ``times``: of the events [s].
     """
     if not times:
         return []

@@ -16,12 +16,10 @@ from orchestrator.watch.settings import Settings
 ANGLES = ("delta", "droop.theta", "source.theta")
 """Variables with a unit's angle in the network frame [rad]: of a rotor, of a converter's frame, of a stiff source."""
 
-_SPEED = "omega"
-"""Output with a foreign unit's frequency [pu of f_n]; its integral is the angle."""
+_SPEED = "omega"  # output with a foreign unit's frequency [pu of f_n]; its integral is the angle
 
 _OUT_OF_STEP = np.pi
-_NAMED = 4
-"""Largest number of a group's units that a message names."""
+_NAMED = 4  # largest number of a group's units that a message names
 
 
 def angle_signals(system: System) -> list[str]:

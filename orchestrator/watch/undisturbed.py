@@ -12,32 +12,20 @@ from orchestrator.watch.machine_limits import is_inner
 from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
 from orchestrator.watch.seen import Seen, is_derivative, unit
 
-LEAST_GROWTH = 1e-6
-"""Smallest reported growth: distance of a signal from its start, as a part of 1 or of the start."""
-
+LEAST_GROWTH = 1e-6  # smallest reported growth: distance of a signal from its start, as a part of 1 or of the start
 LEAST_MOTION = 1e-4
 """Smallest reported motion without growth, such as that from a start that is not a steady state, in the same unit."""
 
-_STEEP = 0.2
-"""A motion grows by itself if it had less than this part of its extent after half the time."""
-
-FEWEST_LOOKS = 3
-"""Least number of looks over which a growth rises; a faster rise is a jump."""
-
-_ROUNDING, _LARGE = 1e-13, 0.03
-"""Range in which a growth is measured, as parts of 1 or of the start."""
-
-_AGREE = 0.2
-"""Largest relative difference between two measurements of a growth that agree."""
+_STEEP = 0.2  # A motion grows by itself if it had less than this part of its extent after half the time
+FEWEST_LOOKS = 3  # least number of looks over which a growth rises; a faster rise is a jump
+_ROUNDING, _LARGE = 1e-13, 0.03  # range in which a growth is measured, as parts of 1 or of the start
+_AGREE = 0.2  # largest relative difference between two measurements of a growth that agree
 
 
 def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Finding]:
     """How the state moves before the first event, if it does.
 
-    Parameters
-    ----------
-    until
-        Time of the first event, or the end [s].
+    ``until``: time of the first event, or the end [s].
     """
     count = int(np.searchsorted(seen.times, until * (1 + 1e-12), side="right"))
     motions = _motions(seen, system, count) if count >= FEWEST_LOOKS else {}

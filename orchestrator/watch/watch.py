@@ -16,6 +16,7 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.rows import RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
+from orchestrator.watch.declared_current import above_declared
 from orchestrator.watch.disturbance import Unrest, among, disturbances, not_judged
 from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import active_limits, limit_signals
@@ -66,14 +67,12 @@ class Watch:
     ) -> list[Finding]:
         """The findings, in the order of their beginning; available after the run, even after one that failed.
 
-        Parameters
-        ----------
-        misfits
-            Of devices and their bindings, by component.
+        ``misfits``: Of devices and their bindings, by component.
         """
         seen = rescaled(self._watcher.seen(self.recorder if self._looks_at_records else None), misfits)
         whole = failure is None
-        told = judged(seen, self._prepared.system, self._prepared.events, whole=whole) if len(seen.times) > 1 else ()
+        system = self._prepared.system
+        told = judged(seen, system, self._prepared.events, whole=whole) if len(seen.times) > 1 else ()
         found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), told)
         return sorted(found, key=lambda finding: finding.time)
 
@@ -81,10 +80,7 @@ class Watch:
 def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool = True) -> list[Finding]:
     """All findings from the signals.
 
-    Parameters
-    ----------
-    whole
-        Whether the run came to its end; of one that did not, nobody asks whether it settles.
+    ``whole``: Whether the run came to its end; of one that did not, nobody asks whether it settles.
     """
     settings = Settings(system, events, seen.times)
     end = float(seen.times[-1])
@@ -96,6 +92,7 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
         parts.insert(0, Stretch(0.0, happened[0]))
     found = [
         *undisturbed,
+        *above_declared(seen, system),
         *active_limits(seen, system, settings),
         *lost,
         *run_away(seen, system, settings, parts, slipped=bool(lost)),
@@ -138,6 +135,7 @@ class _Responses:
     def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
         acting = among(self._disturbances, part)
         found = unsettled_response(self._seen, self._system, part, self._units, noisy=bool(acting))
+        found = [finding for finding in found if not any(one.explains(finding) for one in acting)]
         if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units):
             self.masked[part] = acting
         if not is_short(part):

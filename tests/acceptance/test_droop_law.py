@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 from orchestrator.acceptance.checks import droop as law
-from orchestrator.acceptance.checks.droop import FREQUENCY, VOLTAGE, DroopAnswer
+from orchestrator.acceptance.checks import signs
+from orchestrator.acceptance.checks.droop import FREQUENCY, VOLTAGE, DroopAnswer, Way
 
 R, X, SLOPE = 0.01, 0.3, 0.06
 EFFECT = 0.05
@@ -46,3 +47,14 @@ def test_the_reactance_falls_with_the_frequency():
     point = law.OperatingAt(1.0, 0.0, 0.5, 0.1)
     found = [(point, answer(point, VOLTAGE, 0.0), answer(point, 0.0, FREQUENCY))]
     assert np.abs(law._errors(np.array([R, X, SLOPE]), found, False)).max() < 1e-12
+
+
+@pytest.mark.parametrize(("moving", "said"), [((0.0, 0.0), "wrong sign"), ((0.5, 0.0), ""), ((0.0, 0.5), "wrong sign")])
+def test_only_an_answer_that_has_settled_has_a_sign(moving, said):
+    """Reactive power that falls with the voltage is wrong where it rests; the frequency's answer does not matter."""
+    falls, rises = (
+        DroopAnswer(power, power, power, moves, 0.05, (Way(0j, moves, 0.05, None, 0.0, (0.0, 0.0, 0)),) * 2)
+        for power, moves in zip((-0.05j, 0.05), moving, strict=True)
+    )
+    found = signs._wrong(law.POINT, falls, rises)
+    assert (found[0] if found else "") == said

@@ -36,6 +36,7 @@ def checked(path, binding=None, only=()):
     ("name", "only"),
     [
         ("state_of_dip_timer", "state"),
+        ("clock_of_single_precision", "later_times"),
         ("gain_of_dips", "after_dips"),
         ("nan_without_power", "operating_points"),
         ("clips_its_start", "operating_points"),
@@ -72,19 +73,29 @@ def test_a_check_finds_its_fault_and_leaves_the_good_one_alone(name, only, galle
 
 
 @pytest.mark.parametrize(
+    ("name", "fault", "words"),
+    [("shows_kw_as_mw", "wrong units", "P_meas is declared in MW and shows 1000 times the P that flows"),
+     ("shows_pu_as_mw", "wrong units", "shows 0.0006667 times the P that flows (1/S_n)"),
+     ("converter_shows_mw", "", "no wrong unit is seen"), ("converter_shows_pu", "", "no wrong unit is seen")],
+)  # fmt: skip
+def test_power_in_another_unit_than_declared_is_told(name, fault, words, gallery):
+    """An honest one shows it before its filter's losses."""
+    found = check_fmu(*gallery(name), LIMITS, ("shown_power",), run_for=0.3)
+    assert found.faults == ([fault] if fault else [])
+    assert words in found.results[-1].evidence
+
+
+def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
+    found = check_fmu(*gallery("sum_of_single_precision"), LIMITS, ("steady_state", "later_times"), run_for=1.0)
+    assert found.faults == ["counts time"]
+
+
+@pytest.mark.parametrize(
     ("name", "only", "words"),
     [
         ("held", "sample_time", "its outputs change every 1 ms only: 90% of all steps of 100 µs do nothing"),
-        (
-            "sixty_hertz",
-            "rated_frequency",
-            "so it is made for 60 Hz where 50 Hz is bound",
-        ),
-        (
-            "crash_in_dip",
-            "limits",
-            "s: its process died with SIGSEGV in fmi2DoStep",
-        ),
+        ("sixty_hertz", "rated_frequency", "so it is made for 60 Hz where 50 Hz is bound"),
+        ("crash_in_dip", "limits", "s: its process died with SIGSEGV in fmi2DoStep"),
     ],
 )
 def test_the_verdict_says_what_happened(name, only, words, gallery):

@@ -2,10 +2,12 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cli import main
+from orchestrator.coupling.coupled import _jump
 from orchestrator.coupling.master import Master
 
 CASE = """
@@ -84,3 +86,23 @@ def test_the_steady_state_error_names_it(case, capsys):
     assert "no steady state" in said
     assert "box.i_re is 0 before the end of initialisation" in said
     assert "generation and load balance" not in said
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "late"),
+    [
+        (0.0, 0.9, True),
+        (1.0, 1.0 + 5e-7, False),  # as of an FMU that computes in single precision
+        (1.0, 1.0 + 2e-6, True),
+        (31415.9, 31415.9 * (1 + 5e-7), False),  # amperes, by their own size
+        (31415.9, 31415.9 * (1 + 2e-6), True),
+        (1e-4, 1.005e-4, False),  # what is near 0 is judged by 1
+        (31415.9, 0.0, True),
+    ],
+)
+def test_an_output_is_late_by_its_own_size(before, after, late):
+    """Another output that stays does not hide it."""
+    found = _jump(["box.other", "box.i_re"], np.array([2e6, before]), np.array([2e6, after]))
+    assert (found is not None) == late
+    if found:
+        assert found.variable == "i_re"

@@ -1,5 +1,6 @@
 """What the check of memory does where a block misleads, where a call is refused, and where nothing can be measured."""
 
+from contextlib import contextmanager
 from itertools import accumulate
 
 import pytest
@@ -93,3 +94,31 @@ def test_a_leak_of_each_reset_is_found_though_one_block_frees_more(gallery, quic
 def test_a_platform_that_tells_nothing_of_files_is_named(gallery, quick, monkeypatch):
     monkeypatch.setattr(resources, "_of_files", lambda subject: _Unknown("nothing tells", refused=False))
     assert "; not measured: open files, because nothing tells" in checked(gallery("converter")[0]).evidence
+
+
+class Counted:
+    """A subject that counts the steps of each block."""
+
+    def __init__(self, ends):
+        self.ends, self.step_size, self.blocks = ends, 1e-3, []
+
+    def steps(self, hold):
+        return None
+
+    @contextmanager
+    def running(self):
+        yield self
+
+    def record(self, count, step_size, stimulus):
+        self.blocks.append(count)
+
+    def memory_in_use(self):
+        return 1
+
+
+@pytest.mark.parametrize(("ends", "steps"), [(None, 100), (1000.0, 100), (0.6, 100), (0.3, 50)])
+def test_fewer_steps_are_looked_at_only_where_the_experiment_ends(ends, steps):
+    subject = Counted(ends)
+    assert resources._of_steps(subject, 100) == 0
+    assert subject.blocks == [steps] * 6
+    assert isinstance(resources._of_steps(Counted(0.1), 100), _Unknown)

@@ -53,12 +53,7 @@ def test_a_start_that_fits_at_one_angle_alone_is_no_steady_state(judged):
 
 @pytest.mark.parametrize(
     ("leak", "verdict"),
-    [
-        (0.0, ("pass", "")),
-        (1e-11, ("remark", "")),
-        (4e-7, ("remark", "")),
-        (4e-6, ("fail", "hidden state")),
-    ],
+    [(0.0, ("pass", "")), (1e-11, ("remark", "")), (4e-7, ("remark", "")), (4e-6, ("fail", "hidden state"))],
 )
 def test_a_saved_state_is_exact_or_said_not_to_be(judged, leak, verdict):
     """What is forgotten moves the output by about ``leak`` of its range; 1e-12 is said, and 1e-6 is a fault."""

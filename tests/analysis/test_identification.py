@@ -51,8 +51,7 @@ def test_noise_is_not_a_mode():
 
 
 @pytest.mark.parametrize(
-    ("times", "signal", "word"),
-    [(TIMES, np.ones_like(TIMES), "constant"), (TIMES[:15], TIMES[:15], "15 samples")],
+    ("times", "signal", "word"), [(TIMES, np.ones_like(TIMES), "constant"), (TIMES[:15], TIMES[:15], "15 samples")]
 )
 def test_what_holds_no_mode_is_said(times, signal, word):
     with pytest.raises(AnalysisError, match=word):

@@ -115,10 +115,7 @@ def test_a_drift_counts_by_the_second_however_short_the_step():
     """1e-4 per second is 1e-10 in a step of 1 µs."""
     system = System()
     system.add("a", small_fmu("integrator"), {"gain": 1.0}, {"u": 1e-4})
-    with (
-        Master(system, gauss_seidel((("a",),)), 1e-6) as master,
-        pytest.raises(AnalysisError, match="no steady state"),
-    ):
+    with Master(system, gauss_seidel((("a",),)), 1e-6) as master, pytest.raises(AnalysisError, match="no steady state"):
         find_operating_point(master)
 
 

@@ -1,6 +1,7 @@
 """The verdict over the whole spectrum: growth planted at every frequency, in systems of any size, and its cause."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,15 @@ def test_a_stable_system_is_said_to_be_stable():
     assert verdict.stable is True
     assert verdict.largest_growth_rate == pytest.approx(-0.06 * 2 * np.pi * 0.02, rel=1e-3)
     assert verdict.zeros == 1
+
+
+@pytest.mark.parametrize(("stable", "doubted"), [(True, None), (False, False), (None, None)])
+def test_what_does_not_fit_its_binding_is_never_stable_and_growth_stays_growth(stable, doubted):
+    found = replace(judge(model(crowd([]), STEP)), stable=stable, reason="first")
+    assert found.doubted([]) is found
+    again = found.doubted(["a does not fit its binding: wrong base"])
+    assert (again.stable, again.verdict == "not known") == (doubted, doubted is None)
+    assert again.reason == ("a does not fit its binding: wrong base" if stable else "first")
 
 
 def test_a_search_finds_all_that_grows_in_a_system_too_large_for_its_spectrum(monkeypatch):

@@ -254,6 +254,17 @@ def test_one_number_in_an_array_is_a_number(case):
     assert len(case.scenario("pod_p").modes(critical=np.array([30]))) > 0
 
 
+def test_a_linear_model_has_the_inputs_that_are_given_and_else_those_of_the_events():
+    scenario = gfor.load("infinite_bus").scenario("load_step")
+    model = scenario.linearize(["gfor.droop.delta_Q_ref"], ["gfor.p"])
+    assert (model.inputs, model.outputs) == (("gfor.droop.delta_Q_ref",), ("gfor.p",))
+    changed = {
+        f"{c}.{v}" for event in scenario.prepared.events for c, values in event.changes().items() for v in values
+    }
+    assert set(scenario.linearize().inputs) == changed
+    assert "gfor.droop.delta_Q_ref" not in changed
+
+
 def test_a_matrix_is_named_by_a_letter():
     model = gfor.load("infinite_bus").scenario("load_step").linearize()
     with pytest.raises(InputError, match=r"there is no matrix \['A'\]"):

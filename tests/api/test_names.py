@@ -13,7 +13,7 @@ import orchestrator
 ROOT = Path(__file__).parents[2]
 NAMES = {
     *("Case", "CosimError", "Modes", "Run", "Scenario", "build", "built_in_cases", "check", "compare", "load"),
-    *("export_comtrade", "identify", "info", "open_fmu", "read_linear_model"),
+    *("export_comtrade", "identify", "info", "nyquist", "open_fmu", "read_linear_model", "source"),
 }
 
 

@@ -206,7 +206,7 @@ def test_values_may_be_numpys_and_have_units():
         (lambda: face.load("infinite_bus").scenario("dip").modes((2, 1)), "the lower one first"),
         (
             lambda: face.load("infinite_bus").scenario("dip").modes(critical=0.2),
-            "is read in percent, at least 1; write 20",
+            "it is in percent between 1 and 90, such as 20: write 20",
         ),
         (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 20), "begin above 0 Hz"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": []}), "grid.X: a sweep needs values"),
@@ -225,10 +225,7 @@ def test_values_may_be_numpys_and_have_units():
         (lambda: face.load("two_area").design("pod_x"), "there are: pod_p, pod_q"),
         (lambda: face.load("two_area").design("pod_p", dampning=0.2), "dampning"),
         (lambda: face.load("two_area").design("pod_p", damping=20, damping_increment=10), "give one of them"),
-        (
-            lambda: face.load("two_area").design("pod_p", damping=0.2),
-            "write 20 for a damping ratio of 0.2",
-        ),
+        (lambda: face.load("two_area").design("pod_p", damping=0.2), "write 20 for a damping ratio of 0.2"),
         (lambda: face.build("gforr"), "there is no model 'gforr'; there are: "),
         (lambda: face.build("gfor", fmi="3.0"), "native"),
         (lambda: face.compare("a", "b"), "there is no trajectory.nc"),

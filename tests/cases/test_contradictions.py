@@ -65,11 +65,7 @@ PANEL = '{ signal = "gfor.omega", label = "ω_GFOR [pu]" }'
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (
-            MODES,
-            'modes = [{ name = "electromechanical" }]',
-            "has neither of 'states' and 'against'",
-        ),
+        (MODES, 'modes = [{ name = "electromechanical" }]', "has neither of 'states' and 'against'"),
         (MODES, MODES.replace(" }]", f", {TWO_SIDES} }}]"), "has both of 'states' and 'against'; give one of them"),
         (MODES, MODES.replace(" }]", f" }}, {{ name = 'electromechanical', {TWO_SIDES} }}]"), "two modes are called"),
         ("base.electromechanical", "bsae.electromechanical", "there is no scenario 'bsae'"),
@@ -94,11 +90,7 @@ def test_a_contradiction_is_refused(the_problem, old, new, words):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (
-            RECORD,
-            RECORD + '\nrecord = ["sg*"]',
-            "'gfor.omega' is not shown, because solver.record leaves out",
-        ),
+        (RECORD, RECORD + '\nrecord = ["sg*"]', "'gfor.omega' is not shown, because solver.record leaves out"),
         (RECORD, RECORD + '\nrecord = ["gfor.*"]', "leaves out sg1.omega and sg2.omega"),
         ('start = "2 s"', 'start = "20 s"', "no ring-down is shown: it starts at 20 s, and runs stop at 20 s"),
         ('area_2 = ["sg2"]', 'area_2 = ["sg*"]', "sg1 is in area_1 and area_2; it counts to area_1"),

@@ -176,6 +176,7 @@ def as_pandapower():
         ({"matpower": "broken.mat"}, "broken.mat: it cannot be read as a MATPOWER case"),
         ({"matpower": "short.m"}, r"short.m: mpc.branch must be a table of numbers with 11 columns or more"),
         ({"pandapower": "case93"}, "there is no pandapower network 'case93'; did you mean case9 or"),
+        ({"pandapower": "logging"}, "there is no pandapower network 'logging'"),  # a module that it imports
         ({"pandapower": "quite_different"}, "'quite_different'; give one of pandapower.networks, or the path"),
         ({"pandapower": "none.json"}, r"none.json: there is no such file; save a network with pandapower.to_json"),
         ({"pandapower": "text.json"}, "text.json: it is no network saved with pandapower.to_json"),

@@ -382,3 +382,10 @@ def test_a_converter_that_is_loaded_beyond_its_rating_is_questioned(questions, p
         assert (
             questions(("P_0 = 0.8", f"P_0 = {power}"), ('name = "plausible"', 'name = "p"\nmeant = ["vsc.S_n"]')) == []
         )
+
+
+@pytest.mark.parametrize(("name", "largest"), [("droop.R_f", 0.3), ("droop.R_V", 0.5)])
+def test_a_droop_of_a_tenth_of_a_percent_is_usual_and_less_is_asked_about(name, largest):
+    wanted = RANGES[name]
+    assert all(wanted.fits(value) for value in (0.0, 0.001, 0.05, largest))
+    assert not any(wanted.fits(value) for value in (0.0009, 1.01 * largest))

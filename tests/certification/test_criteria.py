@@ -7,13 +7,18 @@ from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.certification.criteria import (
     _partners,
     critical_mode,
-    eigenvalue_test,
+    judged_modes,
+    matched_modes,
     modal_test,
     neighbouring_modes,
     stability_fault,
 )
 from orchestrator.certification.frequency import bus_frequency
 from orchestrator.certification.judgement import PointVerdict
+
+
+def eigenvalue_test(having, lacking):
+    return judged_modes(matched_modes(having, lacking))
 
 
 def mode(frequency, ratio):
@@ -81,9 +86,9 @@ def test_a_judged_mode_is_compared_with_none_far_from_the_judged_range(was, same
     having = modes((0.33, 0.04, "a"))
     (found,) = eigenvalue_test(having, modes((was, 0.03, "a")))
     assert (found.before is not None, found.accepted) == (same, same)
-    beside = neighbouring_modes(modes((was, 0.03, "a")), having)
+    beside = neighbouring_modes(matched_modes(modes((was, 0.03, "a")), having))
     assert all((m.before is not None) == same for m in beside)
-    (low,) = neighbouring_modes(modes((0.056, 0.9, "a")), modes((0.06, 0.9, "a")))
+    (low,) = neighbouring_modes(matched_modes(modes((0.056, 0.9, "a")), modes((0.06, 0.9, "a"))))
     assert low.before is not None
 
 

@@ -15,7 +15,7 @@ from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.criteria import ModalTest, ModeVerdict
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
-from orchestrator.certification.margins import CriterionMargin, margins_of, narrowest
+from orchestrator.certification.margins import CriterionMargin, narrowest
 from orchestrator.certification.matrix import CertificateMatrix, MatrixCell
 from orchestrator.certification.matrix_record import in_words, matrix_json, matrix_page
 from orchestrator.certification.study import Certification
@@ -86,7 +86,7 @@ def norm(modes, time, faults=()):
     point = PointVerdict(0.1, modes, time, None, tuple(faults))
     made = object.__new__(Certification)
     made.verdicts = [point]
-    return margins_of(made)
+    return made.margins
 
 
 def test_the_norms_margins_are_in_parts_of_5_percent_and_of_the_ratio_of_swings():
@@ -108,7 +108,7 @@ def test_a_row_without_a_verdict_or_an_answer_gives_no_margin():
     made = object.__new__(CodeCertificate)
     made.verdicts = [RowVerdict(rows["jump_60"], (bad,)), RowVerdict(rows["jump_10"], (good,)),
                      RowVerdict(rows["rocof"], unknown="no licence")]  # fmt: skip
-    assert [(m.place, m.margin) for m in margins_of(made)] == [("jump_10", 0.2)]
+    assert [(m.place, m.margin) for m in made.margins] == [("jump_10", 0.2)]
 
 
 def test_a_mode_that_was_low_without_the_converter_has_no_margin():

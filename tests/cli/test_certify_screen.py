@@ -7,10 +7,11 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
+from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.margins import margin_text
-from orchestrator.cli.certify_codes import show_code
+from orchestrator.cli.certificate_screen import show
 
 
 def row(name):
@@ -18,7 +19,7 @@ def row(name):
 
 
 def criterion(name, value, limit, margin, *, accepted):
-    return RowFinding(name, "rule", "code", value, limit, margin, accepted, f"{name} is {value}")
+    return RowFinding(name, "rule", "code", value, limit, margin, accepted, f"{value} pu away")
 
 
 VERDICTS = [
@@ -32,13 +33,13 @@ VERDICTS = [
 @pytest.fixture
 def screen():
     slip = {"kind": "misfit", "message": "converter: wrong rated frequency: omega is 0.8333"}
-    found = SimpleNamespace(
-        code=SimpleNamespace(title="ERCOT"), description=SimpleNamespace(model_name="vendor"), verdicts=VERDICTS,
-        verdict="fails", acceptance=None, missing=("row weak",),
-        results={name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")},
+    code = SimpleNamespace(title="ERCOT", f_n=50.0, rows=[v.row for v in VERDICTS], left_out=())
+    found = CodeCertificate(
+        SimpleNamespace(values={}), SimpleNamespace(model_name="vendor"), VERDICTS, code, 50.0,
+        {name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")},
     )  # fmt: skip
     console = Console(width=150, record=True, file=StringIO())
-    show_code(found, [Path("certificate.html")], Path("out"), console)
+    show(found, [Path("certificate.html")], Path("out"), console)
     return console.export_text()
 
 
@@ -47,7 +48,7 @@ def test_the_verdict_stands_first_and_each_row_has_a_line(screen):
     cells = [[cell.strip() for cell in line.strip("│").split("│")] for line in first if line.startswith("│")]
     assert [c[:2] for c in cells] == [["all", "fails"], ["jump", "fails"], ["dip", "accepted"], ["weak", "not judged"]]
     assert cells[0][4] == "2 judged, 1 failed, 1 not judged"
-    assert cells[1][2:] == ["1 of 2", "−1.12 in its unit", "settles"]
+    assert cells[1][2:] == ["1 of 2", "−1.12 pu", "settles"]
     assert cells[2][2:] == ["1 of 1", "+80 %", "voltage"]
     assert cells[3][4] == "the worker died"
 
@@ -60,7 +61,7 @@ def test_a_fault_of_the_device_is_told_once(screen):
 @pytest.mark.parametrize(
     ("margin", "known", "text"),
     [(None, (), "–"), (0.125, (), "+12.5 %"), (-0.5, (1.0, 1.5), "−50 %"),
-     (-112.72, (0.01, 1.137), "−1.13 in its unit"),
+     (-112.72, (0.01, 1.137), "−1.13 in its unit"), (-112.72, (0.01, 1.137, "Hz"), "−1.13 Hz"),
 
      (187.87, (), "+> 10 times")],
 )  # fmt: skip

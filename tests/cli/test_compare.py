@@ -95,12 +95,14 @@ def test_a_start_may_have_a_unit_and_be_the_beginning(runs, gfor):
 def test_the_heading_names_the_part_of_the_record_that_was_used(runs, gfor):
     _, out, _ = gfor("identify", runs[0], "a.omega", "--start", "1.005", "--stop", "99")
     assert "a.omega from 1.01 to 14.99 s" in out
+    assert "λ [rad/s]" in out
     code, _, err = gfor("identify", runs[0], "a.omega", "--start", "3", "--stop", "2")
     assert (code, "stop = 2.0: it must come after start = 3.0" in err) == (2, True)
 
 
 def test_other_intervals_and_short_runs_are_said(runs, gfor, tmp_path):
     _, out, _ = gfor("compare", *runs)
+    assert "at [s]" in out
     assert "they are compared at the 750 times that both have" in out.replace("\n", " ")
     short = save(tmp_path / "short", -0.3 + 4j, times=np.arange(0, 1.5, 0.01))
     code, out, err = gfor("compare", runs[0], short, "--json")

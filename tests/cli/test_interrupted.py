@@ -6,6 +6,7 @@ import signal
 
 import pytest
 
+from orchestrator.api.executors import PointStudy
 from orchestrator.cli import run as command
 from orchestrator.cli import sweep as sweep_command
 from orchestrator.cli.checkpoints import Checkpoints
@@ -102,9 +103,9 @@ def test_the_interval_of_the_checkpoints_is_kept(gfor, tmp_path, monkeypatch):
 
 
 def test_a_sweep_of_which_nothing_is_kept(gfor, tmp_path, monkeypatch):
-    for stage in ("plan", "compute"):
+    for place, stage in ((sweep_command, "plan"), (PointStudy, "compute")):
         with monkeypatch.context() as planted:
-            planted.setattr(sweep_command, stage, interrupts)
+            planted.setattr(place, stage, interrupts)
             assert gfor(*SWEEP, "--out", tmp_path) == (130, "", "interrupted\n")
 
 
@@ -112,7 +113,7 @@ def test_a_sweep_whose_points_are_kept(gfor, tmp_path, monkeypatch):
     """It is interrupted while its files are written, and another time before its points are counted."""
     said = f"points are in {tmp_path}; the same command continues from there\n"
     with monkeypatch.context() as planted:
-        planted.setattr(sweep_command, "_present", interrupts)
+        planted.setattr(sweep_command, "present", interrupts)
         assert gfor(*SWEEP, "--out", tmp_path) == (130, "", f"interrupted: 2 of 2 {said}")
         planted.setattr(sweep_command, "plan", interrupts)
         assert gfor(*SWEEP, "--out", tmp_path) == (130, "", f"interrupted: {said}")

@@ -31,9 +31,7 @@ def test_the_files_hold_the_model_with_its_names(tmp_path, capsys):
 
 def test_the_exported_model_answers_as_the_simulation_does(tmp_path, capsys):
     folder = tmp_path / "out"
-    code = main(
-        ["run", "two_area", "--scenario", "gfor", "--linear", "--stop", "6", "--out", str(folder)],
-    )
+    code = main(["run", "two_area", "--scenario", "gfor", "--linear", "--stop", "6", "--out", str(folder)])
     assert code == 0
     assert "Linear model against the simulation" in capsys.readouterr().out
     (scenario,) = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["scenarios"]

@@ -69,6 +69,7 @@ def test_a_sweep_names_the_points_that_grow(tmp_path, capsys):
     assert code == 1
     first = text.splitlines()[0]
     assert first.startswith("UNSTABLE: SG + GFOR: at 1 of 2 points; worst at gfor.droop.R_f = 10 ")
+    assert first.endswith("; stable at gfor.droop.R_f = 0.05 pu, unstable at gfor.droop.R_f = 10 pu")
     with (tmp_path / "sweep.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["gfor.droop.R_f [pu]"]: row["stable"] for row in rows} == {"0.05": "true", "10.0": "false"}

@@ -8,15 +8,23 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from orchestrator.analysis.continuation import ModesMeetError
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.case import load_case
-from orchestrator.coordinated_design import open_loops, point, ranking, study
+from orchestrator.coordinated_design import following, open_loops, point, ranking, study
+from orchestrator.coordinated_design.following import with_followed_names
 from orchestrator.coordinated_design.objective import Aim, RatedPoint, growth
 from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointsRecord
 from orchestrator.coordinated_design.search import SettingSearch
 from orchestrator.coordinated_design.settings import SettingSpace
-from orchestrator.coordinated_design.study import PointsDesignRequest, design_over_points, modes_at, plan_points_design
+from orchestrator.coordinated_design.study import (
+    PointsDesignRequest,
+    design_over_points,
+    modes_at,
+    plan_points_design,
+    values_of,
+)
 from orchestrator.coordinated_design.words import remarks, verdict_sentence
 from orchestrator.errors import InputError
 from orchestrator.pod_design.closed_loop import PodSetting
@@ -261,6 +269,51 @@ def test_a_mode_that_is_pushed_down_is_harm(planned, store):
     harmed = [growth(one.loops.eigenvalues(strong)) > 0 for one in rated]
     assert any(harmed)
     assert all(not one.worth(strong).allowed for one, grows in zip(rated, harmed, strict=True) if grows)
+
+
+def test_a_name_follows_its_mode_from_the_loops_that_are_open(planned, points, store):
+    """By hand: tiny steps of the gain, and at each the nearest eigenvalue. What shapes say with the setting counts for
+    nothing."""
+    points.write_text("name,grid.X_L,load\nshort,0.05,1\nlonger,0.3,1\n")
+    plan = planned("pod_p", modes=("electromechanical",))
+    before = modes_at(plan, plan.off, plan.candidates, Serial(), store)
+    gain = 250.0
+    setting = {P: PodSetting(gain, lead_lag_turning(40.0, 4.5, 2))}
+    values = values_of(plan.groups, list(setting.values()))
+    after = modes_at(plan, values, (), Serial(), store)
+    lying = [replace(one, named={"electromechanical": one.swinging[-1]}) for one in after]
+    found = with_followed_names(["electromechanical"], before, after, setting)
+    borne = 0
+    for first, last, other, lie in zip(before, found, after, lying, strict=True):
+        assert with_followed_names(["electromechanical"], [first], [lie], setting) == [last] or last.named == {}
+        assert with_followed_names([], [first], [other], setting) == [other]
+        if "electromechanical" not in first.named:
+            assert last.named == {}
+        elif "electromechanical" in last.named:
+            borne += 1
+            value = first.values[first.named["electromechanical"]]
+            for k in np.linspace(1e-6, gain, 250):
+                values = first.loops.eigenvalues({P: replace(setting[P], gain=k)})
+                value = values[np.abs(values - value).argmin()]
+            assert last.values[last.named["electromechanical"]] == pytest.approx(value, rel=1e-3)
+    assert borne >= 1
+
+
+@pytest.mark.slow
+def test_a_name_that_cannot_be_followed_is_borne_by_none(planned, points, store, monkeypatch):
+    """The verdict counts all modes there, and says so."""
+    points.write_text("name,grid.X_L\nshort,0.05\n")
+
+    def meets(*_):
+        raise ModesMeetError(-0.5 + 4j, 0.3, 1.0)
+
+    monkeypatch.setattr(following, "follow_along", meets)
+    plan = planned("pod_p", modes=("electromechanical",), damping=0.1)
+    verdict = design_over_points(plan, Serial(), store).verdict
+    assert all(one.unnamed for one in verdict.known)
+    assert "its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count" in " ".join(
+        remarks(verdict)
+    )
 
 
 def test_a_mode_that_is_named_counts_alone(planned, points, store):

@@ -57,8 +57,7 @@ def test_rows_are_the_convolution_with_the_ends_held(system):
 
 
 @pytest.mark.parametrize(
-    ("hertz", "left"),
-    [(0.0, 1.0), (5.0, 1.0), (19.0, 1.0), (26.0, 0.0), (40.0, 0.0), (48.0, 0.0), (313.0, 0.0)],
+    ("hertz", "left"), [(0.0, 1.0), (5.0, 1.0), (19.0, 1.0), (26.0, 0.0), (40.0, 0.0), (48.0, 0.0), (313.0, 0.0)]
 )
 def test_what_rows_cannot_show_is_taken_away_and_the_rest_is_not_delayed(system, hertz, left):
     """Rows every 20 ms show up to 25 Hz; 20 Hz pass. Without the filter 48 Hz would pass for 2 Hz."""

@@ -61,9 +61,7 @@ def ring(*names):
 def oscillator():
     """Two integrators in a ring: ẋ_a = 30·x_b, ẋ_b = −20·x_a."""
     return system_of(
-        ring("a", "b"),
-        a=("integrator", {"gain": 30.0, "x_0": 1.0}),
-        b=("integrator", {"gain": -20.0, "x_0": 0.5}),
+        ring("a", "b"), a=("integrator", {"gain": 30.0, "x_0": 1.0}), b=("integrator", {"gain": -20.0, "x_0": 0.5})
     )
 
 
@@ -107,11 +105,7 @@ def test_two_integrators_one_after_the_other(groups, step):
 
 @pytest.mark.parametrize("step_size", [1e-4, 1e-3, 1.7e-3], ids=lambda h: f"H = {h} s")
 def test_two_lags_one_after_the_other(step_size):
-    system = system_of(
-        ring("a", "b"),
-        a=("lag", {"T": 0.005, "x_0": 2.0}),
-        b=("lag", {"T": 0.02, "x_0": -1.0}),
-    )
+    system = system_of(ring("a", "b"), a=("lag", {"T": 0.005, "x_0": 2.0}), b=("lag", {"T": 0.02, "x_0": -1.0}))
     seen = trajectory(system, gauss_seidel((("a",), ("b",))), ["a.y", "b.y"], step_size=step_size)
     keep_a, keep_b = lag_factor(step_size, 0.005), lag_factor(step_size, 0.02)
 

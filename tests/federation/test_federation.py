@@ -22,6 +22,7 @@ from orchestrator.coupling.schedule import jacobi
 from orchestrator.errors import ComponentError, InputError, NotFiniteError, RunInterruptedError
 from orchestrator.federation import federation as processes
 from orchestrator.federation.choice import Federates
+from orchestrator.federation.frames import JOIN, Door, Frames, call
 from orchestrator.federation.layout import make_layout
 from orchestrator.federation.ports import broker_port
 from orchestrator.study.run import run_scenario
@@ -119,8 +120,7 @@ def assert_same(one, other):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("names", "schedule"),
-    [(("gfor",), "gauss-seidel"), (("gfor", "sg1"), "jacobi"), (("sg2", "grid"), "gauss-seidel")],
+    ("names", "schedule"), [(("gfor",), "gauss-seidel"), (("gfor", "sg1"), "jacobi"), (("sg2", "grid"), "gauss-seidel")]
 )
 def test_a_case_gives_the_local_master_s_numbers(names, schedule, temporary, started):
     (ready,) = load_case("two_area").prepare(["pod_p"], stop_time=0.02)
@@ -394,3 +394,18 @@ def test_the_program_of_the_guide(tmp_path, temporary, started):
     np.testing.assert_allclose(np.abs(found), abs(current), rtol=0.02)
     assert "gfor.omega" not in data
     assert "sg1.omega" in data
+
+
+def test_only_who_knows_the_word_comes_in():
+    """Another program of this machine that calls first is sent away, and the hub's call after it is taken."""
+    with Door() as door:
+        stranger = Frames(socket.create_connection(("127.0.0.1", door.port), timeout=5.0))
+        stranger.send(JOIN, b"guessed")
+        hub = call(door.port, door.word)
+        taken = door.accept(5.0)
+        hub.send(JOIN, b"here")
+        assert taken.receive(5.0) == (JOIN, b"here")
+        with pytest.raises(EOFError):
+            stranger.receive(5.0)
+        for end in (stranger, hub, taken):
+            end.close()

@@ -6,6 +6,7 @@ them. `pytest tests/fmi/test_sandbox.py -s -k lists` prints what this machine la
 
 import errno
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -19,7 +20,7 @@ import pytest
 
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.errors import ComponentError
-from orchestrator.fmi import confined, process_tree
+from orchestrator.fmi import confined, process_tree, seccomp
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.confinement import LAYERS
 from orchestrator.fmi.description import read_description
@@ -447,3 +448,21 @@ def test_gfor_check_says_what_happened_and_goes_on(action, value, fault, layers,
     assert report.faults == ([fault] if fault else [])
     assert tuple(protection.name for protection in report.protections) == NAMES
     assert set(descendants(os.getpid())) <= before
+
+
+@pytest.mark.parametrize(("header", "column"), [("x86_64-linux-gnu/asm/unistd_64.h", 0), ("asm-generic/unistd.h", 1)])
+def test_the_numbers_of_refused_calls_are_the_kernels(header, column):
+    """As its headers have them, which come with the compiler; newer calls may be missing there."""
+    text = (Path("/usr/include") / header).read_text(encoding="utf-8")
+    lines = re.findall(r"#define __NR(?:3264)?_(\w+) (\d+)", text)
+    kernel = {name: int(number) for name, number in lines}
+    tables = (seccomp._ALWAYS, seccomp._ATTRIBUTES, seccomp._SIGNALS, seccomp._MEMORY, seccomp._IPC,
+              seccomp._OF_A_PROCESS, seccomp._OF_SOME_PROCESS)  # fmt: skip
+    ours = {name: numbers[column] for table in tables for name, numbers in table.items()}
+    names = ("_KILL", "_TGKILL", "_SOCKETPAIR", "_CLONE", "_CLONE3", "_PRCTL")
+    ours |= {name[1:].lower(): getattr(seccomp, name)[column] for name in names}
+    ours["seccomp"] = list(seccomp._SECCOMP.values())[column]
+    known = ours.keys() & kernel.keys()
+    assert {name: ours[name] for name in known} == {name: kernel[name] for name in known}
+    assert len(known) > 70
+    assert {"memfd_create", "ptrace", "clone3"} <= known

@@ -105,10 +105,7 @@ parameters = {{ S_n = "600 MVA", P_0 = 0.5, Q_0 = 0.0, v_0 = 1.0, pll.f_0 = {pll
         + "".join(
             f'[[connections]]\nfrom = "{a}"\nto = "{b}"\n'
             for part in ("re", "im")
-            for a, b in (
-                (f"bus_{name}.v_{part}", f"{name}.v_{part}"),
-                (f"{name}.i_{part}", f"bus_{name}.i_{part}"),
-            )
+            for a, b in ((f"bus_{name}.v_{part}", f"{name}.v_{part}"), (f"{name}.i_{part}", f"bus_{name}.i_{part}"))
         )
         for name, pll in (("A", 10.0), ("B", 25.0))
     ]

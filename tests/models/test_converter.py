@@ -256,3 +256,9 @@ def test_an_axis_at_its_limit_leaves_the_other_ones_integrator_free(fmu_path):
     assert current[-1, 1] == pytest.approx(0.3, rel=2e-3)
     assert x[999, 1] == pytest.approx(x[20, 1], abs=1e-9)
     assert abs(x[999, 0] - x[20, 0]) > 1e-4
+
+
+@pytest.mark.parametrize(("name", "least"), [("xi", 0.1), ("tau", 1e-3)])
+def test_how_far_the_voltage_loop_may_be_tuned(name, least):
+    (found,) = (v for v in build_model("gfor").parameters if v.name == f"voltage_control.{name}")
+    assert found.minimum == least

@@ -125,10 +125,7 @@ def by_the_fmu(path, values, stages, times, names=NAMES):
     return np.array(rows)
 
 
-EVENTS = {
-    "dip": [(0.005, 1.0), (0.025, 0.3), (0.05, 1.0)],
-    "jump": [(0.005, 1.0), (0.05, exp(-0.6j))],
-}
+EVENTS = {"dip": [(0.005, 1.0), (0.025, 0.3), (0.05, 1.0)], "jump": [(0.005, 1.0), (0.05, exp(-0.6j))]}
 
 
 @pytest.mark.slow

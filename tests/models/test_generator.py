@@ -165,6 +165,21 @@ def test_any_dispatch_starts_in_steady_state(name, variant):
         assert (y["p"], y["q"]) == pytest.approx((start["P_0"], start["Q_0"]), abs=1e-12)
 
 
+@pytest.mark.parametrize("q", [0.4, -0.3])
+def test_saturation_is_that_of_the_flux_behind_the_leakage(q):
+    """Which a machine that gives reactive power has above its port's voltage, and one that takes some below it."""
+    model = build_model("synchronous_generator_st4b")
+    start = {v.name: float(v.start) for v in model.parameters}
+    values = start | {"v_0": 1.0, "theta_0": 0.0, "P_0": 0.6, "Q_0": q, "machine.saturation": 1.0}
+    c, _ = model.initialise(np.array([values[v.name] for v in model.parameters]))
+    factor = next(k for k, v in enumerate(model.calculated) if v.name == "machine.saturation_factor")
+    R = values["machine.R_s"] + values["transformer.R_t"]
+    X = values["machine.X_l"] + values["transformer.X_t"]
+    flux = abs(1.0 + complex(R, X) * complex(0.6, -q))
+    s_10, s_12 = values["machine.s_10"], values["machine.s_12"]
+    assert float(c[factor]) == pytest.approx(1 + s_10 * flux ** (np.log(s_12 / s_10) / np.log(1.2)))
+
+
 def test_saturation_passes_through_its_two_points():
     model = build_model("synchronous_generator_st4b")
     factor = next(k for k, v in enumerate(model.calculated) if v.name == "machine.saturation_factor")

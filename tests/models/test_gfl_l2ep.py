@@ -68,10 +68,7 @@ def by_hand(p, x, v):
     K_p, K_i = p["current_control.K_p"], p["current_control.K_i"]
     v_md = v_d - w * L * i_q + K_p * error_d + M_d
     v_mq = w * L * i_d + K_p * error_q + M_q
-    di_d, di_q = (
-        w_N / L * (v_md - v_d - R * i_d + w * L * i_q),
-        w_N / L * (v_mq - v_q - R * i_q - w * L * i_d),
-    )
+    di_d, di_q = (w_N / L * (v_md - v_d - R * i_d + w * L * i_q), w_N / L * (v_mq - v_q - R * i_q - w * L * i_d))
     dM_d, dM_q = K_i * error_d, K_i * error_q
     if not p["connected"]:
         di_d, di_q, dM_d, dM_q = (-value / 1e-3 for value in (i_d, i_q, M_d, M_q))

@@ -138,11 +138,7 @@ def test_an_exciter_is_its_block_diagram_and_a_signal_raises_the_field_voltage(n
     else:
         gain = p["K_A"] * (1 + p["T_C"] * s) / (1 + p["T_B"] * s) / (1 + p.get("T_A", 0.0) * s)
     assert found.response(s, AT_REST) == pytest.approx(
-        {
-            ("E_fd", "v_s"): gain,
-            ("E_fd", "v_t"): of_voltage - gain / (1 + p["T_R"] * s),
-            ("E_fd", "I_fd"): of_current,
-        },
+        {("E_fd", "v_s"): gain, ("E_fd", "v_t"): of_voltage - gain / (1 + p["T_R"] * s), ("E_fd", "I_fd"): of_current},
         rel=1e-9,
         abs=1e-12,
     )

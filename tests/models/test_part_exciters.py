@@ -6,6 +6,8 @@ from scipy.optimize import brentq
 
 from fmus.synchronous_generator.composed import synchronous_generator, synchronous_generator_phasor
 from fmus.synchronous_generator.parts import EXCITERS
+from fmus.synchronous_generator.saturation import require_rising
+from fmus.toolchain.model_builder import ModelBuilder
 from tests.models.parts import AT_BUS, AT_REST, BUS, E_FD, V_T, exciter, integrated, refused
 from tests.support.evaluated import Evaluated
 
@@ -210,3 +212,22 @@ def test_the_field_currents_limiter_of_st1a_lowers_the_field_voltage():
     rest = alone.outputs(REST)["E_fd"]
     assert alone.outputs([V_T, 2.4, 0.0])["E_fd"] == rest
     assert alone.outputs([V_T, 2.7, 0.0])["E_fd"] == pytest.approx(rest - 4 * 0.2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("points", "fine"),
+    [
+        ({"s_10": 0.03, "s_12": 0.2}, True),
+        ({"s_10": 0.05, "s_12": 0.15}, True),
+        ({"s_10": 0.0, "s_12": 0.0}, True),
+        ({"s_10": 0.03, "s_12": 0.024}, False),  # 1.2 times it is less than the first
+        ({"s_10": 0.1, "s_12": 0.05}, False),
+    ],
+)
+def test_saturation_rises_between_its_two_points(points, fine):
+    """Also where the second value is far below 1, as data sheets have it."""
+    m = ModelBuilder("saturated", "Two points alone")
+    m.derivative(m.state("x", 0, "1", "Some state"), 0)
+    require_rising(m, (1.0, points["s_10"]), (1.2, points["s_12"]), "S")
+    model = m.build()
+    assert (float(model.requirements([], [])) > 0) is fine

@@ -23,10 +23,7 @@ def admittance(b_mvar, connected):
     y = 1 / complex(0.01, 0.1)
     share = 1.0 if connected else (1e-3 if b_mvar > 0 else 0.0)
     return np.array(
-        [
-            [y + 0.05j + 2.0 - 0.5j, -y],
-            [-y, y + 0.05j + (0.3 if connected else 0.0) + 1j * share * b_mvar / 100],
-        ]
+        [[y + 0.05j + 2.0 - 0.5j, -y], [-y, y + 0.05j + (0.3 if connected else 0.0) + 1j * share * b_mvar / 100]]
     )
 
 

@@ -18,8 +18,10 @@ HEAVY = ("how-to/use-your-own-fmu", "how-to/black-box", "how-to/write-a-controll
 
 ANYWHERE = (
     "first-steps",
+    "how-to/scan-and-fmu",
     "how-to/grid-forming-among-grid-following",
     "how-to/faults-and-outages",
+    "how-to/own-network",
     *(pytest.param(guide, marks=pytest.mark.nightly) for guide in HEAVY),
 )
 SECONDS = 1800.0

@@ -1,5 +1,6 @@
 """The report as a page: what it holds, and what a browser makes of it."""
 
+import re
 import shutil
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import InputError
-from orchestrator.report.html.charts import ChartCurve, Frame, line_chart, thinned
+from orchestrator.report.html.charts import ChartCurve, Frame, Mark, complex_plane, line_chart, thinned
 from orchestrator.report.html.page import write_report
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
@@ -85,12 +86,12 @@ def test_a_browser_shows_it_without_errors_answers_the_pointer_and_prints(page, 
 
 
 def test_what_is_no_folder_of_a_run_is_said(tmp_path, page):
-    with pytest.raises(InputError, match="not the folder of a run"):
+    with pytest.raises(InputError, match="nothing in it can be used for a report"):
         write_report(tmp_path)
     with pytest.raises(InputError, match="no such file or folder"):
         write_report(page.parent, [tmp_path / "nowhere"])
     (tmp_path / "screening.html").write_text("a page")
-    with pytest.raises(InputError, match=r"nothing in it belongs into a run's report.*own: screening.html"):
+    with pytest.raises(InputError, match=r"nothing in it can be used for a report.*own: screening.html"):
         write_report(page.parent, [tmp_path])
 
 
@@ -115,3 +116,14 @@ def test_a_frame_without_extent_still_has_axes():
     chart = line_chart("flat", "x", "y", [ChartCurve("c", "#000", np.array([0.0, 1.0]), np.zeros(2))])
     assert "nan" not in chart
     assert Frame((0, 2), (0, 1), "", "").at(1, 0)[0] > 0
+
+
+def test_rays_of_equal_damping_stand_at_their_percent():
+    """Each ends where it leaves the picture; its slope is that of its damping, f/|σ| = sqrt(1 − ζ²)/(2π·ζ)."""
+    text = complex_plane("plane", [Mark(-1.0, 2.0, "red", "a mode")])
+    shown = [int(percent) for percent in re.findall(r'<text class="faint"[^>]*>(\d+) %</text>', text)]
+    assert shown == [5, 10, 15, 20, 30]
+    rays = [[float(x) for x in ray] for ray in re.findall(r'class="ray" d="M(\S+) (\S+)L(\S+) (\S+)"', text)]
+    steepness = [(y0 - y1) / (x0 - x1) for x0, y0, x1, y1 in rays]
+    wanted = [np.sqrt(1 - z**2) / z for z in np.array(shown) / 100]
+    assert np.array(steepness) / steepness[0] == pytest.approx(np.array(wanted) / wanted[0], rel=0.02)

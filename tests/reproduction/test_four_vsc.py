@@ -94,10 +94,7 @@ def test_no_single_change_comes_near_the_recording():
         apart = np.abs(np.array([cell[0] for cell in figures(PAGE, RECORDED, label)]) - theirs)
         if apart[::2].max() < 1.2 and apart[1::2].max() < 0.4:
             near.add(label)
-    assert near == {
-        "two: PLL: integral gain 2.2 times; a fifth of the load",
-        "three: these; a fifth of the load",
-    }
+    assert near == {"two: PLL: integral gain 2.2 times; a fifth of the load", "three: these; a fifth of the load"}
 
 
 def assert_limit(system, gva, hertz):

@@ -126,11 +126,7 @@ def test_times_that_contradict_each_other_are_said(recording):
         ("ASCII", "EBCDIC", r"line 13: the form of the samples is 'EBCDIC'; known are ASCII, BINARY"),
         ("ASCII\n1\n", "", r"rec.cfg: the file ends after line 12, before the form of the samples"),
         ("ASCII\n1", "ASCII\n0", r"the multiplier of time stamps is 0; it must exceed 0"),
-        (
-            "ASCII",
-            "BINARY",
-            r"rec.dat: it has 58 bytes, and a sample of 3 analog and 2 status channels in BINARY has",
-        ),
+        ("ASCII", "BINARY", r"rec.dat: it has 58 bytes, and a sample of 3 analog and 2 status channels in BINARY has"),
     ],
 )
 def test_a_configuration_that_cannot_be_used(recording, old, new, words):

@@ -372,6 +372,14 @@ def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(two_area, day, t
     assert {record.zeros for record in computed if record.counted} == {1}
 
 
+def test_a_stretch_counts_growth_at_its_ends_alone(two_area, day, tmp_path, monkeypatch):
+    """What stands between them is followed, and would take many times as long to count."""
+    monkeypatch.setattr(modes, "DENSE", 0)
+    result = screened(plan_screening(two_area[0], day, None, "gfor"), tmp_path / "points")
+    counted = [item.record.counted for item in result.items if item.record.status is Status.COMPUTED]
+    assert counted == [True, *[False] * (len(counted) - 2), True]
+
+
 @pytest.mark.parametrize("clocks", [0, 1, 3, 7])
 @pytest.mark.parametrize("others", [(3.0, 5.0, 40.0), (3.0, 5.0, 40.0, 60.0, 80.0, 100.0)])
 def test_slow_growth_beside_zero_and_second_zeros_are_found(clocks, others):

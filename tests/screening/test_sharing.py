@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import orchestrator.api.case as gfor_face
 from orchestrator.analysis.modes import find_modes
 from orchestrator.cases.sharing import Reserve, SharingRule, droop_gain, power_limits, shares
 from orchestrator.errors import ErrorKind, InputError
@@ -114,6 +115,62 @@ def test_an_outage_has_the_modes_of_the_dispatch_by_hand(five, tmp_path, lost):
     assert item.record.status is Status.COMPUTED
     assert item.record.text.startswith(f"{unit} is lost, which fed {intact[unit]:.4g} MW; shared: ")
     assert critical(item) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("rule", list(SharingRule))
+def test_switching_a_unit_off_shares_as_its_outage_does_and_as_by_hand(five, tmp_path, rule):
+    """By hand: powers by rating and droop are given, with a factor for which sg5, which feeds the rest, feeds its own
+    share. The screening's item, the case with the unit switched off and the case by hand have the same modes."""
+    weights = {2: 200 / 0.04, 3: 220 / 0.05, 4: 0.0, 5: 260 / 0.06} if rule == "droop" else {
+        2: 200.0, 3: 220.0, 4: 150.0, 5: 260.0
+    }  # fmt: skip
+    weights = weights if rule != "slack" else {2: 0.0, 3: 0.0, 4: 0.0, 5: 1.0}
+    off = {"sg1.connected": False, "sg1.governor.V_MIN": -0.1, "sg5.governor.V_MAX": 1.5}
+    (intact,) = five.prepare(["base"])
+    before = {**POWERS, 5: intact.power_flow.powers["sg5"].real * 260}
+
+    def by_hand(factor):
+        fed = {n: before[n] + factor * weight for n, weight in weights.items()}
+        (prepared,) = five.prepare(["base"], off | {f"sg{n}.P_0": fed[n] / RATINGS[n] for n in (2, 3, 4)})
+        return prepared, prepared.power_flow.powers["sg5"].real * 260 - fed[5]
+
+    factor = before[1] / sum(weights.values())
+    for _ in range(4):
+        hand, missing = by_hand(factor)
+        factor += missing / sum(weights.values())
+    assert abs(missing) < 1e-5
+    scenario = gfor_face.Case(five).scenario("base", off, sharing=str(rule))
+    (told,) = (text for text in scenario.questions if "sharing" in text)
+    assert f"sg1 is lost, which fed 190 MW; shared: sg{'5' if rule == 'slack' else ''}" in told
+    assert f"by {rule}; the rules are droop, rating, slack" in told
+    for name in ("sg2", "sg3", "sg4", "sg5"):
+        assert scenario.prepared.power_flow.powers[name].real == pytest.approx(
+            hand.power_flow.powers[name].real, abs=1e-6
+        )
+    expected = [m.eigenvalue for m in find_modes(compute_modes(hand).system, 0.1, 2.0) if m.damping_ratio <= 0.2]
+    found = find_modes(compute_modes(scenario.prepared).system, 0.1, 2.0)
+    assert [m.eigenvalue for m in found if m.damping_ratio <= 0.2] == pytest.approx(expected, rel=1e-6)
+    item = screened(five, tmp_path, "sg1", "name,sg5.governor.V_MAX\nonly,1.5\n", sharing=rule)[-1]
+    assert critical(item) == pytest.approx(expected, rel=1e-6)
+
+
+def test_what_is_switched_off_is_shared_as_the_case_says_unless_powers_are_given(five, tmp_path):
+    def powers(case, values, **how):
+        scenario = gfor_face.Case(case).scenario("base", values, **how)
+        return scenario.prepared.power_flow.powers, [q for q in scenario.questions if "sharing" in q]
+
+    off = {"sg2.connected": False}
+    shared, (told,) = powers(five, off)
+    assert shared == powers(five, {"grid.sg2.connected": False})[0] == powers(five, {"sg[2].connected": False})[0]
+    assert "by droop" in told
+    folder = tmp_path / "slack"
+    folder.mkdir()
+    left, (told,) = powers(five_machines(folder, flow='sharing = "slack"'), off)
+    assert (left["sg1"].real * 250, "by slack" in told) == (pytest.approx(190), True)
+    assert powers(five, {**off, "sg1.P_0": 0.8})[0]["sg3"].real * 220 == pytest.approx(160)  # a dispatch by hand
+    assert powers(five, {"grid.line_11_13.connected": False})[1] == []
+    with pytest.raises(InputError, match="give one of droop, rating, slack"):
+        powers(five, off, sharing="governor")
 
 
 def test_ratings_or_the_slack_share_where_they_are_asked_for(five, tmp_path):

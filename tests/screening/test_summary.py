@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.screening.modes import CriticalRegion
 from orchestrator.screening.record import Status
+from orchestrator.screening.study import ScreeningResult
 from orchestrator.screening.summary import Summary
 
 
@@ -31,6 +32,13 @@ def summary(*verdicts, complete=True):
 )
 def test_only_a_complete_screening_without_gaps_is_stable(verdicts, complete, stable):
     assert summary(*verdicts, complete=complete).stable is stable
+
+
+@pytest.mark.parametrize(("there", "complete"), [(0, False), (2, False), (3, True)])
+def test_a_screening_is_complete_with_all_its_items(there, complete):
+    result = ScreeningResult(SimpleNamespace(number_of_items=3))
+    result.items = [object()] * there
+    assert result.complete is complete
 
 
 def test_of_a_part_the_same_holds_for_what_is_there():

@@ -1,5 +1,7 @@
 """Units out of service: the grid has fewer inputs then, and every outage is computed."""
 
+from dataclasses import replace
+
 import pytest
 
 from orchestrator.analysis.modes import find_modes
@@ -32,13 +34,14 @@ def critical(item):
 
 
 def switched_off(case, scenario, unit):
-    """Critical modes of the whole spectrum where the unit is left in the model and fed nothing."""
+    """Critical modes of the whole spectrum where the unit is left in the model, and the slack feeds its power."""
+    case = replace(case, sharing=SharingRule.SLACK)
     (prepared,) = case.prepare([scenario], {f"{unit}.connected": False})
     return [m.eigenvalue for m in find_modes(compute_modes(prepared).system, 0.1, 2.0) if m.damping_ratio <= 0.2]
 
 
 def test_outages_of_units_have_the_modes_of_units_switched_off(case, tmp_path):
-    """A unit that is switched off in a case leaves its power to the slack."""
+    """The slack feeds their power."""
     result = screened(case, tmp_path, "name\nonly\n", "sg33,sg36", sharing=SharingRule.SLACK)
     assert [item.record.status for item in result.items] == [Status.COMPUTED] * 3
     for item in result.items[1:]:

@@ -14,17 +14,7 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.errors import CosimError
 from orchestrator.ssp.archive import SspArchive
 from orchestrator.ssp.names import NAMESPACES
-from tests.ssp.packages import (
-    OSP_STEP,
-    bindings,
-    component,
-    connector,
-    experiment,
-    system,
-    values,
-    wire,
-    write,
-)
+from tests.ssp.packages import OSP_STEP, bindings, component, connector, experiment, system, values, wire, write
 
 H = 1e-3
 

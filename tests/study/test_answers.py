@@ -29,10 +29,11 @@ def test_the_first_screen_of_modes_has_one_line_a_scenario(capsys):
     assert not [line for line in text if "largest real part" in line or "a mode grows" in line]
 
 
-def result(findings=(), stable=True, events=("fault",), failure=None):
+def result(findings=(), stable=True, events=(1.0,), failure=None):
     mode = make_mode(-0.2 + 5j, np.array([1.0 + 0j]), np.array([1.0 + 0j]), ("sg1.machine.omega",))
     case = SimpleNamespace(table=SimpleNamespace(analysis=SimpleNamespace(modes={})))
-    prepared = SimpleNamespace(title="S", events=events, stop_time=5.0, case=case)
+    prepared = SimpleNamespace(title="S", events=[t for t in events if t < 5], stop_time=5.0, case=case,
+                               not_reached=[t for t in events if t >= 5])  # fmt: skip
     modes = SimpleNamespace(
         prepared=prepared, modes=[mode], hidden=None, named={}, unnamed={}, misfits={},
         swing_of=lambda _: (["sg1"], ["sg2"]),
@@ -61,6 +62,34 @@ def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
     answer = of_run(result(findings, stable))
     assert (answer.verdict, answer.good) == (word, {"stable": True, "UNSTABLE": False}.get(word))
     assert remark in answer.remark
+
+
+@pytest.mark.parametrize(
+    ("events", "good", "remark"),
+    [
+        ((), True, "sg1 against sg2"),
+        ((4.9,), True, "settles until 5 s; sg1"),
+        ((1.0, 6.0), True, "settles until 5 s, before the events at 6 s; sg1"),
+        ((5.0, 6.0), None, "the run ends at 5 s, before its events (t = 5 s, 6 s)"),
+    ],
+)
+def test_a_run_that_ends_before_its_events_has_no_verdict(events, good, remark):
+    """A run has no events at its end; growth that it shows before stays told."""
+    run = result(events=events)
+    answer = of_run(run)
+    assert (answer.good, run.stable_in_simulation) == (good, good)
+    assert remark in answer.remark
+    grows = of_run(result([finding("growth")], events=events))
+    assert (grows.good, grows.verdict) == (False, "UNSTABLE")
+
+
+def test_a_run_that_is_stopped_before_its_event_says_so(tmp_path, capsys):
+    text = lines(capsys, "run", "two_area_rms", "--scenario", "pod_p", "--stop", "0.1", "--out", tmp_path)
+    assert "not known" in text[3]
+    assert "the run ends at 0.1 s, before its events (t = 1 s)" in " ".join(
+        " ".join(text[3:6]).replace("│", " ").split()
+    )
+    assert json.loads((tmp_path / "summary.json").read_text())["scenarios"][0]["answer"]["stable"] is None
 
 
 def test_stable_eigenvalues_are_no_verdict_of_a_run_with_a_fault():

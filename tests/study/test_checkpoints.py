@@ -22,11 +22,7 @@ from orchestrator.study.run import run_scenario
 STOP = 1.3
 """After both events of the scenario [s]."""
 
-KINDS = {
-    "python-backed": {},
-    "native": {"gfor.native": True},
-    "isolated": {"isolated": True},
-}
+KINDS = {"python-backed": {}, "native": {"gfor.native": True}, "isolated": {"isolated": True}}
 
 
 class KeptOnce(Checkpoints):

@@ -26,9 +26,9 @@ def typed(fmu, tmp_path, capfd, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def run(*words, **bound):
-        f_n = bound.get("f_n", 50.0)
+        f_n, depth = bound.get("f_n", 50.0), bound.pop("depth", 0.2)
         vendor.binding(tmp_path, **bound)
-        vendor.case(tmp_path, f_n)
+        vendor.case(tmp_path, f_n, depth=depth)
         code = main([*map(str, words)])
         out, err = capfd.readouterr()
         return code, out, re.sub(r"\s+", " ", err)
@@ -77,6 +77,19 @@ def test_sign_and_limit_are_found_alike(typed, bound, check, fault):
     assert REMEDIES[fault] in said
 
 
+@pytest.mark.parametrize(("i_max", "above"), [(0.65, True), (1.5, False)])
+def test_a_run_finds_a_limit_that_a_dip_exceeds(typed, i_max, above):
+    """It gives 0.6 pu at rest, and its limit is at 1.5 pu."""
+    _, out, _ = typed("run", "case.toml", "--scenario", "dip", "--stop", "1.2", "--out", "r", "--json", i_max=i_max)
+    found = [f for f in json.loads(out)[0]["findings"] if f["kind"] == "misfit"]
+    assert len(found) == above
+    for finding in found:
+        assert "gfor: above its current limit: " in finding["message"]
+        assert f"{i_max:g} pu is declared" in finding["message"]
+        assert 1 <= finding["time"] < 1.02
+        assert 0.7 < finding["mean"] < 0.9
+
+
 @pytest.mark.parametrize("bound", [{"v_n": 230.0}, {"rating": 4.0}])
 def test_another_rating_than_delivered_is_told(typed, fmu, bound, tmp_path):
     told = checked(typed, "binding", **bound)["binding"]
@@ -89,6 +102,68 @@ def test_another_rating_than_delivered_is_told(typed, fmu, bound, tmp_path):
             component.check(3, "fmi2DoStep", 0.1)
     finally:
         component.close()
+
+
+@pytest.mark.parametrize(
+    ("bound", "said"),
+    [
+        ({"v_n": 22.0}, "V_n"),
+        ({"v_n": 18.0}, "V_n"),
+        ({"rating": 1400.0}, "S_n = 1400 MVA, and the FMU's S_n is 1500 MVA"),
+    ],
+)
+def test_a_rating_a_little_off_is_named_and_is_the_likely_cause(typed, fmu, bound, said, tmp_path):
+    """10 per cent beside what the FMU has by itself: a limit of the declared size is then exceeded, or not reached."""
+    told = checked(typed, "binding", **bound)["binding"]
+    assert told["verdict"] == "remark"
+    assert said in told["evidence"]
+    if "v_n" in bound:
+        assert f"({bound['v_n']:g} kV, and 20 kV by itself)" in told["evidence"]
+    found = typed("run", "case.toml", "--out", "r", **bound, i_max=0.4)[2]
+    assert "above its current limit" in found
+    assert f"likely cause: the binding has {told['evidence'].removeprefix('the binding has ')}" in found
+
+
+@pytest.mark.parametrize(("i_max", "found"), [(1.05, True), (1.5, False)])
+def test_a_limit_that_is_exceeded_in_a_dip_alone_is_found_in_a_run(typed, i_max, found):
+    _, out, _ = typed("run", "case.toml", "--out", "r", "--json", i_max=i_max, depth=0.7)
+    told = [f for f in json.loads(out)[0]["findings"] if f["kind"] == "misfit"]
+    assert bool(told) is found
+    for finding in told:
+        assert finding["time"] > 0.5
+        assert 1.2 < finding["current"] < 1.6
+        assert "above its current limit" in finding["message"]
+        assert "; 1.05 pu is declared; " in finding["message"]
+
+
+@pytest.mark.slow
+def test_a_device_that_does_not_fit_its_binding_is_not_called_stable(typed):
+    _, shown, _ = typed("modes", "case.toml", "--black-box", i_max=0.4)
+    first = shown.split("└")[0]
+    assert "not known" in first
+    assert "above its current limit" in first
+    code, out, _ = typed("modes", "case.toml", "--black-box", "--json", "--fail-unstable", i_max=0.4)
+    assert code == 1
+    stability = json.loads(out)["scenarios"][0]["stability"]
+    assert stability["stable"] is None
+    assert stability["reason"] == "gfor does not fit its binding: above its current limit"
+    assert "stable" in typed("modes", "case.toml", "--black-box")[1].split("└")[0]
+
+
+@pytest.mark.slow
+def test_check_names_the_rating_beside_the_limit_that_is_exceeded(typed):
+    found = checked(typed, "limits", v_n=22.0, i_max=1.5)["limits"]
+    assert found["fault"] == "above its current limit"
+    assert "likely cause: the binding has another V_n" in found["evidence"]
+    assert "(22 kV, and 20 kV by itself)" in found["evidence"]
+    assert "likely cause" not in checked(typed, "limits", i_max=1.5)["limits"]["evidence"]
+
+
+@pytest.mark.slow
+def test_another_frequency_is_one_accusation(typed):
+    found = checked(typed, "rated_frequency", "power_balance", "signs", **WRONG)
+    assert [name for name, check in found.items() if check["fault"]] == ["rated_frequency"]
+    assert "because it failed in 'rated_frequency'" in found["signs"]["evidence"]
 
 
 def test_a_right_binding_is_not_accused(typed, fmu, tmp_path):
@@ -104,6 +179,25 @@ def test_a_right_binding_is_not_accused(typed, fmu, tmp_path):
         assert "the binding has" not in str(caught.value)
     finally:
         component.close()
+
+
+@pytest.mark.parametrize(
+    ("begins", "f_n"), [(0.0, 50.0), (0.0, 60.0), *(pytest.param(b, 50.0, marks=pytest.mark.slow) for b in (0.9, 50.0))]
+)
+def test_a_meter_that_settles_is_judged_where_it_has(typed, begins, f_n, tmp_path):
+    """It is honest however it begins, 0 or its frequency in place of 1; one for another frequency is found anyway."""
+    shown = vendor.device(tmp_path, METER_BEGINS=begins, FAULT_OMEGA_LAGS=0.03)
+    (tmp_path / "vendor.fmu").write_bytes(shown.read_bytes())
+    found = checked(typed, "rated_frequency", f_n=f_n)["rated_frequency"]
+    _, out, _ = typed("run", "case.toml", "--stop", "0.3", "--out", "r", "--json", f_n=f_n)
+    kinds = {finding["kind"]: finding["message"] for finding in json.loads(out)[0]["findings"]}
+    assert "loss_of_synchronism" not in kinds
+    if f_n == 50:
+        assert found["verdict"] == "pass"
+        assert "misfit" not in kinds
+    else:
+        assert found["fault"] == "wrong rated frequency"
+        assert found["evidence"] in kinds["misfit"]
 
 
 def test_units_that_a_binding_converts_are_not_accused(tmp_path):

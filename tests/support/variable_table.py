@@ -35,13 +35,7 @@ LEAFLETS = {
     "probe_a": ROOT / "fmus" / "probe" / "README.md",
     "probe_b": ROOT / "fmus" / "probe" / "README.md",
 }
-KINDS = {
-    Input: "input",
-    Output: "output",
-    Parameter: "parameter",
-    CalculatedParameter: "calculated",
-    State: "state",
-}
+KINDS = {Input: "input", Output: "output", Parameter: "parameter", CalculatedParameter: "calculated", State: "state"}
 
 
 def variable_table(model: Model) -> str:

@@ -51,12 +51,13 @@ def binding(folder: Path, f_n: float = 50.0, v_n: float = V_N, rating: float = R
     return path
 
 
-def case(folder: Path, f_n: float = 50.0, changed: str = "") -> Path:
+def case(folder: Path, f_n: float = 50.0, changed: str = "", depth: float = 0.2) -> Path:
     """The device at an infinite bus that dips."""
     text = (Path(infinite_bus.__file__).parent / "case.toml").read_text(encoding="utf-8")
     text = text.replace('model = "gfor"\n', f'fmu = "vendor.fmu"\nbinding = "vendor.toml"\n{changed}')
     text = text.replace("parameters = { P_0 = 9.0,", f'parameters = {{ f_n = "{f_n} Hz", P_0 = 9.0,')
     text = text.replace('stop_time = "5 s"', 'stop_time = "2 s"').partition("[scenarios.load_step]")[0]
+    text = text.replace("value = 0.2\n", f"value = {depth}\n")
     path = folder / "case.toml"
     path.write_text(text, encoding="utf-8")
     return path

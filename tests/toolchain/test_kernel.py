@@ -312,13 +312,7 @@ def test_compiled_kernel_computes_what_casadi_computes():
         np.testing.assert_allclose(got, expected, rtol=1e-15, err_msg=f"{a}, {b}")
 
 
-@pytest.mark.parametrize(
-    "kernel",
-    [
-        "compiled",
-        "python",
-    ],
-)
+@pytest.mark.parametrize("kernel", ["compiled", "python"])
 def test_the_branch_not_taken_may_be_undefined(kernel):
     model = algebra({"y": lambda a, b: ca.if_else(a > 0, 1 / a, b)})
     code, z = KERNELS[kernel](model), vector(model, a=0.0, b=7.0)

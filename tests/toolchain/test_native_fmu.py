@@ -195,12 +195,7 @@ def derivative_of(unknown, known):
 
 # name: (initialised first, call, status that the standard asks for, words of the log)
 BAD = {
-    "read an unknown reference": (
-        True,
-        lambda h: h.fmu.getReal([UNKNOWN]),
-        ERROR,
-        "no variable with value reference",
-    ),
+    "read an unknown reference": (True, lambda h: h.fmu.getReal([UNKNOWN]), ERROR, "no variable with value reference"),
     "set an unknown reference": (True, lambda h: h.fmu.setReal([999], [1.0]), ERROR, "value reference 999"),
     "read an output as Integer": (True, lambda h: h.fmu.getInteger([h.vr["p"]]), ERROR, "p is no Integer variable"),
     "read a Boolean as Real": (True, lambda h: h.fmu.getReal([h.vr["connected"]]), ERROR, "connected is no Real"),
@@ -211,12 +206,7 @@ BAD = {
     "NaN as a state": (True, lambda h: h.set(droop__P_f=math.nan), DISCARD, "droop.P_f"),
     "parameter NaN": (True, lambda h: h.set(pod_p__K=math.nan), DISCARD, r"pod_p.K = -?nan; it must be a finite"),
     "parameter too low": (True, lambda h: h.set(pod_p__K=-1.0), DISCARD, "pod_p.K = -1; it must be at least 0"),
-    "parameter too high": (
-        True,
-        lambda h: h.set(pod_p__K=1e6),
-        DISCARD,
-        r"pod_p.K = 1e\+06; it must be at most 1",
-    ),
+    "parameter too high": (True, lambda h: h.set(pod_p__K=1e6), DISCARD, r"pod_p.K = 1e\+06; it must be at most 1"),
     "Integer too high": (False, lambda h: h.fmu.setInteger([h.vr["pod_p.N_S"]], [4]), DISCARD, "at most 3"),
     "step of zero": (True, lambda h: h.fmu.doStep(0.0, 0.0), ERROR, "step size 0 s; it must exceed 0"),
     "negative step": (True, lambda h: h.fmu.doStep(0.0, -H), ERROR, "step size -0.0001 s; it must exceed 0"),

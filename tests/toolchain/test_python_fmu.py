@@ -48,7 +48,7 @@ ALL_PATHS_OPEN = {
 } | {f"synchronous_generator_{e}_phasor": {"communication_step": 5e-3, "machine.X_q2": 0.3} for e in EXCITERS}
 # Inputs without which nothing in a model moves.
 FED = {
-    "two_area_phasor_grid": {f"sg1.{k}": v for k, v in (("e_re", 1.0), ("e_im", 0.2), ("y_re", 1.0), ("y_im", -50.0))},
+    "two_area_phasor_grid": {f"sg1.{k}": v for k, v in (("e_re", 1.0), ("e_im", 0.2), ("y_re", 1.0), ("y_im", -50.0))}
 }
 # Outputs that reach some listed states only where a block is left out (time constant 0).
 BEHIND_LEFT_OUT_BLOCKS = {"P_m"}
@@ -105,12 +105,7 @@ def test_equal_models_give_equal_files_at_any_time(name, tmp_path, monkeypatch):
     assert one.read_bytes() == two.read_bytes()
 
 
-CHANGES = [
-    {"gain": 2.5},
-    {"text": "Another gain"},
-    {"slope": 3.0},
-    {"rule": "raise K above 0"},
-]
+CHANGES = [{"gain": 2.5}, {"text": "Another gain"}, {"slope": 3.0}, {"rule": "raise K above 0"}]
 
 
 @pytest.mark.parametrize("change", CHANGES, ids=str)

@@ -39,12 +39,7 @@ def _terminated_step(h, _):
 
 # name: (initialised first, what is done, words of the log, status of a proper step afterwards)
 MISUSES = {
-    "read an unknown reference": (
-        True,
-        lambda h, _: h.fmu.getReal([999]),
-        r"reading value references \[999\]",
-        ERROR,
-    ),
+    "read an unknown reference": (True, lambda h, _: h.fmu.getReal([999]), r"reading value references \[999\]", ERROR),
     "read the largest reference": (True, lambda h, _: h.fmu.getReal([UNKNOWN]), "reading value references", ERROR),
     "set an unknown reference": (
         True,
@@ -239,13 +234,7 @@ def test_the_process_outlives_all_misuse(kernel, extracted):
     assert (code, "end" in report) == (0, True), stderr
 
 
-@pytest.mark.parametrize(
-    "kernel",
-    [
-        "compiled",
-        "python",
-    ],
-)
+@pytest.mark.parametrize("kernel", ["compiled", "python"])
 def test_a_broken_rule_is_named_even_where_initialisation_divides_by_zero(kernel, open_host, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_KERNEL", kernel)
     h = open_host(GENERATOR)

@@ -143,6 +143,14 @@ def test_chance_makes_no_decay_of_an_irregular_swing_that_lasts(seed):
     assert finding.kind == "sustained_oscillation"
 
 
+@pytest.mark.parametrize(("lasts", "kinds"), [(40.0, {"sustained_oscillation"}), (6.0, set())])
+def test_a_slow_irregular_swing_is_told_by_how_often_it_passes_its_middle(lasts, kinds):
+    """About once in a second: often enough in 40 s, and not in 6 s."""
+    coarse = np.random.default_rng(3).standard_normal(200)
+    told = found(lambda t: 0.02 * np.interp(t, 0.5 * np.arange(200), coarse), lasts)
+    assert {f.kind for f in told} & {"sustained_oscillation"} == kinds
+
+
 @pytest.mark.parametrize(("early", "late", "why"), [(-0.05, 0.25, "in one half of its end it decays"), (0.3, 0.1, "")])
 def test_one_half_that_decays_is_enough_for_a_doubt(early, late, why):
     """The rate changes in the middle of the end; over the whole of it the strongest oscillation grows either way."""

@@ -79,8 +79,7 @@ def test_the_papers_scenarios_are_silent(scenario):
 
 
 @pytest.mark.parametrize(
-    ("case", "rate"),
-    [("two_area_rms", 0.033), pytest.param("two_area", 0.0285, marks=pytest.mark.slow)],
+    ("case", "rate"), [("two_area_rms", 0.033), pytest.param("two_area", 0.0285, marks=pytest.mark.slow)]
 )
 def test_the_papers_base_case_grows_after_its_load_step(case, rate):
     (finding,) = findings(case, "base")

@@ -111,3 +111,20 @@ def test_a_frequency_of_another_scale_is_no_slip_and_a_slip_from_the_start_stays
     assert rescaled(still, misfits).values["plant.omega"] == pytest.approx(1.0)
     assert rescaled(turning, misfits).values["plant.omega"] == pytest.approx(5 / 6)
     assert rescaled(still, {}).values["plant.omega"] == pytest.approx(5 / 6)
+
+
+@pytest.mark.parametrize("begins", [0.0, 0.9, 50.0])
+def test_a_meter_that_settles_is_no_slip_and_what_follows_is_seen(begins):
+    """Its current stands still; a slip from 1.5 s on moves it, and one that begins like a meter does as well."""
+
+    def omega(t):
+        return 1 + (begins - 1) * np.exp(-t / 0.05) + np.where(t > 1.5, 0.3, 0.0)
+
+    resting = {"plant.omega": omega, "plant.i_re": lambda t: np.where(t > 1.5, np.cos(9 * t), 1.0),
+               "plant.i_im": lambda t: 0 * t}  # fmt: skip
+    seen = seen_of(resting, 2.0)
+    found = rescaled(seen, {}).values["plant.omega"]
+    assert found[seen.times < 1.5] == pytest.approx(1.0, abs=2e-4)
+    assert found[seen.times > 1.51] == pytest.approx(1.3)
+    turning = seen_of({**resting, "plant.i_re": lambda t: np.cos(60 * t)}, 2.0)
+    assert rescaled(turning, {}).values["plant.omega"] == pytest.approx(turning.values["plant.omega"])

@@ -17,39 +17,24 @@ from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject
 from orchestrator.arrays import Complex
 from orchestrator.errors import ComponentError
 
-_POINT = OperatingAt(1.0, 0.0, 0.4, 0.05)
-"""With so little power that a converter comes back from most disturbances."""
+_POINT = OperatingAt(1.0, 0.0, 0.4, 0.05)  # with so little power that a converter comes back from most disturbances
+_PROBE = 0.3  # duration [s] of each small change: 1.5 % less voltage, a jump of 1.5°, 0.1 % less frequency
+_CHANGED = 0.05  # part of an answer to a small change by which it may differ after a disturbance
+_BACK = 5e-4  # distance of the current from where it was [pu, S_n] at which it has come back
 
-_PROBE = 0.3
-"""Duration [s] of each small change: 1.5 % less voltage, a jump of 1.5°, 0.1 % less frequency."""
+_WINDOW, _WINDOWS = 0.1, 60  # time [s] from one look to the next, and how often it is looked whether it has come back
 
-_CHANGED = 0.05
-"""Part of an answer to a small change by which it may differ after a disturbance."""
-
-_BACK = 5e-4
-"""Distance of the current from where it was [pu, S_n] at which it has come back."""
-
-_WINDOW, _WINDOWS = 0.1, 60
-"""Time [s] from one look to the next, and how often it is looked whether it has come back."""
-
-_LOST, _GIVEN_UP = 0.3, 20
-"""Distance [pu, S_n] at which no more is looked after so many windows."""
+_LOST, _GIVEN_UP = 0.3, 20  # distance [pu, S_n] at which no more is looked after so many windows
 
 _STILL, _ELSEWHERE, _NOTHING = 1e-4, 0.01, 0.01
 """Movement in a window [pu, S_n] of a device at rest; distance that is another rest; current of one that gives none."""
 
-_LATCHED = 0.9
-"""Part of the current limit, or of the rating, from which a device at rest may be held by its limit."""
-
+_LATCHED = 0.9  # part of the current limit, or of the rating, from which a device at rest may be held by its limit
 _LEAST = 32.0
 """Bytes kept by each step of a dip that count as a leak; a new page of the heap is up to 12 in some hundred steps."""
 
-_BLOCKS = 5
-"""Parts of a disturbance, between which the memory is read."""
-
-_PART = 0.75
-"""Time to spend, in parts of the time for which an FMU is made to run."""
-
+_BLOCKS = 5  # parts of a disturbance, between which the memory is read
+_PART = 0.75  # time to spend, in parts of the time for which an FMU is made to run
 _EVENTS = (("deep", 0.45), ("jump", 0.15), ("middle", 0.2), ("swell", 0.2), ("low", 0.15), ("small jump", 0.2))
 """Kinds of disturbances, and how long they last [s]."""
 
@@ -75,24 +60,12 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class _After:
-    """What a disturbance left behind.
-
-    Attributes
-    ----------
-    away
-        Distance of the current from where it was [pu, S_n].
-    changed
-        By which part of it the answer to a small change differs, and to which.
-    kept
-        Bytes kept by each step meanwhile.
-    """
-
     words: str
     end: _End
-    away: float = 0.0
-    changed: float = 0.0
+    away: float = 0.0  # distance of the current from where it was [pu, S_n]
+    changed: float = 0.0  # by which part of it the answer to a small change differs, and to which
     of: str = ""
-    kept: float = 0.0
+    kept: float = 0.0  # bytes kept by each step meanwhile
 
 
 @check("after_dips", "Is it after dips and jumps what it was before?", needs=SAME)

@@ -7,6 +7,7 @@ from orchestrator.acceptance.checks import (
     file,
     initialisation,
     instances,
+    late,
     loading,
     points,
     port,
@@ -22,7 +23,7 @@ from orchestrator.acceptance.checks import (
 
 MODULES = (
     *(file, loading, running, initialisation, instances, state, sampling, timing, tuning),
-    *(port, points, signs, ride_through, aftermath, extremes, resources),
+    *(port, late, points, signs, ride_through, aftermath, extremes, resources),
 )
 """Importing them enters their checks."""
 
@@ -32,9 +33,9 @@ ORDER = (
     "reset", "reinstantiation",
     "state", "settable_states", "state_size", "tunables", "feedthrough", "sample_time", "delay", "step_invariance",
     "internal_step",
-    "steady_state", "rated_frequency", "power_balance", "operating_points", "ratings", "signs", "limits", "after_dips",
+    "steady_state", "later_times", "rated_frequency", "power_balance", "shown_power", "operating_points", "ratings",
+    "signs", "limits", "after_dips",
     "nan_input", "extreme_inputs", "memory",
 )  # fmt: skip
 
-CHECKS = {name: base.CHECKS[name] for name in ORDER}
-"""By name."""
+CHECKS = {name: base.CHECKS[name] for name in ORDER}  # by name

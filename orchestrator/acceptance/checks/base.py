@@ -29,27 +29,14 @@ class Whose(StrEnum):
 
 @dataclass(frozen=True)
 class CheckResult:
-    """What one check found.
-
-    Attributes
-    ----------
-    fault
-        Name of what is wrong, or not supported; else empty.
-    evidence
-        What was seen, with figures; for `NOT_APPLICABLE` the reason.
-    figures
-        The measured figures, for programs.
-    whose
-        Whether it is the FMU that is wrong, this program or machine that lacks something, or a call that FMI forbids
-        and only the check makes.
-    """
-
     check: str
     verdict: Verdict
-    evidence: str
-    fault: str = ""
+    evidence: str  # what was seen, with figures; for `NOT_APPLICABLE` the reason
+    fault: str = ""  # name of what is wrong, or not supported; else empty
     remedy: str = ""
-    figures: dict[str, Any] = field(default_factory=dict)
+    figures: dict[str, Any] = field(default_factory=dict)  # the measured figures, for programs
+    # whether it is the FMU that is wrong, this program or machine that lacks something, or a call that FMI forbids and
+    # only the check makes
     whose: Whose = Whose.NOBODY
 
     def as_dict(self) -> dict[str, Any]:
@@ -80,12 +67,10 @@ class Check:
     run: Callable[[Subject], CheckResult]
 
 
-CHECKS: dict[str, Check] = {}
-"""All checks by name, in the order in which they run."""
+CHECKS: dict[str, Check] = {}  # all checks by name, in the order in which they run
 
 
-SAME = ("independence", "repeatability")
-"""What must hold for two runs to be compared."""
+SAME = ("independence", "repeatability")  # what must hold for two runs to be compared
 
 
 def check(
@@ -113,12 +98,8 @@ def remarked(name: str, evidence: str, remedy: str, **figures: Any) -> CheckResu
 def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
     """A check that found a fault of the FMU.
 
-    Parameters
-    ----------
-    fault
-        A key of `REMEDIES`, which has the remedy for it.
-    figures
-        What was measured, for the report: plain values by name.
+    ``fault``: A key of `REMEDIES`, which has the remedy for it.
+    ``figures``: what was measured, for the report: plain values by name.
     """
     return CheckResult(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
 

@@ -18,9 +18,7 @@ VOLTAGE = 0.02
 FREQUENCY = 0.001
 """Changes [pu] that are made, up and down; half the difference of both answers has no terms of second order."""
 
-CHARGING = OperatingAt(1.0, 0.0, -0.6, 0.1)
-"""While it takes active power."""
-
+CHARGING = OperatingAt(1.0, 0.0, -0.6, 0.1)  # while it takes active power
 _FURTHER = (OperatingAt(1.0, 0.0, 0.2, 0.02), OperatingAt(1.0, 0.0, 0.2, 0.3), OperatingAt(1.0, 0.0, -0.5, 0.1))
 _FURTHER_ABSORBING = (
     OperatingAt(1.0, 0.0, 0.2, -0.25),
@@ -28,11 +26,8 @@ _FURTHER_ABSORBING = (
     OperatingAt(1.0, 0.0, -0.5, -0.3),
 )
 
-SETTLED = 1e-3
-"""Power [pu, S_n] by which an answer may still move."""
-
-_GOOD = 0.2
-"""Largest error of the law, in parts of what the droop does where the frequency changes."""
+SETTLED = 1e-3  # power [pu, S_n] by which an answer may still move
+_GOOD = 0.2  # largest error of the law, in parts of what the droop does where the frequency changes
 
 
 def further(point: OperatingAt) -> tuple[OperatingAt, ...]:
@@ -42,28 +37,15 @@ def further(point: OperatingAt) -> tuple[OperatingAt, ...]:
 
 @dataclass(frozen=True)
 class Way:
-    """What a change in one direction brings.
-
-    Attributes
-    ----------
-    power
-        Change of the power in the end [pu, S_n].
-    moving
-        How much P and Q still move in the end [pu, S_n].
-    far
-        How far they go away at most [pu, S_n].
-    omega, omega_moving
-        Its frequency in the end, and how much that still moves [pu]; None for an FMU that does not say it.
-    ringing
-        How far P or Q swings about its course in the middle and in the end, from crest to trough [pu, S_n], and how
-        often that changes its sign in the end.
-    """
-
-    power: complex
-    moving: float
-    far: float
+    power: complex  # change of the power in the end [pu, S_n]
+    moving: float  # how much P and Q still move in the end [pu, S_n]
+    far: float  # how far they go away at most [pu, S_n]
+    # omega, omega_moving: its frequency in the end, and how much that still moves [pu]; None for an FMU that does not
+    # say it
     omega: float | None
     omega_moving: float
+    # how far P or Q swings about its course in the middle and in the end, from crest to trough [pu, S_n], and how often
+    # that changes its sign in the end
     ringing: tuple[float, float, int]
 
 

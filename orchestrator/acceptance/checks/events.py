@@ -16,8 +16,7 @@ EPISODE = 1.2
 _HOLD, _WIGGLE = 10, 0.3
 """Small steps beside the events: for how many steps they stay, and their height in parts of the usual one."""
 
-_SPENT = 1.0
-"""Time [s] that events may take."""
+_SPENT = 1.0  # time [s] that events may take
 
 _FAINT = 1e-3
 """Relative difference of two runs with events that counts where they differ slightly without: dips amplify it."""
@@ -27,11 +26,9 @@ RANGES = {
 }  # fmt: skip
 """Bounds of the voltage [pu] by kind."""
 
-JUMPS = {"jump": (26.0, 70.0), "small jump": (10.0, 24.0)}
-"""Bounds of a phase jump's size [°], of either sign, by kind."""
+JUMPS = {"jump": (26.0, 70.0), "small jump": (10.0, 24.0)}  # bounds of a phase jump's size [°], of either sign, by kind
 
-Segment = tuple[complex, float]
-"""A factor on the voltage, and for how long [s]."""
+Segment = tuple[complex, float]  # A factor on the voltage, and for how long [s]
 
 
 def factor(draw: np.random.Generator, kind: str) -> complex:
@@ -64,14 +61,9 @@ def rows(
 ) -> Numbers:
     """Deviations of the inputs, one row a step, with small random steps of every input beside the events.
 
-    Parameters
-    ----------
-    segments
-        What the voltage is multiplied by, one after another.
-    purpose
-        For what; each purpose has other random steps.
-    point
-        Where it starts; the subject's own point where None.
+    ``segments``: what the voltage is multiplied by, one after another.
+    ``purpose``: for what; each purpose has other random steps.
+    ``point``: where it starts; the subject's own point where None.
     """
     counts = [max(1, round(times * lasts / subject.step_size)) for _, lasts in segments]
     total, wide = sum(counts), len(subject.inputs)

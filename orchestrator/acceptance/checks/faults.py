@@ -74,5 +74,6 @@ REMEDIES = {
     "rests elsewhere": "look for integrators that wind up in a dip, and for references that are not set back after it",
     "does not start": "it must start from a power flow within its ratings",
     "no steady state": "it must compute its states from the power flow; otherwise let it settle before linearising",
+    "counts time": "look for a clock in single precision, or for what acts at a time of its own; it must be a double",
     "leaves its steady state": "something in it counts time, or adds up what never ends; ask the author",
 }

@@ -10,13 +10,9 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
 
-_LATE = 1e-3
-"""Part of an output's size by which it may change as initialisation ends; 1e-6 is worth a remark."""
-
+_LATE = 1e-3  # part of an output's size by which it may change as initialisation ends; 1e-6 is worth a remark
 _CLEAR = 1e-6
-
-_ELSEWHERE = POINTS[1]
-"""Another operating point: at its own, an FMU may start from what it declares."""
+_ELSEWHERE = POINTS[1]  # another operating point: at its own, an FMU may start from what it declares
 
 
 @check("initial_outputs", "Are its outputs there before initialisation ends?")

@@ -15,10 +15,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
 
 _OTHER = OperatingAt(v=1.03, theta=0.4, P=0.7, Q=-0.1)
-
-_CHUNK = 50
-"""Steps that one instance does before the other one's turn comes."""
-
+_CHUNK = 50  # steps that one instance does before the other one's turn comes
 IN_EVENTS, NOT_IN_EVENTS = ", in dips and jumps as well", "; not judged in dips and jumps, which it refuses"
 
 
@@ -47,10 +44,8 @@ def independence(subject: Subject) -> CheckResult:
 def _first_fault(subject: Subject, look: Callable[[Subject, Setting], CheckResult]) -> CheckResult:
     """The first fault that is found with some parameters set, or else the result with the parameters as they are.
 
-    Raises
-    ------
-    ComponentError
-        With the parameters as they are; a setting with which the FMU does not work is passed over.
+    Raises a `ComponentError` with the parameters as they are; a setting with which the FMU does not work is passed
+    over.
     """
     results = []
     for found, said in with_each_setting(subject, lambda setting: look(subject, setting)):

@@ -25,20 +25,15 @@ from orchestrator.fmi.port import BoundDescription
 _IDLE = OperatingAt(1.0, 0.1, 0.0, 0.0)
 _FULL = (OperatingAt(1.02, 0.2, 1.0, 0.0), OperatingAt(1.02, -0.3, -1.0, 0.0))
 
-_APART = 0.0037
-"""Difference of the power of two points [pu, S_n], which no setting in steps of 1 % can show."""
+_APART = 0.0037  # difference of the power of two points [pu, S_n], which no setting in steps of 1 % can show
+_RESTS = 2000  # steps for which it is watched at each point
 
-_RESTS = 2000
-"""Steps for which it is watched at each point."""
-
-_SMALLER, _LARGER = (0.3, 0.42), (2.2, 3.5)
-"""Bounds of other ratings, in parts of its own."""
+_SMALLER, _LARGER = (0.3, 0.42), (2.2, 3.5)  # bounds of other ratings, in parts of its own
 
 _DIP, _DIP_LASTS, _CYCLE = 0.05, 0.15, 0.02
 """Voltage of the dip that shows the limit at another rating [pu], its duration and the time of the mean [s]."""
 
-_STAYS = 0.25
-"""Part by which a current in a dip may miss the limit of another rating, and be that limit."""
+_STAYS = 0.25  # part by which a current in a dip may miss the limit of another rating, and be that limit
 
 
 def _points(subject: Subject) -> Iterator[tuple[str, OperatingAt]]:

@@ -1,6 +1,7 @@
 """Whether a converter at its port does what a power flow expects of it."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isinf
 from time import perf_counter
@@ -24,17 +25,11 @@ POINTS = (
     OperatingAt(1.0, 2.0, 0.6, 0.0),
     OperatingAt(1.01, -2.5, 0.4, -0.2),
 )
-IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0.1))
-"""Points at which it takes power."""
-
-DRIFT = 1e-3
-"""Movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark."""
-
-_PART = 0.75
-"""Wall-clock time to spend on a long rest, in parts of the time for which an FMU is made to run."""
-
-_GOES_ON = 0.4
-"""Part of a movement that its second half has where it goes on; of a ramp it is a half."""
+IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0.1))  # points at which it takes power
+DRIFT = 1e-3  # movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark
+ANSWER = 400  # steps of the answer that is compared at several times
+_PART = 0.75  # wall-clock time to spend on a long rest, in parts of the time for which an FMU is made to run
+_GOES_ON = 0.4  # part of a movement that its second half has where it goes on; of a ramp it is a half
 
 WHY = {
     "no port": "because it has no port: give a binding with --binding (`gfor bind` drafts one), or, around a "
@@ -127,6 +122,9 @@ def steady_state(subject: Subject) -> CheckResult:
                 worst = max(worst, float(np.nan_to_num(moved, nan=np.inf).max()))
                 if rest is None and worst <= DRIFT:
                     rest = _rest(subject, running, begin, steps)
+                    with suppress(ComponentError, EndedError):
+                        late = running.record(affordable(subject, ANSWER), subject.step_size, subject.one_step())
+                        subject.memory["rested"] = point, rest, late
         except ComponentError as error:
             refused.append(str(error))
     if len(refused) == 3:

@@ -17,26 +17,17 @@ from orchestrator.errors import ComponentError
 _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
 """When something happens [s]: a timer or a counter in an FMU may run out between two of them."""
 
-_LASTS = 0.15
-"""Duration of a disturbance [s]; a fault is cleared within it."""
+_LASTS = 0.15  # duration of a disturbance [s]; a fault is cleared within it
+_LONG = ((0.8, 0.9), 1.0, 2.0)  # A dip that stays: to what voltage [pu], when [s], how long [s]
+_DEEP = ((0.17, 0.21), 1.0, 0.5)  # A deep dip that outlasts a fault that is cleared in time
 
-_LONG = ((0.8, 0.9), 1.0, 2.0)
-"""A dip that stays: to what voltage [pu], when [s], how long [s]."""
-
-_DEEP = ((0.17, 0.21), 1.0, 0.5)
-"""A deep dip that outlasts a fault that is cleared in time."""
-
-_BLOCKED, _GIVES = 0.02, 0.1
-"""Current [pu, S_n] of a device that blocks, and of one that gives any."""
+_BLOCKED, _GIVES = 0.02, 0.1  # current [pu, S_n] of a device that blocks, and of one that gives any
 
 _BLOCKS_FOR = 0.06
 """Time [s] without current at a healthy voltage from which a device blocks: zero crossings of its power are shorter."""
 
-_HEALTHY = 0.9
-"""Voltage [pu] at which a device has to stay on."""
-
-_CYCLE = 0.02
-"""Time [s] over which a current is averaged: what heats the semiconductors and what protection sees."""
+_HEALTHY = 0.9  # voltage [pu] at which a device has to stay on
+_CYCLE = 0.02  # time [s] over which a current is averaged: what heats the semiconductors and what protection sees
 
 NO_LIMIT = 3.3
 """Current [pu, S_n] over the last cycle of a disturbance that no converter with a current limit gives.
@@ -55,8 +46,7 @@ _BACK = 0.3
 _AT_LEAST = 4
 """Runs that are made however long they take: at all times, dips that stay, and while power flows the other way."""
 
-_PART = 1.5
-"""Wall-clock time to spend, in parts of the time for which an FMU is made to run."""
+_PART = 1.5  # wall-clock time to spend, in parts of the time for which an FMU is made to run
 
 
 @dataclass(frozen=True)
@@ -75,28 +65,14 @@ class Disturbance:
 
 @dataclass(frozen=True)
 class Answer:
-    """What an event brought [pu, S_n].
-
-    Attributes
-    ----------
-    peak
-        The largest current.
-    mean
-        Over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after that.
-    away
-        Distance of the current from where it was, afterwards.
-    blocked
-        Time [s] without current at a healthy voltage, where it gives current before and after.
-    gone
-        Whether it gives no current in the end.
-    """
+    """What an event brought [pu, S_n]."""
 
     event: Disturbance
-    peak: float
-    mean: float
-    away: float
-    blocked: float
-    gone: bool
+    peak: float  # the largest current
+    mean: float  # over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after that
+    away: float  # distance of the current from where it was, afterwards
+    blocked: float  # time [s] without current at a healthy voltage, where it gives current before and after
+    gone: bool  # whether it gives no current in the end
 
 
 def _runs(draw: np.random.Generator) -> Iterator[list[Disturbance]]:

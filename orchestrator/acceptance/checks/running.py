@@ -14,29 +14,15 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 
-RUN_FOR = 2.0
-"""Time [s] for which an FMU is made to run."""
+RUN_FOR = 2.0  # time [s] for which an FMU is made to run
+_PATIENCE = 10.0  # how many times as long it may take to come to its experiment's end
+_LOADED = 4.0  # how many times as long a run may take as it computes, on a machine that is busy with other things
+_HELD, _ROUNDS = 50, 4  # steps for which inputs stay; how often they change before it is looked at the clock
 
-_PATIENCE = 10.0
-"""How many times as long it may take to come to its experiment's end."""
-
-_LOADED = 4.0
-"""How many times as long a run may take as it computes, on a machine that is busy with other things."""
-
-_HELD, _ROUNDS = 50, 4
-"""Steps for which inputs stay; how often they change before it is looked at the clock."""
-
-_LOOK = 2.5
-"""Simulated time [s] from one look at its memory to the next."""
-
-LONGEST = 60.0
-"""Simulated time [s] after which enough was seen."""
-
-LEAST_STEPS = 20
-"""An FMU that ends by itself before that many steps has shown nothing."""
-
-EQUAL = 1e-10
-"""Relative difference up to which two runs are equal."""
+_LOOK = 2.5  # simulated time [s] from one look at its memory to the next
+LONGEST = 60.0  # simulated time [s] after which enough was seen
+LEAST_STEPS = 20  # an FMU that ends by itself before that many steps has shown nothing
+EQUAL = 1e-10  # relative difference up to which two runs are equal
 
 
 @check("runs", "Does it run without crash, hang, exit, NaN or infinite values?")

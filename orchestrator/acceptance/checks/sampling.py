@@ -8,24 +8,12 @@ from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.errors import ComponentError
 
-_FINER = 8
-"""It is also looked at with steps so many times smaller."""
-
-_IDLE = 2.01
-"""Steps from one change to the next above which more than half of all steps do nothing."""
-
-_LENGTHS = (200, 2000, 20000)
-"""Steps of a run; the next longer one where the last one saw too few changes."""
-
-_SINGLE = 400
-"""Steps of a run in which every input is set, and every output read, by itself."""
-
-_CHANGES = 4
-"""Times from change to change that a sample time takes to be seen."""
-
-_MOST_MOVE = 0.7
-"""Part of all steps that must move the outputs for a step that does not to be a step that was skipped."""
-
+_FINER = 8  # it is also looked at with steps so many times smaller
+_IDLE = 2.01  # steps from one change to the next above which more than half of all steps do nothing
+_LENGTHS = (200, 2000, 20000)  # steps of a run; the next longer one where the last one saw too few changes
+_SINGLE = 400  # steps of a run in which every input is set, and every output read, by itself
+_CHANGES = 4  # times from change to change that a sample time takes to be seen
+_MOST_MOVE = 0.7  # part of all steps that must move the outputs for a step that does not to be a step that was skipped
 _MOST_STEPS = 1.05
 """Mean number of steps from change to change up to which it is every step; it may rest where a number is rounded."""
 

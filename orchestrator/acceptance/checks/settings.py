@@ -9,8 +9,7 @@ from orchestrator.fmi.description import VariableInfo
 
 Look = TypeVar("Look")
 
-Setting = Mapping[str, float | bool]
-"""Values of parameters by their names."""
+Setting = Mapping[str, float | bool]  # values of parameters by their names
 
 
 def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | bool]:
@@ -45,9 +44,7 @@ def _may_be_a_flag(info: VariableInfo) -> bool:
 
 
 _NO_UNIT = ("", "1", "-", "n/a", "na", "none", "unitless", "flag", "bool", "mode")
-
-_MOST_SWITCHES = 3
-"""Switches that are tried one by one; where there are more, all together as well."""
+_MOST_SWITCHES = 3  # switches that are tried one by one; where there are more, all together as well
 
 
 def _settings(subject: Subject) -> list[dict[str, float | bool]]:

@@ -24,12 +24,11 @@ from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex, Numbers
-from orchestrator.binding.misfits import of_frequency, omega_seen
+from orchestrator.binding.misfits import SLIGHT, at_rest, of_frequency, omega_seen
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
-_LASTS = 3.0
-"""Time [s] in which an answer settles."""
+_LASTS = 3.0  # time [s] in which an answer settles
 
 _EARLY = (0.005, 0.025)
 """Cycle in which a converter is still the source behind its impedance that it was; oscillations of the network's
@@ -38,39 +37,24 @@ frequency have no mean over it."""
 _MORE = 0.97
 """Reactive power in the end, in parts of the first cycle's, from which it is looked closer: a droop leaves less."""
 
-_SOME = 1e-3
-"""Change of power [pu, S_n] that is an answer."""
-
-_SETTLED = 0.05
-"""Part of an answer by which it may still move."""
-
-_AWAY = 0.5
-"""Power [pu, S_n] by which it may differ after such small changes, and be stable."""
-
-_LOST = 0.02
-"""Power [pu, S_n] that still moves where an angle runs; an answer that settles slowly moves less."""
-
-_EACH = 5e-3
-"""Power [pu, S_n] of the wrong sign after a change in one direction, which has terms of second order."""
-
-_EVEN = 3.0
-"""How many times its answer to the frequency may be larger with power in one direction than in the other."""
-
+_SOME = 1e-3  # change of power [pu, S_n] that is an answer
+_SETTLED = 0.05  # part of an answer by which it may still move
+_AWAY = 0.5  # power [pu, S_n] by which it may differ after such small changes, and be stable
+_LOST = 0.02  # power [pu, S_n] that still moves where an angle runs; an answer that settles slowly moves less
+_EACH = 5e-3  # power [pu, S_n] of the wrong sign after a change in one direction, which has terms of second order
+_EVEN = 3.0  # how many times its answer to the frequency may be larger with power in one direction than in the other
 _RINGS, _DAMPED, _TOLD = 1e-3, 0.8, 0.5
 """Swing [pu, S_n] in the end that counts; parts of the swing before from which it is not damped, and is told."""
 
-_CROSSINGS = 6
-"""Changes of sign in a third of the time, from which a swing is fast enough to be judged in it."""
-
+_CROSSINGS = 6  # changes of sign in a third of the time, from which a swing is fast enough to be judged in it
 _OMEGA_APART = 2e-4
 """Deviation of a settled omega from the network's [pu]: a fifth of the change; a wrong sign or base leaves 0.6 or more
 of the change, a frequency meter's own error far less."""
 
 _DROOP_OF_Q = "the sign of its droop of reactive power"
-_SIGNS, _WORDS = (1.0, -1.0), ("less", "more")
-"""Of the changes of voltage and frequency."""
+_SIGNS, _WORDS = (1.0, -1.0), ("less", "more")  # of the changes of voltage and frequency
 
-_OMEGA = 1e-3
+_NEEDS = (*SAME, "rated_frequency", "power_balance")
 _PLAIN = ("pu", "p.u.", "1")
 
 
@@ -83,14 +67,12 @@ def rated_frequency(subject: Subject) -> CheckResult:
         )
     steps = affordable(subject, 2000)
     with subject.running() as running:
-        omega = running.hold(np.zeros((1, len(running.rest))), steps, subject.step_size)[
-            :, subject.outputs.index("omega")
-        ]
-    rest = float(np.median(omega[-max(1, steps // 10) :]))
+        still, shown = np.zeros((1, len(running.rest))), subject.outputs.index("omega")
+        rest, settled = at_rest(lambda: running.hold(still, steps, subject.step_size)[:, shown])
     seen = omega_seen(rest)
-    if found := of_frequency(rest, _rated(subject)):
+    if settled and (found := of_frequency(rest, _rated(subject))):
         return failed("rated_frequency", found.fault, found.evidence, **found.figures)
-    if abs(rest - 1) > _OMEGA:
+    if abs(rest - 1) > SLIGHT:
         return remarked("rated_frequency", seen, "let it settle, or ask what omega is", omega=rest)
     return passed("rated_frequency", seen, omega=rest)
 
@@ -109,7 +91,7 @@ def _rated(subject: Subject) -> float:
     return float(subject.use.values.get("f_n", known))
 
 
-@check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=(*SAME, "power_balance"))
+@check("signs", "Do P and Q answer voltage and frequency with the right signs?", needs=_NEEDS)
 def signs(subject: Subject) -> CheckResult:
     """Small changes while it gives reactive power, while it takes some, and where a case uses it."""
     if not subject.port:

@@ -18,14 +18,9 @@ _CLEAR = 1e-6
 """Relative difference above which something was not restored; an integrator with memory may begin anew below it."""
 
 _EXACT = 1e-12
-
-_RESTARTED = 1e-2
-"""The same with dips and jumps, which amplify what an integrator leaves that begins anew."""
-
+_RESTARTED = 1e-2  # the same with dips and jumps, which amplify what an integrator leaves that begins anew
 _STEPS = 600
-
-_READ = 1e-9
-"""Relative difference of a state or parameter that is read just after it was restored."""
+_READ = 1e-9  # relative difference of a state or parameter that is read just after it was restored
 
 
 @check("state", "Does a saved state bring back everything?", needs=(*SAME, "reading"))

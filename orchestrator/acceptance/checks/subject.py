@@ -17,11 +17,9 @@ from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import START, BoundDescription
 
-Stimulus = Callable[[float], Numbers]
-"""Time [s] → the inputs' deviations from where they start."""
+Stimulus = Callable[[float], Numbers]  # time [s] → the inputs' deviations from where they start
 
-PORT_STEP = 1e-4
-"""Communication step [s] at which converters are coupled."""
+PORT_STEP = 1e-4  # communication step [s] at which converters are coupled
 
 
 @dataclass(frozen=True)
@@ -41,51 +39,31 @@ class OperatingAt:
 
 @dataclass(frozen=True)
 class Use:
-    """How somebody uses it: what a case gives it.
-
-    Attributes
-    ----------
-    step_size
-        Communication step [s].
-    point
-        Where the power flow puts it.
-    values, inputs
-        Of its parameters, and of inputs that nothing feeds.
-    said
-        Where that comes from, and the operating point, in words.
-    """
-
-    step_size: float | None = None
-    point: OperatingAt | None = None
+    step_size: float | None = None  # communication step [s]
+    point: OperatingAt | None = None  # where the power flow puts it
+    # values, inputs: of its parameters, and of inputs that nothing feeds
     values: Mapping[str, float | bool] = field(default_factory=dict)
     inputs: Mapping[str, float] = field(default_factory=dict)
-    said: str = ""
+    said: str = ""  # where that comes from, and the operating point, in words
 
 
 class Subject:
     """One FMU, opened as often as a check wants.
 
-    Attributes
-    ----------
-    port
-        Whether it speaks our port, by a binding or by itself.
-    starts
-        Whether it takes the power flow's start values.
-    step_size
-        Communication step of the tests [s].
-    step_is_given
-        Whether the file declares it or the user asks for it.
-    process
-        Gives the process in which it runs, a new one after its end; whoever runs checks sets it.
-    memory
-        Results that several checks share.
+    ``port``: Whether it speaks our port, by a binding or by itself.
+    ``starts``: Whether it takes the power flow's start values.
+    ``step_size``: Communication step of the tests [s].
+    ``step_is_given``: Whether the file declares it or the user asks for it.
+    ``memory``: Results that several checks share.
+    ``start_time``: At which its instances begin [s].
     """
 
+    # gives the process in which it runs, a new one after its end; whoever runs checks sets it.
     process: Callable[[], FmuProcess]
 
     def __init__(self, description: FmuDescription, directory: Path, use: Use | None = None, seed: int = 1) -> None:
         self.description, self.directory, self.doing, self.seed = description, directory, "", seed
-        self.use = use or Use()
+        self.use, self.start_time = use or Use(), 0.0
         self.memory: dict[str, Any] = {}
         variables = description.variables
         self.inputs = tuple(n for n in description.inputs if variables[n].type == "Real")
@@ -140,12 +118,9 @@ class Subject:
     ) -> None:
         """Give a new instance what it is given before initialisation.
 
-        Parameters
-        ----------
-        point
-            Operating point that it starts from; the one of use where None.
+        ``point``: operating point that it starts from; the one of use where None.
         """
-        component.setup(0.0, None)
+        component.setup(self.start_time, None)
         if self.starts:
             at = point or self.point
             start = {"P_0": at.P, "Q_0": at.Q, "v_0": at.v, "theta_0": at.theta}
@@ -224,12 +199,8 @@ class Subject:
     def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Numbers:
         """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs).
 
-        Parameters
-        ----------
-        step_size
-            Their length [s].
-        stimulus
-            Gives the deviations of the inputs from where they start, at a time [s].
+        ``step_size``: their length [s].
+        ``stimulus``: gives the deviations of the inputs from where they start, at a time [s].
         """
         with self.running(**options) as running:
             return running.record(steps, step_size, stimulus)
@@ -252,7 +223,7 @@ class Running:
     def begin(self) -> None:
         """Initialise the instance, new or reset."""
         subject, component = self.subject, self.component
-        self.time = 0.0
+        self.time = subject.start_time
         subject.prepare(component, self.point, self.parameters)
         component.enter_initialization_mode()
         self.rest = subject.start_inputs(self.point)
@@ -285,10 +256,7 @@ class Running:
     def hold(self, deviations: Numbers, steps: int, step_size: float) -> Numbers:
         """Step many times at once, shape (steps, n): what was read after each.
 
-        Parameters
-        ----------
-        deviations
-            Of the inputs before the first steps, one row each; after the last row they stay.
+        ``deviations``: of the inputs before the first steps, one row each; after the last row they stay.
         """
         begin = self.time
         if not steps:

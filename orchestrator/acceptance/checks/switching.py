@@ -13,20 +13,14 @@ from numpy.typing import NDArray
 from orchestrator.acceptance.checks.comparing import scales
 from orchestrator.arrays import Numbers
 
-_LEVELS = 4
-"""A signal with more values than that does not switch."""
-
+_LEVELS = 4  # A signal with more values than that does not switch
 _ALIKE = 0.05
 """Difference of all else at the moments of switching, relative to its range, beyond what one step moves it."""
 
-_DWELL = 0.1
-"""Relative difference of the times between two switchings."""
+_DWELL = 0.1  # relative difference of the times between two switchings
+_STEPS = 2.0  # how many of the longer steps a time between two switchings may differ by
 
-_STEPS = 2.0
-"""How many of the longer steps a time between two switchings may differ by."""
-
-Interval = tuple[Numbers, float]
-"""What was read after every step, from the start on, and the step [s]."""
+Interval = tuple[Numbers, float]  # what was read after every step, from the start on, and the step [s]
 
 
 def switches_elsewhere(names: Sequence[str], pairs: Sequence[tuple[Interval, Interval]]) -> list[str]:

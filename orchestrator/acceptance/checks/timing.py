@@ -13,25 +13,17 @@ from orchestrator.acceptance.checks.switching import switches_elsewhere
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 
-_SMALL = 1e-6
-"""Relative difference below which step sizes do not matter."""
-
-_BEYOND = 32.0
-"""Times as much that twice the step may differ: a method of fourth order is 16 times as far off."""
-
+_SMALL = 1e-6  # relative difference below which step sizes do not matter
+_BEYOND = 32.0  # times as much that twice the step may differ: a method of fourth order is 16 times as far off
 _LARGE = 0.1
-_CLEARLY = 0.15
-"""Part of a difference that a shift may leave, and be its cause."""
-
+_CLEARLY = 0.15  # part of a difference that a shift may leave, and be its cause
 _RATIOS = ((7, 10), (13, 10), (17, 12), (7, 4))
 """Other communication steps: a times the step where b of them last a steps; none is a multiple of another."""
 
-_DELAYS = 5
-"""Communication steps of delay that are looked for."""
+_DELAYS = 5  # communication steps of delay that are looked for
 
 
-_VOLTAGES = (1.08, 0.6)
-"""At which it is looked as well [pu]: a limit or an arrester may act there only."""
+_VOLTAGES = (1.08, 0.6)  # at which it is looked as well [pu]: a limit or an arrester may act there only
 
 
 @check("feedthrough", "Does what its outputs depend on at once agree with what it declares?", needs=("reading",))
@@ -172,10 +164,7 @@ def _rms(values: Numbers) -> float:
 def _stale(subject: Subject, *, declared: bool) -> str | None:
     """Outputs that follow an input at once, but not when they are read: they jump in the next step, however short.
 
-    Parameters
-    ----------
-    declared
-        Look at the inputs that the file says they depend on at once; else at those of which it says nothing.
+    ``declared``: look at the inputs that the file says they depend on at once; else at those of which it says nothing.
     """
     seen, h = subject.memory.get("feedthrough"), subject.step_size
     known = subject.description.output_dependencies

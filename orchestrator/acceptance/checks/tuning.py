@@ -11,13 +11,9 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import START
 
-_MOST = 24
-"""Parameters that are tried, drawn at random where there are more."""
-
+_MOST = 24  # parameters that are tried, drawn at random where there are more
 _STEPS = 200
-
-_ACTS = 1e-6
-"""Part of an output's range by which a parameter that is set before the run changes it, if it acts at all."""
+_ACTS = 1e-6  # part of an output's range by which a parameter that is set before the run changes it, if it acts at all
 
 
 @check("tunables", "Do its tunable parameters act where they are set while it runs?", needs=(*SAME, "reading"))

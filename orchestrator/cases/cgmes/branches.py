@@ -10,29 +10,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-BASE_MVA = 100.0
-"""Power base [MVA] of the tables that are made."""
+BASE_MVA = 100.0  # power base [MVA] of the tables that are made
 
 
 @dataclass(frozen=True, slots=True)
 class Branch:
-    """A branch between two buses.
-
-    Attributes
-    ----------
-    z
-        Series impedance [pu].
-    to_earth
-        Admittances behind the ratio at the first side, and at the second side [pu].
-    tap, shift
-        MATPOWER's ratio, and its angle [degrees].
-    """
-
     name: str
     start: str
     end: str
-    z: complex
-    to_earth: tuple[complex, complex]
+    z: complex  # series impedance [pu]
+    to_earth: tuple[complex, complex]  # admittances behind the ratio at the first side, and at the second side [pu]
+    # tap, shift: MATPOWER's ratio, and its angle [degrees]
     tap: float
     shift: float
 
@@ -43,16 +31,10 @@ def branch(
 ) -> Branch:  # fmt: skip
     """A branch in pu.
 
-    Parameters
-    ----------
-    name, ends
-        Its name, and the buses' ids.
-    nominal
-        Nominal voltages of the buses [kV].
-    z, to_earth
-        Behind the ratio [ohm, S].
-    rho, alpha
-        The ratio V'/V [kV/kV], and its angle [degrees].
+    ``name`` and ``ends``: its name, and the buses' ids.
+    ``nominal``: nominal voltages of the buses [kV].
+    ``z`` and ``to_earth``: behind the ratio [ohm, S].
+    ``rho`` and ``alpha``: the ratio V'/V [kV/kV], and its angle [degrees].
     """
     first, second = nominal
     base = second**2 / BASE_MVA
@@ -64,12 +46,8 @@ def branch(
 def lines(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
     """Lines that are closed at both ends.
 
-    Parameters
-    ----------
-    network
-        pypowsybl's.
-    nominal
-        Bus → nominal voltage [kV]; a branch that ends at another bus is out of service.
+    ``network``: pypowsybl's.
+    ``nominal``: bus → nominal voltage [kV]; a branch that ends at another bus is out of service.
     """
     for row in network.get_lines(all_attributes=True).itertuples():
         ends = row.bus1_id, row.bus2_id

@@ -10,14 +10,11 @@ from typing import Any
 from fmus.toolchain.extras import require
 from orchestrator.errors import InputError
 
-MOST_BYTES = 2_000_000_000
-"""Of all profiles together, unpacked: twenty times a national grid of 10,000 buses."""
-
+MOST_BYTES = 2_000_000_000  # of all profiles together, unpacked: twenty times a national grid of 10,000 buses
 _NEEDED = {"EQ": "EquipmentCore", "SSH": "SteadyStateHypothesis", "TP": "Topology", "SV": "StateVariables"}
 """Profile → word in the address of its version, in the file's head."""
 
-_HEAD = 64 * 1024
-"""Bytes of a file in which its profile is looked for."""
+_HEAD = 64 * 1024  # bytes of a file in which its profile is looked for
 
 
 def load_cgmes(path: Path) -> Any:

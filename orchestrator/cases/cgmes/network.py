@@ -27,14 +27,9 @@ LEFT_OUT = (*_TABLES, "island")
 """Elements that our network does not have, and parts of it that nothing joins to the largest; `leave_out` of the case
 names those that may go."""
 
-_NO_LIMIT = 9998.0
-"""Mvar and MW by which exports say that there is no limit."""
-
-_ONE_LEVEL = 1.05
-"""Nominal voltages with a larger ratio are two levels of voltage."""
-
-_MOST_RATING = 9998.0
-"""MVA; an unknown rating is 9999 in exports, and pypowsybl's is the largest number there is."""
+_NO_LIMIT = 9998.0  # mvar and MW by which exports say that there is no limit
+_ONE_LEVEL = 1.05  # nominal voltages with a larger ratio are two levels of voltage
+_MOST_RATING = 9998.0  # MVA; an unknown rating is 9999 in exports, and pypowsybl's is the largest number there is
 
 
 @dataclass(frozen=True)
@@ -49,10 +44,7 @@ class CgmesNetwork:
 def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
     """Read the network of a CGMES model.
 
-    Parameters
-    ----------
-    leaving_out
-        Kinds of `LEFT_OUT` that the user lets go.
+    ``leaving_out``: kinds of `LEFT_OUT` that the user lets go.
     """
     unknown = [kind for kind in leaving_out if kind not in LEFT_OUT]
     if unknown:
@@ -70,12 +62,8 @@ def _read(path: Path, versions: tuple[tuple[str, int], ...], leaving_out: tuple[
 def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
     """Tables of a network that pypowsybl holds.
 
-    Parameters
-    ----------
-    place
-        Path of its source, for messages.
-    leaving_out
-        Kinds of `LEFT_OUT` that may go.
+    ``place``: path of its source, for messages.
+    ``leaving_out``: kinds of `LEFT_OUT` that may go.
     """
     return _Reading(place, source).network(leaving_out)
 

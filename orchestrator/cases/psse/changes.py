@@ -6,9 +6,7 @@ from orchestrator.cases.psse.records import RawFile
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import InputError
 
-_LINES = {"two-terminal dc": 3, "vsc dc line": 3, "facts device": 1, "induction machine": 1}
-"""Lines of a record."""
-
+_LINES = {"two-terminal dc": 3, "vsc dc line": 3, "facts device": 1, "induction machine": 1}  # lines of a record
 LEFT_OUT = (*_LINES, "multi-terminal dc", "gne")
 """Elements that our network does not have; `leave_out` of the case names those that may go."""
 
@@ -23,10 +21,7 @@ _KNOWN = {"bus", "load", "fixed shunt", "generator", "branch", "system switching
 def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
     """Note the elements that our network does not have.
 
-    Parameters
-    ----------
-    allowed
-        Kinds of `LEFT_OUT` that the user lets go.
+    ``allowed``: kinds of `LEFT_OUT` that the user lets go.
     """
     unknown = [kind for kind in allowed if kind not in LEFT_OUT]
     if unknown:

@@ -15,8 +15,7 @@ from orchestrator.errors import InputError
 _KNOWN = DYR_RECORDS | REGFM_A1_RECORDS
 
 _MOST_SHOWN = 20
-_SAME = 1e-3
-"""Part by which two figures for one reactance may differ: files round them."""
+_SAME = 1e-3  # part by which two figures for one reactance may differ: files round them
 
 
 @dataclass(frozen=True)
@@ -48,23 +47,13 @@ def machine_models(
 ) -> dict[tuple[int, str], MachineModel]:
     """Models of the machines in service, by bus and identifier.
 
-    Parameters
-    ----------
-    leaving_out
-        Models whose records may be left out; their generators keep what the case says of that part.
-    replaced
-        Machines in whose place a converter of the case stands: they need no record.
-    idle
-        Machines of the RAW file that are out of service.
-    approximate
-        Whether WECC's grid-following converters become `gfl_phasor`, which leaves a part of them out; else they are
-        refused.
-
-    Raises
-    ------
-    InputError
-        With every machine that has no machine record, every record of a machine that is not there, every model that is
-        unknown, and every value that our part cannot have.
+    ``leaving_out``: models whose records may be left out; their generators keep what the case says of that part.
+    ``replaced``: machines in whose place a converter of the case stands: they need no record.
+    ``idle``: machines of the RAW file that are out of service.
+    ``approximate``: whether WECC's grid-following converters become `gfl_phasor`, which leaves a part of them out; else
+    they are refused.
+    Raises an `InputError` with every machine that has no machine record, every record of a machine that is not there,
+    every model that is unknown, and every value that our part cannot have.
     """
     at = {(machine.bus, machine.name.strip()): machine for machine in machines}
     problems: list[str] = []

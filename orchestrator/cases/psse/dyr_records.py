@@ -10,9 +10,7 @@ from fmus.synchronous_generator.dyr_fields import DyrField
 from orchestrator.errors import InputError
 from orchestrator.units import LARGEST
 
-MOST_BYTES = 100_000_000
-"""Of a file."""
-
+MOST_BYTES = 100_000_000  # of a file
 _TOKEN = re.compile(r"'([^']*)'|([^\s,'/]+)|(/)|(,)")
 
 

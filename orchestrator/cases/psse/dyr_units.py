@@ -43,18 +43,11 @@ def with_records(
 ) -> list[UnitRow]:
     """The units with what the records say of them.
 
-    Parameters
-    ----------
-    rows, machines
-        In the same order.
-    leaving_out
-        Models whose records may be left out.
-    without
-        Labels of units that are converters of the case alone, and need no record.
-    idle
-        Bus and identifier of the machines that are out of service.
-    approximate
-        Whether grid-following converters become `gfl_phasor`.
+    ``rows`` and ``machines``: in the same order.
+    ``leaving_out``: models whose records may be left out.
+    ``without``: labels of units that are converters of the case alone, and need no record.
+    ``idle``: bus and identifier of the machines that are out of service.
+    ``approximate``: whether grid-following converters become `gfl_phasor`.
     """
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}

@@ -11,14 +11,9 @@ from orchestrator.errors import InputError
 _WITHOUT = {"exciter": "manual", "governor": "constant_power", "stabilizer": "none"}
 """What PSS/E assumes where there is no record."""
 
-_CONSTANT = {"exciter": "field voltage", "governor": "mechanical power"}
-"""What is constant without the part."""
-
-_OTHERS = 2
-"""Machines with a record from which on a machine without one is questioned."""
-
-_CONDENSER = 0.01
-"""Active power [pu of the rating] below which a machine needs no governor."""
+_CONSTANT = {"exciter": "field voltage", "governor": "mechanical power"}  # what is constant without the part
+_OTHERS = 2  # machines with a record from which on a machine without one is questioned
+_CONDENSER = 0.01  # active power [pu of the rating] below which a machine needs no governor
 
 
 def with_choices(rows: Sequence[UnitRow], replaced: Collection[str], chosen: Mapping[str, str]) -> list[UnitRow]:
@@ -56,10 +51,7 @@ def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
 def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValue]:
     """Ask about machines without an exciter or a governor where others have one.
 
-    Parameters
-    ----------
-    rows
-        Machines, with the choices of ``[units]``.
+    ``rows``: machines, with the choices of ``[units]``.
     """
     for kind, quantity in _CONSTANT.items():
         able = [row for row in rows if _can_have(kind, row)]
@@ -83,12 +75,8 @@ def _can_have(kind: str, row: UnitRow) -> bool:
 def completed(rows: Sequence[UnitRow], replaced: Collection[str]) -> list[UnitRow]:
     """The units with what PSS/E assumes for every part that nothing says; a record that is left out stays open.
 
-    Parameters
-    ----------
-    rows
-        With the choices of ``[units]``.
-    replaced
-        Labels of units that are converters of the case alone.
+    ``rows``: with the choices of ``[units]``.
+    ``replaced``: labels of units that are converters of the case alone.
     """
     return [
         row if row.converter or row.partial or row.label in replaced else replace(row, parts={**_WITHOUT, **row.parts})

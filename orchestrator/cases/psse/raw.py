@@ -17,40 +17,28 @@ from orchestrator.errors import Problem
 
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
 _REFERENCE = 3
-_NO_LIMIT = 9999.0
-"""MW or Mvar by which PSS/E says that a generator has no limit."""
-
+_NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
 _MOST_VOLTAGE = 2.0
 _FAR = 20.0
 """Times the middle one of all reactances of lines from which one is questioned, where its ohms would be usual."""
 
-_SAME_VOLTAGE = 0.1
-"""Part by which the nominal voltages at a line's ends may differ."""
+_SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may differ
 
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """One generator in service.
-
-    Attributes
-    ----------
-    p_mw, v_pu
-        Active power [MW], and voltage that it holds at its bus [pu].
-    rating_mva
-        MBASE [MVA].
-    source
-        ZSORCE [pu of the rating].
-    q_min_mvar, q_max_mvar, p_min_mw, p_max_mw
-        Limits of reactive and of active power; infinite where the file has none.
-    """
+    """One generator in service."""
 
     bus: int
     name: str
     line: int
+    # p_mw, v_pu: active power [MW], and voltage that it holds at its bus [pu]
     p_mw: float
     v_pu: float
-    rating_mva: float
-    source: complex
+    rating_mva: float  # MBASE [MVA]
+    source: complex  # ZSORCE [pu of the rating]
+    # q_min_mvar, q_max_mvar, p_min_mw, p_max_mw: limits of reactive and of active power; infinite where the file has
+    # none
     q_min_mvar: float
     q_max_mvar: float
     p_min_mw: float = -math.inf
@@ -293,17 +281,7 @@ class _Reading:
                 self._changes.note(record.line, f"{text}: it feeds PG, and takes no part of an outage beyond")
             machines.append(
                 Machine(
-                    bus,
-                    record.text(1, "1"),
-                    record.line,
-                    feeds,
-                    held,
-                    rating,
-                    source,
-                    least,
-                    most,
-                    p_least,
-                    p_most,
+                    bus, record.text(1, "1"), record.line, feeds, held, rating, source, least, most, p_least, p_most
                 )
             )
         return tuple(machines)

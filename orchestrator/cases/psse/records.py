@@ -9,11 +9,8 @@ from pathlib import Path
 from orchestrator.errors import InputError
 from orchestrator.units import LARGEST
 
-REVISIONS = (33, 34, 35, 36)
-"""Revisions whose records are known."""
-
-MOST_BYTES = 200_000_000
-"""Of a file: ten times the largest interconnections."""
+REVISIONS = (33, 34, 35, 36)  # revisions whose records are known
+MOST_BYTES = 200_000_000  # of a file: ten times the largest interconnections
 
 _TAIL = (
     "area", "two-terminal dc", "vsc dc line", "impedance correction", "multi-terminal dc", "multi-section line", "zone",
@@ -75,24 +72,15 @@ class Record:
 
 @dataclass(frozen=True)
 class RawFile:
-    """What a file holds.
-
-    Attributes
-    ----------
-    base_mva, frequency
-        System base [MVA], and rated frequency [Hz] where the file says it.
-    sections
-        Records by the section's name in small letters; one with several lines is several records.
-    guessed
-        Lines between sections that do not say which data begin, though others do, and the section that was taken by the
-        revision's order.
-    """
-
     place: str
     revision: int
+    # base_mva, frequency: system base [MVA], and rated frequency [Hz] where the file says it
     base_mva: float
     frequency: float | None
+    # records by the section's name in small letters; one with several lines is several records
     sections: dict[str, list[Record]] = field(default_factory=dict)
+    # lines between sections that do not say which data begin, though others do, and the section that was taken by the
+    # revision's order
     guessed: dict[int, str] = field(default_factory=dict)
 
     def of(self, section: str) -> list[Record]:

@@ -11,8 +11,7 @@ from orchestrator.cases.psse.records import RawFile, Record
 
 _CONTROL = {33: 6}
 _TABLE = {33: 13, 34: 22}
-_OPEN = {0: (0, 1, 2), 1: (), 2: (1,), 3: (2,), 4: (0,)}
-"""STAT → windings that are off."""
+_OPEN = {0: (0, 1, 2), 1: (), 2: (1,), 3: (2,), 4: (0,)}  # STAT → windings that are off
 
 
 @dataclass(frozen=True)
@@ -27,28 +26,13 @@ class Winding:
 
 @dataclass(frozen=True)
 class Transformer:
-    """A transformer.
-
-    Attributes
-    ----------
-    record
-        Its first line.
-    impedances
-        Between windings 1-2, or 1-2, 2-3 and 3-1 [pu of the system].
-    magnetisation
-        At the bus of winding 1 [pu of the system].
-    off
-        Windings that are out of service.
-    controlled, corrected
-        Whether a tap changer acts on it, and whether its impedance depends on its tap.
-    """
-
-    record: Record
+    record: Record  # its first line
     circuit: str
     windings: tuple[Winding, ...]
-    impedances: tuple[complex, ...]
-    magnetisation: complex
-    off: tuple[int, ...]
+    impedances: tuple[complex, ...]  # between windings 1-2, or 1-2, 2-3 and 3-1 [pu of the system]
+    magnetisation: complex  # at the bus of winding 1 [pu of the system]
+    off: tuple[int, ...]  # windings that are out of service
+    # controlled, corrected: whether a tap changer acts on it, and whether its impedance depends on its tap
     controlled: bool
     corrected: bool
 
@@ -56,10 +40,7 @@ class Transformer:
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
     """The transformers of a file.
 
-    Parameters
-    ----------
-    voltages
-        Bus → base voltage [kV]; 0 where the file leaves it open.
+    ``voltages``: bus → base voltage [kV]; 0 where the file leaves it open.
     """
     lines = iter(raw.of("transformer"))
     for first in lines:

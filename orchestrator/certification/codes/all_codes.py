@@ -8,25 +8,19 @@ from orchestrator.certification.codes.declared import Declaration, checked
 from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.fingrid import FINGRID
 from orchestrator.certification.codes.miso import MISO
+from orchestrator.certification.codes.prc029 import PRC029
 from orchestrator.certification.codes.row import GridCode
 
-CODES: dict[str, GridCode] = {code.key: code for code in (MISO, AEMO, ERCOT, FINGRID)}
-"""By what ``--code`` takes."""
+CODES: dict[str, GridCode] = {code.key: code for code in (MISO, AEMO, ERCOT, FINGRID, PRC029)}  # by what ``--code`` takes
 
 BY_DECLARATION: dict[str, tuple[Sequence[Declaration], Callable[[Mapping[str, float]], GridCode]]] = {
-    "rte": (rte.DECLARED, rte.rte_code),
+    "rte": (rte.DECLARED, rte.rte_code)
 }
 """Codes whose rows depend on what the applicant declares: what that is, and the code for it."""
 
 
 def code_for(key: str, given: Mapping[str, object]) -> GridCode:
-    """A code, for what is declared of the converter.
-
-    Parameters
-    ----------
-    key
-        As ``--code`` takes it.
-    """
+    """A code, for what is declared of the converter."""
     if key in CODES:
         checked((), given, key)
         return CODES[key]

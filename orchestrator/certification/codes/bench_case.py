@@ -1,6 +1,5 @@
 """The case file of one row: the converter, for some rows its duplicate, and the test bench."""
 
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -24,8 +23,7 @@ CAPACITANCE = 0.05
 RECORDED = ("v_re", "v_im", "v", "p", "q", "duplicate.p", "duplicate.q", "source.p", "source.q")
 """Outputs of the bench that are recorded."""
 
-STEP, INTERVAL = 1e-4, 1e-3
-"""Communication step, and interval of the record [s]."""
+STEP, INTERVAL = 1e-4, 1e-3  # communication step, and interval of the record [s]
 
 
 def rated_frequency(request: CertificationRequest, wanted: float) -> float:
@@ -38,14 +36,6 @@ def rated_frequency(request: CertificationRequest, wanted: float) -> float:
     return wanted if "f_n" in description.variables else 50.0
 
 
-def lay_files(request: CertificationRequest, folder: Path) -> None:
-    """Copy the FMU and its binding into a certificate's folder."""
-    for file, name in ((request.fmu, FMU), (request.binding, BINDING)):
-        target = folder / name
-        if file is not None and not (target.exists() and target.samefile(file)):
-            shutil.copyfile(file, target)
-
-
 def case_name(row: str) -> str:
     """Name of a row's case file."""
     return f"row_{row}.toml"
@@ -54,13 +44,7 @@ def case_name(row: str) -> str:
 def write_row(
     request: CertificationRequest, row: str, title: str, programme: BenchProgramme, f_n: float, folder: Path
 ) -> Path:
-    """Write the case file of a row beside the FMU.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency of the bench [Hz].
-    """
+    """Write the case file of a row beside the FMU."""
     description = bound_fmu(request.fmu, request.binding)
     own = dict(request.values)
     components: dict[str, Any] = {PLANT: _plant(request, description, own, RATING_MVA, programme.power, f_n)}

@@ -23,44 +23,22 @@ from orchestrator.watch.watch import Watch
 
 @dataclass(frozen=True)
 class BenchTask:
-    """A row's case file.
-
-    Attributes
-    ----------
-    key
-        Name of the result's file: a hash of everything that the result depends on.
-    changes
-        Values by ``component.variable`` that are others than the case file's.
-    """
+    """A row's case file."""
 
     row: str
     case: str
     fingerprint: str
     key: str
-    changes: tuple[tuple[str, Value], ...] = ()
+    changes: tuple[tuple[str, Value], ...] = ()  # values by ``component.variable`` that are others than the case file's
 
 
 @dataclass
 class BenchResult:
-    """The response of a row.
-
-    Attributes
-    ----------
-    signals
-        By the bench's names, each of the shape of ``times``.
-    findings
-        Of the watch, in the form of `Finding.as_json`.
-    seconds
-        Processor time of the run, that of FMUs in processes of their own included [s].
-    failure
-        Why there is no whole response.
-    """
-
     row: str
     times: Numbers = field(default_factory=lambda: np.empty(0))
-    signals: dict[str, Numbers] = field(default_factory=dict)
-    findings: list[dict[str, Any]] = field(default_factory=list)
-    seconds: float = 0.0
+    signals: dict[str, Numbers] = field(default_factory=dict)  # by the bench's names, each of the shape of ``times``
+    findings: list[dict[str, Any]] = field(default_factory=list)  # of the watch, in the form of `Finding.as_json`
+    seconds: float = 0.0  # processor time of the run, that of FMUs in processes of their own included [s]
     failure: Failure | None = None
 
     @property

@@ -15,27 +15,13 @@ from orchestrator.points.failure import Failure
 from orchestrator.points.store import Arrays
 from orchestrator.watch.finding import UNSTABLE
 
-ENDED = "runs"
-"""Criterion of a run that ends early; its value is the time of the end."""
-
+ENDED = "runs"  # criterion of a run that ends early; its value is the time of the end
 _TIMED = ("stable", ENDED)
 """Criteria without a figure of their own that are the further off the earlier something goes wrong."""
 
 
 @dataclass(frozen=True)
 class ChangeTask:
-    """A row of a code with changed values.
-
-    Attributes
-    ----------
-    f_n
-        Rated frequency of the bench [Hz].
-    bench
-        The row's case file and the changes.
-    declared
-        Values by which the code judges, as ``--declare`` gave them.
-    """
-
     code: str
     f_n: float
     bench: BenchTask
@@ -49,40 +35,19 @@ class ChangeTask:
 
 @dataclass(frozen=True)
 class ChangedCriterion:
-    """A criterion of a changed row.
-
-    Attributes
-    ----------
-    margin
-        In parts of the limit; None where there is no figure.
-    timed
-        Whether it is a criterion without a figure of its own, and the margin is the time until the first fault in parts
-        of the run, less one.
-    """
-
     criterion: str
-    margin: float | None
+    margin: float | None  # in parts of the limit; None where there is no figure
     accepted: bool
     text: str
+    # whether it is a criterion without a figure of its own, and the margin is the time until the first fault in parts
+    # of the run, less one.
     timed: bool = False
 
 
 @dataclass
 class ChangeResult:
-    """What the criteria of a row say of a changed converter.
-
-    Attributes
-    ----------
-    criteria
-        In their order; empty where the row could not be run.
-    mark
-        Hash of the response: two responses with one mark agree to the last bit.
-    failure
-        Why there are no criteria, as where the FMU refuses the value.
-    """
-
     criteria: tuple[ChangedCriterion, ...] = ()
-    mark: str = ""
+    mark: str = ""  # hash of the response: two responses with one mark agree to the last bit
     failure: Failure | None = None
 
     @property
@@ -120,15 +85,7 @@ def compute_change(task: ChangeTask) -> ChangeResult:
 def margins_with_time(
     verdict: RowVerdict, findings: Sequence[Mapping[str, Any]], f_n: float
 ) -> tuple[ChangedCriterion, ...]:
-    """The criteria of a row; one that has no figure, as a loss of synchronism, takes the time until the first fault.
-
-    Parameters
-    ----------
-    findings
-        Of the watch over the run, in the form of `Finding.as_json`.
-    f_n
-        Rated frequency of the bench [Hz].
-    """
+    """The criteria of a row; one that has no figure, as a loss of synchronism, takes the time until the first fault."""
     stop = verdict.row.programme(f_n).stop
     faults = [float(f["time"]) for f in findings if f["kind"] in UNSTABLE]
     found = []

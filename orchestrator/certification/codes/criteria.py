@@ -16,12 +16,8 @@ SETTLED = 0.02
 """Largest movement of a power or a voltage, peak to peak over the last half second of a hold, that counts as settled
 [pu]."""
 
-BACK = 0.05
-"""Largest distance from the power before an event at which it counts as returned [pu]."""
-
-MOVED = 0.01
-"""Least change of a settled power that counts as a response of the droop [pu]."""
-
+BACK = 0.05  # largest distance from the power before an event at which it counts as returned [pu]
+MOVED = 0.01  # least change of a settled power that counts as a response of the droop [pu]
 CALM = 0.05
 """Largest movement of the frequency, peak to peak over the last half second of a hold, that counts as settled [Hz]."""
 
@@ -29,20 +25,15 @@ OPPOSED = 0.2
 """Least change of the power against a jump of 10° or more where the code gives no number [pu]: what MISO and ERCOT ask
 for 10°."""
 
-FIRST_SWING = 0.1
-"""Time after a jump in which its first response is looked for [s]."""
-
+FIRST_SWING = 0.1  # time after a jump in which its first response is looked for [s]
 SPIKE = 5e-3
 """Width of the median by which the speed of a response is read [s]: what is shorter than half of it is the filter's."""
 
-SIDE = 0.01
-"""Largest deviation of a settled frequency to the wrong side of rated [Hz]."""
+SIDE = 0.01  # largest deviation of a settled frequency to the wrong side of rated [Hz]
 
-POWER_SHOWN, VOLTAGE_SHOWN = "Active power [pu]", "Voltage [pu]"
-"""How pictures call what is judged."""
+POWER_SHOWN, VOLTAGE_SHOWN = "Active power [pu]", "Voltage [pu]"  # how pictures call what is judged
 
-LOOK = 0.5
-"""End of a hold in which it has to be settled [s]."""
+LOOK = 0.5  # end of a hold in which it has to be settled [s]
 
 
 def _finding(
@@ -97,16 +88,9 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
             of_code: bool = False, events: tuple[int, ...] = ()) -> Judge:  # fmt: skip
     """The power comes back to what it was before the first event.
 
-    Parameters
-    ----------
-    within
-        Time after the event in which it has to be back for good [s]; None for the end of its hold.
-    tolerance
-        Largest distance [pu of the rating].
-    of_code
-        Whether the numbers are the code's.
-    events
-        Numbers of the events; all of them where empty.
+    ``within``: Time after the event in which it has to be back for good [s]; None for the end of its hold.
+    ``tolerance``: Largest distance [pu of the rating].
+    ``events``: Numbers of the events; all of them where empty.
     """
 
     def judge(row: MeasuredRow) -> RowFinding:
@@ -135,12 +119,7 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
 def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -> Judge:
     """The power, averaged over a period, moves against the jump by at least so much.
 
-    Parameters
-    ----------
-    sign
-        +1 where the power has to rise: the source's angle falls.
-    least
-        [pu]
+    ``sign``: +1 where the power has to rise: the source's angle falls.
     """
 
     def judge(row: MeasuredRow) -> RowFinding:
@@ -168,14 +147,8 @@ def opposes_jumps(signs: tuple[int, ...]) -> tuple[Judge, ...]:
 def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -> Judge:
     """The power reaches a share of its first change in a time. A median takes the filter's spikes away.
 
-    Parameters
-    ----------
-    sign
-        +1 where the power has to rise.
-    longest
-        [s]
-    share
-        Of the largest change in the first swing.
+    ``sign``: +1 where the power has to rise.
+    ``share``: Of the largest change in the first swing.
     """
 
     def judge(row: MeasuredRow) -> RowFinding:
@@ -279,12 +252,8 @@ def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
 
     H = f_n·ΔE/(2·|rate|·lasts), where ΔE is the energy beyond that of the power before [pu·s].
 
-    Parameters
-    ----------
-    rate, lasts
-        Of the ramp [Hz/s, s]; the power has to rise where the rate is negative.
-    least
-        Least inertia constant [s].
+    ``rate``, ``lasts``: Of the ramp [Hz/s, s]; the power has to rise where the rate is negative.
+    ``least``: Least inertia constant [s].
     """
 
     def judge(row: MeasuredRow) -> RowFinding:

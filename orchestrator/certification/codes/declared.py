@@ -9,19 +9,11 @@ from orchestrator.errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class Declaration:
-    """One value that has to be declared.
-
-    Attributes
-    ----------
-    name, meaning, unit
-        As ``--declare`` takes it, and what it is.
-    least, most
-        Range in which a value makes sense, in its unit.
-    """
-
+    # name, meaning, unit: as ``--declare`` takes it, and what it is.
     name: str
     meaning: str
     unit: str
+    # least, most: range in which a value makes sense, in its unit.
     least: float
     most: float
 

@@ -21,60 +21,39 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 
-LAG = 0.01
-"""Lag with which the damping follows the frequency of the grid [s]."""
-
+LAG = 0.01  # lag with which the damping follows the frequency of the grid [s]
 LATE = 0.02
 """By how much the bounds come later where waveforms are measured [s]: the mean over a period of 50 Hz takes as long."""
 
-SLACK = 0.01
-"""By how much later a bound that asks for something begins [s]."""
-
+SLACK = 0.01  # by how much later a bound that asks for something begins [s]
 TUNNEL, TUNNEL_SHARE = 0.02, 0.05
 """Distance of the bounds in the end: the larger one of these, of the rating and of the peak [pu, 1]."""
 
-DEMAND, CEILING = 0.98, 1.2
-"""Largest power that is asked for, and that is allowed [pu]."""
+DEMAND, CEILING = 0.98, 1.2  # largest power that is asked for, and that is allowed [pu]
 
-_NEAR = 1e-6
-"""Roots that are nearer to each other than this part count as one, and are moved apart."""
+_NEAR = 1e-6  # roots that are nearer to each other than this part count as one, and are moved apart
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What is asked and what is allowed, as distances from the value before the event.
+    """What is asked and what is allowed, as distances from the value before the event."""
 
-    Attributes
-    ----------
-    ideal
-        Response of the declared plant, shape (n,).
-    asked, allowed
-        Bounds towards the value before the event and away from it, shape (n,). One below 0 lies on the other side.
-    """
-
-    ideal: Numbers
+    ideal: Numbers  # response of the declared plant, shape (n,)
+    # asked, allowed: bounds towards the value before the event and away from it, shape (n,). One below 0 lies on the
+    # other side.
     asked: Numbers
     allowed: Numbers
 
 
 @dataclass(frozen=True)
 class Swinging:
-    """The swing equation of a plant at a grid.
+    """The swing equation of a plant at a grid."""
 
-    Attributes
-    ----------
-    D, H
-        Damping [pu of power per pu of frequency] and inertia constant [s].
-    X
-        Reactance between both voltages [pu].
-    omega_b
-        2π times the rated frequency [rad/s].
-    """
-
+    # D, H: damping [pu of power per pu of frequency] and inertia constant [s].
     D: float
     H: float
-    X: float
-    omega_b: float
+    X: float  # reactance between both voltages [pu]
+    omega_b: float  # 2π times the rated frequency [rad/s]
 
     @property
     def decay(self) -> float:
@@ -147,13 +126,7 @@ class Swinging:
 
 
 def jump_bounds(plant: Swinging, angle: float) -> Callable[[Numbers], Bounds]:
-    """Bounds of the active power after a jump of the grid's angle (IGFM1).
-
-    Parameters
-    ----------
-    angle
-        Size of the jump [rad].
-    """
+    """Bounds of the active power after a jump of the grid's angle (IGFM1)."""
     peak = angle / plant.X
     spread, margin = (0.85, 1.15), 0.4
 
@@ -174,13 +147,7 @@ def jump_bounds(plant: Swinging, angle: float) -> Callable[[Numbers], Bounds]:
 
 
 def amplitude_bounds(current: float) -> Callable[[Numbers], Bounds]:
-    """Bounds of the reactive current after a step of the grid's voltage (IGFM2).
-
-    Parameters
-    ----------
-    current
-        Size of the step over X [pu].
-    """
+    """Bounds of the reactive current after a step of the grid's voltage (IGFM2)."""
     tunnel, lasts, margin = _tunnel(current), 0.08, 0.3
     rise = -0.01 / np.log(0.1)  # 90 % in 10 ms
 
@@ -195,12 +162,8 @@ def amplitude_bounds(current: float) -> Callable[[Numbers], Bounds]:
 def strength_bounds(plant: Swinging, change: float) -> Callable[[Numbers], Bounds]:
     """Bounds of the active power after a step of the short-circuit ratio (IGFM3).
 
-    Parameters
-    ----------
-    plant
-        As declared, with the grid after the step.
-    change
-        Size of the power's first change [pu]: |P_0|·|1/SCR_after − 1/SCR_before|/X.
+    ``plant``: As declared, with the grid after the step.
+    ``change``: Size of the power's first change [pu]: |P_0|·|1/SCR_after − 1/SCR_before|/X.
     """
     tunnel, spread, margin = _tunnel(change), (1.0, 0.8, 1.2), 0.2
     plants = [plant.varied(ratio) for ratio in spread]
@@ -221,12 +184,8 @@ def strength_bounds(plant: Swinging, change: float) -> Callable[[Numbers], Bound
 def ramp_bounds(plant: Swinging, rate: float, lasts: float) -> Callable[[Numbers], Bounds]:
     """Bounds of the active power during and after a ramp of the grid's frequency (IGFM4).
 
-    Parameters
-    ----------
-    rate
-        Rate of the frequency [pu/s]; its sign chooses the margins.
-    lasts
-        Duration of the ramp [s].
+    ``rate``: Rate of the frequency [pu/s]; its sign chooses the margins.
+    ``lasts``: Duration of the ramp [s].
     """
     size, tunnel = abs(rate), _tunnel(abs(rate) * plant.ramp_peak(rising=rate > 0))
     less, more = (0.3, 0.5) if rate > 0 else (0.5, 0.3)

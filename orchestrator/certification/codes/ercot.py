@@ -4,8 +4,7 @@ from orchestrator.certification.codes import criteria as c
 from orchestrator.certification.codes.programme import jumps, ramps
 from orchestrator.certification.codes.row import CodeRow, GridCode
 
-LEAST_INERTIA = 2.5
-"""Least inertia constant [s]: ERCOT, model quality tests, revision 24."""
+LEAST_INERTIA = 2.5  # least inertia constant [s]: ERCOT, model quality tests, revision 24
 
 
 ERCOT = GridCode(

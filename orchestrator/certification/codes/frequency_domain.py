@@ -24,15 +24,9 @@ from orchestrator.results.storage import save_table
 from orchestrator.safe_files import write_text
 
 FIGURES_CSV, FIGURES_JSON, FIGURES_PNG = "frequency.csv", "frequency.json", "frequency.png"
-
-POWER = 0.5
-"""Active power at which it is measured [pu]."""
-
-BAND = (5.0, 40.0)
-"""Band in which the least stiffness is told [Hz]: between the droops and the period of the grid."""
-
-EXCITATION = Excitation()
-"""How it is excited: from 0.05 to 1000 Hz."""
+POWER = 0.5  # active power at which it is measured [pu]
+BAND = (5.0, 40.0)  # band in which the least stiffness is told [Hz]: between the droops and the period of the grid
+EXCITATION = Excitation()  # how it is excited: from 0.05 to 1000 Hz
 
 NO_VERDICT = (
     "no verdict: the GB Grid Code (ECP.A.3.9) states no criteria for the plot, and the thresholds and the band of "
@@ -46,20 +40,11 @@ the first change within a time [s] (MISO BPM-015 r32 appendix H)."""
 
 @dataclass(frozen=True)
 class AskedStiffness:
-    """What the criterion of phase jumps comes to as a least |P/θ|, and what was found.
+    """What the criterion of phase jumps comes to as a least |P/θ|, and what was found."""
 
-    Attributes
-    ----------
-    value
-        Least |P/θ| that it asks for at the terminals [pu/rad].
-    band
-        Frequencies at which it asks for it [Hz].
-    found, at
-        Least |P/θ| in the band [pu/rad], and its frequency [Hz].
-    """
-
-    value: float
-    band: tuple[float, float]
+    value: float  # least |P/θ| that it asks for at the terminals [pu/rad]
+    band: tuple[float, float]  # frequencies at which it asks for it [Hz]
+    # found, at: least |P/θ| in the band [pu/rad], and its frequency [Hz].
     found: float
     at: float
 
@@ -84,11 +69,6 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
     power by Δθ/(1/K + 1/K_g), which is to be `OPPOSED` or more. The power is a mean over a period T, so that K has to
     last as long: an angle that follows the bus with the time constant T has its corner at 1/(2π·T). And 90 % of the
     change within `LONGEST` is what a lag of `LONGEST`/ln 10 reaches, whose corner is the upper end of the band.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency [Hz].
     """
     Z = jumps(SCR, POWER, ()).impedance
     asked = 1 / (JUMP / OPPOSED - abs(Z) ** 2 / Z.imag)
@@ -97,15 +77,7 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
 
 
 def measure_stiffness(request: CertificationRequest, f_n: float, report: Callable[[str], None]) -> Stiffness:
-    """Measure a converter at an ideal bus, at half of its rating and 1 pu.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency [Hz].
-    report
-        Called with a sentence before each run.
-    """
+    """Measure a converter at an ideal bus, at half of its rating and 1 pu."""
     description = bound_fmu(request.fmu, request.binding)
     values = _values(description, request, f_n)
     rest = cmath.rect(float(values.get("v_0", 1.0)), float(values.get("theta_0", 0.0)))
@@ -153,13 +125,7 @@ def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
 
 
 def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> list[Path]:
-    """Write ``frequency.csv``, ``frequency.json`` and ``frequency.png``.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency [Hz].
-    """
+    """Write ``frequency.csv``, ``frequency.json`` and ``frequency.png``."""
     table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
     rows = []
     for k, f in enumerate(found.frequencies.tolist()):

@@ -26,11 +26,8 @@ long that end is [s]. From 0.75 to 2 pu the same of 92 rows of four converters s
 slip whose current is limited is not seen at a strong grid.
 """
 
-HALF_TURN = np.pi
-"""What counts as a slip [rad]: on the rows of ERCOT ours moves by 0.10 turns at most."""
-
-FED_IN = 0.05
-"""Active power before the first event from which on a trip can be told [pu]."""
+HALF_TURN = np.pi  # what counts as a slip [rad]: on the rows of ERCOT ours moves by 0.10 turns at most
+FED_IN = 0.05  # active power before the first event from which on a trip can be told [pu]
 
 _IN_WORDS = {"loss_of_synchronism": "it slips", "growth": "it grows", "growing_oscillation": "it swings ever more",
              "sustained_oscillation": "it swings for ever", "run_away": "it runs away",
@@ -39,30 +36,15 @@ _IN_WORDS = {"loss_of_synchronism": "it slips", "growth": "it grows", "growing_o
 
 @dataclass(frozen=True)
 class MeasuredRow:
-    """The response of one row. Powers are in pu of the plant's rating.
+    """The response of one row. Powers are in pu of the plant's rating."""
 
-    Attributes
-    ----------
-    times
-        [s], shape (n,), evenly spaced.
-    signals
-        By the bench's names, each of shape (n,).
-    f_n
-        Rated frequency [Hz].
-    events
-        When something changed [s].
-    findings
-        Of the watch over the run, in the form of `Finding.as_json`.
-    source_angle
-        Of the source against one that turns at the rated frequency [rad], shape (n,); None where there is no source.
-    """
-
-    times: Numbers
-    signals: Mapping[str, Numbers]
+    times: Numbers  # [s], shape (n,), evenly spaced
+    signals: Mapping[str, Numbers]  # by the bench's names, each of shape (n,)
     f_n: float
-    events: tuple[float, ...]
-    findings: tuple[Mapping[str, Any], ...] = ()
+    events: tuple[float, ...]  # when something changed [s]
+    findings: tuple[Mapping[str, Any], ...] = ()  # of the watch over the run, in the form of `Finding.as_json`
     declared: Mapping[str, float] = field(default_factory=dict)
+    # of the source against one that turns at the rated frequency [rad], shape (n,); None where there is no source.
     source_angle: Numbers | None = None
 
     @property

@@ -13,9 +13,7 @@ FAULT = 4.0
 """Conductance of the balanced fault, in parts of the source's admittance: the voltage of the source alone falls to 0.23
 pu, so that a plant that feeds into the fault does not lift it above half."""
 
-CYCLES = 6
-"""Duration of the fault, in periods."""
-
+CYCLES = 6  # duration of the fault, in periods
 CLEARED = tuple(range(1, 2 * len(RATIOS), 2))
 """Numbers of the events with which the faults of the steps are cleared: the power is asked for after each of them."""
 

@@ -17,9 +17,7 @@ from orchestrator.report.tables import PlainTable, make_table
 from orchestrator.safe_files import write_text
 from orchestrator.sensitivities.parameters import Parameter
 
-FORMAT = "margin-sensitivities-1"
-"""Form of the JSON."""
-
+FORMAT = "margin-sensitivities-1"  # form of the JSON
 NEEDS_HTML, NEEDS_JSON = "sensitivities.html", "sensitivities.json"
 
 _COLUMNS = ("Parameter", "Value", "Margin below", "Margin above", "Points per %")

@@ -8,25 +8,12 @@ import numpy as np
 from orchestrator.arrays import Numbers
 from orchestrator.cases.schema import Value
 
-RATING_MVA = 100.0
-"""Rating that the plant under test is given [MVA], so that its per unit are the bench's."""
-
-FIRST = 1.0
-"""When the first thing happens [s]."""
+RATING_MVA = 100.0  # rating that the plant under test is given [MVA], so that its per unit are the bench's
+FIRST = 1.0  # when the first thing happens [s]
 
 
 @dataclass(frozen=True, slots=True)
 class BenchChange:
-    """A tunable parameter of the bench takes a value.
-
-    Attributes
-    ----------
-    time
-        [s], a multiple of the communication step.
-    parameter
-        Its name in the model `test_bench`.
-    """
-
     time: float
     parameter: str
     value: Value
@@ -34,32 +21,14 @@ class BenchChange:
 
 @dataclass(frozen=True)
 class BenchProgramme:
-    """One run on the bench.
-
-    Attributes
-    ----------
-    scr
-        Short-circuit ratio at the connection point: 1/|R + jX| in per unit of the plant's rating.
-    power
-        Active power of the plant at the start [pu of its rating].
-    changes
-        In the order of time.
-    stop
-        End of the run [s].
-    x_r
-        X/R of the source's impedance.
-    load
-        Active power of the load [pu of the plant's rating], and its power factor (lagging).
-    duplicate
-        Active power of the duplicate of half rating [pu of its own rating]; None without one.
-    """
-
-    scr: float
-    power: float
+    scr: float  # short-circuit ratio at the connection point: 1/|R + jX| in per unit of the plant's rating
+    power: float  # active power of the plant at the start [pu of its rating]
     changes: tuple[BenchChange, ...]
     stop: float
     x_r: float = 6.0
+    # active power of the load [pu of the plant's rating], and its power factor (lagging).
     load: tuple[float, float] = (0.0, 1.0)
+    # active power of the duplicate of half rating [pu of its own rating]; None without one.
     duplicate: float | None = None
 
     @property
@@ -74,15 +43,7 @@ class BenchProgramme:
         return tuple(dict.fromkeys(change.time for change in self.changes))
 
     def source_angle(self, times: Numbers, f_n: float) -> Numbers | None:
-        """Angle of the source against one that turns at the rated frequency [rad]; None where the source is lost.
-
-        Parameters
-        ----------
-        times
-            [s], shape (n,).
-        f_n
-            Rated frequency [Hz].
-        """
+        """Angle of the source against one that turns at the rated frequency [rad]; None where the source is lost."""
         if any(change.parameter == "source.connected" for change in self.changes):
             return None
         angle = np.zeros(times.shape)
@@ -119,15 +80,7 @@ class _Ramps:
 
 
 def jumps(scr: float, power: float, degrees: tuple[float, ...], hold: float = 5.0) -> BenchProgramme:
-    """The source's angle jumps by each of the angles in turn; they add up.
-
-    Parameters
-    ----------
-    degrees
-        By how much the angle jumps each time [°].
-    hold
-        How long it stays after each [s].
-    """
+    """The source's angle jumps by each of the angles in turn [°]; they add up, and each holds so long [s]."""
     total, changes = 0.0, []
     for k, angle in enumerate(degrees):
         total += angle
@@ -138,19 +91,7 @@ def jumps(scr: float, power: float, degrees: tuple[float, ...], hold: float = 5.
 def ramps(
     scr: float, power: float, rated: float, rate: float, steps: tuple[float, ...], hold: float = 5.0
 ) -> BenchProgramme:
-    """The source's frequency moves by each of the steps [Hz] in turn, and holds after each.
-
-    Parameters
-    ----------
-    rated
-        Rated frequency [Hz].
-    rate
-        Rate of the ramps [Hz/s].
-    steps
-        By how much the frequency moves each time [Hz].
-    hold
-        How long it stays after each [s].
-    """
+    """The source's frequency moves by each of the steps in turn [Hz], at a rate [Hz/s], and holds after each [s]."""
     made = _Ramps(rated)
     for by in steps:
         made.to(rate, by)
@@ -162,18 +103,9 @@ def weakening(start: float, power: float, ratios: tuple[float, ...], conductance
               hold: float = 3.0) -> BenchProgramme:  # fmt: skip
     """The short-circuit ratio steps down, each time as a balanced fault at the bus is cleared.
 
-    Parameters
-    ----------
-    power
-        Active power of the plant [pu of its rating].
-    ratios
-        Short-circuit ratios, one after the other.
-    conductance
-        Of the fault, in parts of the source's admittance before it, so that its depth is the same each time.
-    lasts
-        Duration of each fault [s].
-    hold
-        Time between two clearances [s].
+    ``conductance``: Of the fault, in parts of the source's admittance before it, so that its depth is the same each
+    time.
+    ``hold``: Time between two clearances [s].
     """
     changes, before = [], start
     for k, ratio in enumerate(ratios):
@@ -186,15 +118,7 @@ def weakening(start: float, power: float, ratios: tuple[float, ...], conductance
 
 
 def voltage(scr: float, power: float, factors: tuple[tuple[float, float], ...], stop: float) -> BenchProgramme:
-    """The source's voltage takes one factor after the other.
-
-    Parameters
-    ----------
-    factors
-        Time after the first event [s], and the factor of the voltage from then on.
-    stop
-        End of the run [s].
-    """
+    """The source's voltage takes one factor after the other, each from a time after the first event on [s]."""
     changes = tuple(BenchChange(round(FIRST + after, 6), "source.factor", factor) for after, factor in factors)
     return BenchProgramme(scr, power, changes, stop)
 
@@ -202,14 +126,8 @@ def voltage(scr: float, power: float, factors: tuple[tuple[float, float], ...], 
 def last_machine(plant: float, duplicate: float, load: float, factor: float = 0.95) -> BenchProgramme:
     """The source is disconnected; the plant and a duplicate of half its rating are left with the load.
 
-    Parameters
-    ----------
-    plant, duplicate
-        Active power of each at the start [pu of its own rating].
-    load
-        Active power of the load [pu of the plant's rating].
-    factor
-        Its power factor, lagging.
+    ``plant``, ``duplicate``: Active power of each at the start [pu of its own rating].
+    ``load``: Active power of the load [pu of the plant's rating].
     """
     return BenchProgramme(10.0, plant, (BenchChange(FIRST, "source.connected", False),), 11.0,
                           load=(load, factor), duplicate=duplicate)  # fmt: skip

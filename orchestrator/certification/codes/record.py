@@ -1,49 +1,23 @@
-"""The files of a code's certificate: figures, responses, a page, and the hashes that tie them together."""
+"""What the files of a code's certificate hold: its figures, its responses and its page."""
 
-from datetime import UTC, datetime
+from datetime import datetime
 from html import escape
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from orchestrator.certification.acceptance import KEPT
-from orchestrator.certification.case_file import BINDING, FMU
-from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_pictures import row_pictures
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED, RowVerdict
 from orchestrator.certification.environment import environment
-from orchestrator.certification.files import HTML, JSON, PDF, RESPONSES, figures_hash, write_sealed
-from orchestrator.certification.margins import margin_text
+from orchestrator.certification.form import CODE
+from orchestrator.certification.margins import margin_of
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, table
-from orchestrator.report.pdf import print_pdf
-from orchestrator.results.storage import save_netcdf
-from orchestrator.safe_files import file_hash, write_text
-
-FORMAT = "code-2"
-"""Form of the JSON of a code's certificate."""
 
 
-def save_certificate(certificate: CodeCertificate, folder: Path, *, pdf: bool = False) -> list[Path]:
-    """Write ``certificate.html``, ``certificate.json`` and ``responses.nc``, on request ``certificate.pdf``."""
-    made = datetime.now(UTC).replace(microsecond=0)
-    save_netcdf(responses_of(certificate), folder / RESPONSES)
-    c = certificate
-    names = [FMU, *([BINDING] if c.request.binding else []), RESPONSES, *([KEPT] if c.acceptance else [])]
-    names += [case_name(name) for name in c.results]
-    hashes = {name: file_hash(folder / name) for name in names}
-    content = {"made": made.isoformat(), **figures_of(c)}
-    write_text(folder / HTML, code_page(c, made, figures_hash(content)))
-    content["files"] = hashes | {HTML: file_hash(folder / HTML)}
-    write_sealed(content, folder / JSON)
-    printed = [print_pdf(folder / HTML, folder / PDF)] if pdf else []
-    return [folder / HTML, folder / JSON, folder / RESPONSES, *printed]
-
-
-def responses_of(certificate: CodeCertificate) -> xr.Dataset:
+def code_responses(certificate: CodeCertificate) -> xr.Dataset:
     """Signals of every row over a time of its own: ``row.signal`` over ``time_row`` [s, pu]."""
     data, coordinates = {}, {}
     for name, result in certificate.results.items():
@@ -54,10 +28,10 @@ def responses_of(certificate: CodeCertificate) -> xr.Dataset:
     return xr.Dataset(data, coords=coordinates, attrs={"source": "gfor certify"})
 
 
-def figures_of(c: CodeCertificate) -> dict[str, Any]:
+def code_json(c: CodeCertificate) -> dict[str, Any]:
     """All figures as JSON's types."""
     return {
-        "format": FORMAT, "code": c.code.key, "title": c.code.title, "source": c.code.source, "date": c.code.date,
+        "format": CODE, "code": c.code.key, "title": c.code.title, "source": c.code.source, "date": c.code.date,
         "f_n": c.f_n, "verdict": c.verdict, "sentence": c.sentence(), "model": c.description.model_name,
         "binding": c.request.binding.name if c.request.binding else None,
         "values": dict(c.request.values), "declared": dict(c.code.declared),
@@ -84,7 +58,7 @@ def code_page(c: CodeCertificate, made: datetime, mark: str) -> str:
     """The page of a certificate; ``mark`` is the hash of its figures."""
     rows = [
         [escape(v.row.name), escape(v.row.clause), escape(v.row.title), escape(f.criterion), escape(f.rule),
-         "the code's" if f.origin == "code" else "reading", escape(f.text), _margin(f), _word(v, f)]
+         "the code's" if f.origin == "code" else "reading", escape(f.text), margin_of(f), _word(v, f)]
         for v in c.verdicts for f in v.findings
     ]  # fmt: skip
     rows += [[escape(v.row.name), escape(v.row.clause), escape(v.row.title), "", "", "", escape(v.unknown), "–",
@@ -119,10 +93,6 @@ def _pictures(c: CodeCertificate) -> str:
 def _list(heading: str, texts: Any) -> str:
     items = "".join(f"<li>{escape(text)}</li>" for text in texts)
     return (f"<p>{escape(heading)}</p>" if heading and items else "") + (f"<ul>{items}</ul>" if items else "")
-
-
-def _margin(finding: RowFinding) -> str:
-    return margin_text(finding.margin, finding.limit, finding.value)
 
 
 def _word(verdict: RowVerdict, finding: RowFinding) -> str:

@@ -14,20 +14,12 @@ class RowFinding:
 
     Attributes
     ----------
-    criterion
-        Its name.
-    rule
-        What is asked, with its number.
     origin
         ``code`` where the number is the code's, ``reading`` where the code gives none and this program's is taken.
     value, limit
         What was measured and what it is compared with; None where there is no such number.
     margin
         How far the value is on the good side of the limit, in parts of the limit (negative: on the bad side).
-    accepted
-        None where it is not judged, or the code gives no verdict.
-    text
-        The result in words.
     """
 
     criterion: str
@@ -50,8 +42,6 @@ class Band:
 
     Attributes
     ----------
-    criterion
-        Its name.
     label
         The quantity, with its unit.
     quantity
@@ -93,14 +83,8 @@ class CodeRow:
     ----------
     name
         Short, for files: letters, digits and underscores.
-    title
-        What is done, in words.
-    clause
-        Where the code asks for it.
     programme
         What the bench does, for a rated frequency [Hz].
-    criteria
-        Each is applied to the response.
     shown_only
         Whether the code gives no verdict on it.
     """
@@ -119,8 +103,6 @@ class GridCode:
 
     Attributes
     ----------
-    key
-        As ``--code`` takes it.
     title, source, date
         What it is, where its numbers were read, and of when it is.
     f_n
@@ -129,8 +111,6 @@ class GridCode:
         What the code asks and this table does not test, with the reason.
     readings
         Where the code leaves something open, how it was read.
-    has_verdict
-        Whether the code gives numbers to judge by.
     declared
         What the applicant declares of the converter, where the rows depend on it.
     """
@@ -143,5 +123,4 @@ class GridCode:
     rows: tuple[CodeRow, ...]
     left_out: tuple[str, ...] = ()
     readings: tuple[str, ...] = ()
-    has_verdict: bool = True
     declared: Mapping[str, float] = field(default_factory=dict)

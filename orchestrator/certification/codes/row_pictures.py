@@ -17,18 +17,11 @@ from orchestrator.report.html.elements import Figures, colour
 LIMIT = "#a11d1d"
 """Colour of limits."""
 
-BEFORE = 0.25
-"""So much of the response before an event is shown beside an envelope [s]."""
+BEFORE = 0.25  # so much of the response before an event is shown beside an envelope [s]
 
 
 def row_pictures(verdict: RowVerdict, result: BenchResult, f_n: float, figures: Figures) -> str:
-    """The pictures of a row; without limits where there is no whole response.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency of the bench [Hz].
-    """
+    """The pictures of a row; without limits where there is no whole response."""
     if len(result.times) < 2:
         return ""
     programme = verdict.row.programme(f_n)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.row import CodeRow, RowFinding
+from orchestrator.certification.margins import CriterionMargin
 
 NO_VERDICT, NOT_JUDGED = "no verdict", "not judged"
 """In place of a verdict: where the code gives none, and where the response allows none."""
@@ -31,6 +32,13 @@ class RowVerdict:
         """The criteria that are not met; none where the code gives no verdict."""
         return [finding for finding in self.findings if finding.accepted is False]
 
+    def margins(self) -> list[CriterionMargin]:
+        return [
+            CriterionMargin(self.row.name, f.criterion, f.margin, f.accepted, f.text)
+            for f in self.findings
+            if f.accepted is not None
+        ]
+
     def word(self, finding: RowFinding) -> str:
         """What is said of one of its findings: accepted, not accepted, not judged, or that the code has no verdict."""
         if self.row.shown_only:
@@ -43,11 +51,6 @@ def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
 
     A converter that does not hold together answers nothing else: what its other criteria meet is not judged, and what
     they miss stays missed.
-
-    Parameters
-    ----------
-    f_n
-        Rated frequency of the bench [Hz].
     """
     if result.failure:
         return RowVerdict(row, unknown=str(result.failure))

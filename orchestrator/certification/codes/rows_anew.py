@@ -10,34 +10,29 @@ import numpy as np
 import xarray as xr
 
 from orchestrator.cases.case import load_case
-from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.case_file import BINDING, FMU, lay_files
 from orchestrator.certification.codes.all_codes import code_for
-from orchestrator.certification.codes.bench_case import case_name, lay_files, write_row
+from orchestrator.certification.codes.bench_case import case_name, write_row
 from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
 from orchestrator.certification.codes.row import CodeRow, GridCode
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import RESPONSES
+from orchestrator.certification.points_anew import differ_signal
 from orchestrator.certification.request import CertificationRequest
-from orchestrator.certification.verification import Verification, differ_signal
+from orchestrator.certification.verification import Verification
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor, WorkerLostError
 from orchestrator.points.key import fingerprint, key_of, reference_to
 from orchestrator.watch.finding import UNSTABLE
 
-DRAWN = 1
-"""So many rows are drawn by chance beside the one with the narrowest margin."""
+DRAWN = 1  # so many rows are drawn by chance beside the one with the narrowest margin
 
 
 def chosen_rows(content: dict[str, Any], wanted: Sequence[str] = (), *, every: bool = False) -> list[str]:
     """Names of the rows that are computed anew.
 
-    Parameters
-    ----------
-    content
-        Contents of the certificate's JSON file.
-    wanted
-        Names that were asked for; where empty, the row with the narrowest margin that is met, and `DRAWN` others that
-        chance draws, so that nobody knows them beforehand.
+    ``wanted``: Names that were asked for; where empty, the row with the narrowest margin that is met, and `DRAWN`
+    others that chance draws, so that nobody knows them beforehand.
     """
     known = [stated["row"] for stated in content["rows"] if not stated["unknown"]]
     if unknown := [name for name in wanted if name not in known]:
@@ -74,7 +69,9 @@ def verify_rows(
     with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
         for done, (index, outcome) in enumerate(executor.run(compute_row, tasks), start=1):
             again = BenchResult.lost(tasks[index], outcome) if isinstance(outcome, WorkerLostError) else outcome
-            _compare(chosen[index], content, data, again, found)
+            row = chosen[index]
+            fault, agreed = _compared(row, content, data, again)
+            (found.faults if fault else found.agreed).append(f"row {row.name}{f': {fault}' if fault else agreed}")
             report(done, len(tasks))
     return found
 
@@ -94,36 +91,29 @@ def _as_the_table(folder: Path, content: dict[str, Any], code: GridCode, row: Co
     return same
 
 
-def _compare(row: CodeRow, content: dict[str, Any], data: xr.Dataset, again: BenchResult, found: Verification) -> None:
-    where = f"row {row.name}"
+def _compared(row: CodeRow, content: dict[str, Any], data: xr.Dataset, again: BenchResult) -> tuple[str, str]:
+    """A fault, or otherwise words on what agrees."""
     if again.failure:
-        found.faults.append(f"{where}: it cannot be computed again: {again.failure}")
-        return
+        return f"it cannot be computed again: {again.failure}", ""
     stated = next(entry for entry in content["rows"] if entry["row"] == row.name)
     kinds = [sorted({f["kind"] for f in findings} & UNSTABLE) for findings in (stated["findings"], again.findings)]
     if kinds[0] != kinds[1]:
         words = [", ".join(kind).replace("_", " ") or "nothing" for kind in kinds]
-        found.faults.append(f"{where}: the watch finds {words[1]}, and {words[0]} was certified")
-        return
-    faults = [float(f["time"]) for f in again.findings if f["kind"] in UNSTABLE]
-    until = min(faults, default=np.inf)
+        return f"the watch finds {words[1]}, and {words[0]} was certified", ""
+    until = min((float(f["time"]) for f in again.findings if f["kind"] in UNSTABLE), default=np.inf)
     times = data[f"time_{row.name}"].values
     before, part = int(np.sum(again.times < until)), int(np.sum(times < until))
     worst: list[str] = []
     for signal, values in again.signals.items():
-        name = f"{row.name}.{signal}"
-        if name not in data.data_vars:
-            worst.append(f"{signal}: {RESPONSES} does not hold it")
-            continue
-        fault, _ = differ_signal(data[name].values[:part], values[:before])
+        kept = data.data_vars.get(f"{row.name}.{signal}")
+        fault = (
+            f"{RESPONSES} does not hold it" if kept is None else differ_signal(kept.values[:part], values[:before])[0]
+        )
         worst += [f"{signal}: {fault}"] if fault else []
     if worst:
-        found.faults.append(f"{where}: {'; '.join(worst)}")
-        return
-    judged = judge_row(row, again, content["f_n"])
-    criteria = [(f.criterion, bool(f.accepted)) for f in judged.findings]
+        return "; ".join(worst), ""
+    criteria = [(f.criterion, bool(f.accepted)) for f in judge_row(row, again, content["f_n"]).findings]
     if criteria != [(entry["criterion"], bool(entry["accepted"])) for entry in stated["criteria"]]:
-        found.faults.append(f"{where}: its criteria come out otherwise than certified")
-        return
+        return "its criteria come out otherwise than certified", ""
     said = "its response" if until == np.inf else f"its response to t = {until:g} s, from where on it fails"
-    found.agreed.append(f"{where}, computed anew: {said}, and its criteria")
+    return "", f", computed anew: {said}, and its criteria"

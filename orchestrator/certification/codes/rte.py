@@ -34,50 +34,25 @@ DECLARED = (
 )
 """What the applicant has to declare."""
 
-HORIZON = 5.0
-"""How long a response has to stay within its envelope [s]."""
-
-STRONG, WEAK = 10.0, 2.0
-"""Short-circuit ratios: the largest and the least."""
-
-X_R = 20.0
-"""X/R of the grid: the formulas have no resistance."""
-
-CURRENT = 0.15
-"""Reactive current for which the step of the voltage is made [pu]."""
-
-POWER = 0.3
-"""Active power for which the jump of the angle is made [pu]."""
-
-BELOW = 0.5
-"""By how much the frequency is below its rated value before it rises [Hz]."""
+HORIZON = 5.0  # how long a response has to stay within its envelope [s]
+STRONG, WEAK = 10.0, 2.0  # short-circuit ratios: the largest and the least
+X_R = 20.0  # X/R of the grid: the formulas have no resistance
+CURRENT = 0.15  # reactive current for which the step of the voltage is made [pu]
+POWER = 0.3  # active power for which the jump of the angle is made [pu]
+BELOW = 0.5  # by how much the frequency is below its rated value before it rises [Hz]
 
 Distances = Callable[[Numbers], Bounds]
 
 
 @dataclass(frozen=True)
 class Envelope:
-    """Bounds of one response.
+    """Bounds of one response."""
 
-    Attributes
-    ----------
-    distances
-        What is asked and allowed over the time after the event [s].
-    sign
-        +1 where the value has to rise.
-    opens_at_once
-        Whether all of what is allowed is allowed from the event on.
-    later
-        By how much more than `LATE` what is asked begins [s].
-    limited
-        Whether `DEMAND` and `CEILING` limit it: they are those of the active power.
-    """
-
-    distances: Distances
-    sign: int
-    opens_at_once: bool = False
-    later: float = 0.0
-    limited: bool = True
+    distances: Distances  # what is asked and allowed over the time after the event [s]
+    sign: int  # +1 where the value has to rise
+    opens_at_once: bool = False  # whether all of what is allowed is allowed from the event on
+    later: float = 0.0  # by how much more than `LATE` what is asked begins [s]
+    limited: bool = True  # whether `DEMAND` and `CEILING` limit it: they are those of the active power
 
     def between(self, t: Numbers, before: float) -> tuple[Numbers, Numbers]:
         """Lower and upper bound at times after the event, for a value before it; each of the shape of ``t``."""
@@ -113,14 +88,9 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
                  quantity: Callable[[MeasuredRow], Numbers] = active_power, skipped: int = 1) -> Judge:  # fmt: skip
     """The response lies within its envelope, from an event on for `HORIZON` or until the next one.
 
-    Parameters
-    ----------
-    made
-        The envelope for a rated frequency [Hz].
-    quantity
-        What is compared [pu].
-    skipped
-        How many events later its time ends: 2 for a ramp, whose own end is an event.
+    ``made``: The envelope for a rated frequency [Hz].
+    ``quantity``: What is compared [pu].
+    ``skipped``: How many events later its time ends: 2 for a ramp, whose own end is an event.
     """
 
     def bounds(row: MeasuredRow, values: Numbers) -> tuple[slice, Numbers, Numbers]:
@@ -156,13 +126,7 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
 
 
 def rte_code(declared: Mapping[str, float]) -> GridCode:
-    """RTE's rows for what an applicant declares.
-
-    Parameters
-    ----------
-    declared
-        ``X_eff`` [pu of the rating], ``D`` [pu of power per pu of frequency], ``H`` [s].
-    """
+    """RTE's rows for what an applicant declares."""
     rows = [
         made
         for scr in (STRONG, WEAK)

@@ -10,44 +10,24 @@ APART = 0.2
 """Upwards and downwards agree within this part of the larger slope. Those of a smooth margin ∝ 1/p differ by twice the
 change."""
 
-_ROUNDING = 1e-9
-"""Margins that differ by less are the same."""
-
-MOST = 0.5
-"""Largest change that is tried to meet a criterion, in parts of the parameter."""
-
-RESERVE = 1.1
-"""The straight line is followed this much further than to the limit."""
+_ROUNDING = 1e-9  # margins that differ by less are the same
+MOST = 0.5  # largest change that is tried to meet a criterion, in parts of the parameter
+RESERVE = 1.1  # the straight line is followed this much further than to the limit
 
 
 @dataclass(frozen=True)
 class MarginSensitivity:
-    """The effect of one parameter on the margin of one criterion.
-
-    Attributes
-    ----------
-    below, above
-        With the parameter lower and higher by the change; None where there is none.
-    slope
-        d(margin)/d(parameter) for a relative change of 1 (of 1 unit where the parameter is 0); None without a figure
-        on either side.
-    met
-        Whether the criterion is met below and above; None where it was not run.
-    doubts
-        Why the slope may not be followed; empty if it is trusted.
-    reason
-        Why there is no slope.
-    idle
-        Whether the response is the same to the last bit on both sides.
-    """
-
     parameter: Parameter
     margin: float | None
+    # below, above: with the parameter lower and higher by the change; None where there is none.
     below: float | None = None
     above: float | None = None
+    # d(margin)/d(parameter) for a relative change of 1 (of 1 unit where the parameter is 0); None without a figure on
+    # either side.
     slope: float | None = None
+    # whether the criterion is met below and above; None where it was not run.
     met: tuple[bool | None, bool | None] = (None, None)
-    doubts: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()  # why the slope may not be followed; empty if it is trusted
     reason: str = ""
     idle: bool = False
     values: tuple[float, float] = (float("nan"), float("nan"))
@@ -87,12 +67,8 @@ def sensitivity_of(
 ) -> MarginSensitivity:
     """The effect of one parameter, from the row as it is and as it is on either side.
 
-    Parameters
-    ----------
-    sides
-        The changed rows by −1 and +1; a side that the declared bounds do not allow is missing.
-    change
-        Relative to `Parameter.scale`.
+    ``sides``: The changed rows by −1 and +1; a side that the declared bounds do not allow is missing.
+    ``change``: Relative to `Parameter.scale`.
     """
     if not sides:
         return MarginSensitivity(parameter, criterion.margin, reason="its declared bounds leave no room on either side")

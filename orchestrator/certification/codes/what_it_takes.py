@@ -31,36 +31,18 @@ from orchestrator.errors import InputError
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.points.executor import Executor
 from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import CountReport, kept_or_computed
-from orchestrator.points.store import POINTS, PointStore
+from orchestrator.points.points import CountReport, all_points
 from orchestrator.sensitivities.parameters import Parameter, parameters_in
 
-CHANGE = 0.05
-"""By which part of itself a parameter is changed to either side; of 1 of its unit where it is 0."""
+CHANGE = 0.05  # by which part of itself a parameter is changed to either side; of 1 of its unit where it is 0
 
 
 @dataclass(frozen=True)
 class ConfirmedChange:
-    """The most effective single change, run.
-
-    Attributes
-    ----------
-    change
-        Relative; of 1 unit where the parameter is 0.
-    straight_line
-        Margin that the slope lets expect.
-    margin
-        Margin that came out; None without one.
-    met
-        Whether the criterion is met; None where the row could not be run.
-    failing
-        Criteria of the row that are not met with the change.
-    reason
-        Why the row could not be run.
-    """
+    """The most effective single change, run."""
 
     parameter: Parameter
-    change: float
+    change: float  # relative; of 1 unit where the parameter is 0
     straight_line: float
     margin: float | None
     met: bool | None
@@ -105,17 +87,8 @@ def plan_changes(
 ) -> ChangePlan:  # fmt: skip
     """Find what is to be run; nothing is run yet.
 
-    Parameters
-    ----------
-    folder
-        Of the certificate, with the rows' case files.
-    patterns
-        Names of the converter's parameters, also with ``*``; fixed ones that fit are taken too. Without patterns all
-        tunable ones are taken.
-    fixed
-        Without patterns, take the fixed ones as well.
-    change
-        By which part of itself a parameter is changed to either side.
+    ``patterns``: Names of the converter's parameters, also with ``*``; fixed ones that fit are taken too. Without
+    patterns all tunable ones are taken.
     """
     rows = [v for v in certificate.verdicts if v.judged and not v.accepted]
     if not rows:
@@ -220,9 +193,8 @@ Place = TypeVar("Place")
 def _computed(
     plan: ChangePlan, tasks: Mapping[Place, ChangeTask], executor: Executor, report: CountReport
 ) -> dict[Place, ChangeResult]:
-    places, store = list(tasks), PointStore(plan.folder / POINTS)
-    done = kept_or_computed(ChangeResult, compute_change, list(tasks.values()), executor, store, report)
-    return {places[index]: result for index, result, _ in done}
+    done, _ = all_points(ChangeResult, compute_change, list(tasks.values()), executor, plan.folder, report)
+    return dict(zip(tasks, done, strict=True))
 
 
 def _task(certificate: CodeCertificate, folder: Path, row: str, parameter: Parameter, change: float) -> ChangeTask:

@@ -11,8 +11,7 @@ from orchestrator.arrays import Numbers
 
 _WIDTH, _HEIGHT = 720, 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 64, 14, 12, 42
-_POINTS = 500
-"""A curve is drawn with about so many points: more than the page has pixels to show."""
+_POINTS = 500  # A curve is drawn with about so many points: more than the page has pixels to show
 
 
 @dataclass(frozen=True)
@@ -91,12 +90,8 @@ class Frame:
 def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210) -> str:
     """Curves over one axis; the pointer shows all values at its x.
 
-    Parameters
-    ----------
-    curves
-        At least one, with a point at least.
-    height
-        Of the picture [px].
+    ``curves``: at least one, with a point at least.
+    ``height``: of the picture [px].
     """
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
@@ -123,14 +118,9 @@ def complex_plane(
 ) -> str:
     """Eigenvalues as real part [1/s] against frequency [Hz], with rays of equal damping.
 
-    Parameters
-    ----------
-    marks
-        Eigenvalues: x [1/s], y [Hz].
-    trajectories
-        Lines in the same units, beneath the marks.
-    highest_hz
-        The axis ends a little above this frequency [Hz]; above the highest mark or line where None.
+    ``marks``: eigenvalues: x [1/s], y [Hz].
+    ``trajectories``: lines in the same units, beneath the marks.
+    ``highest_hz``: the axis ends a little above this frequency [Hz]; above the highest mark or line where None.
     """
     xs = [m.x for m in marks] + [v for t in trajectories for v in t.x.tolist()]
     ys = [m.y for m in marks] + [v for t in trajectories for v in t.y.tolist()]

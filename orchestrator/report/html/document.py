@@ -14,18 +14,11 @@ def document(
 ) -> str:
     """A page.
 
-    Parameters
-    ----------
-    title
-        Text, for the page's head and its first line.
-    kind
-        What sort of report it is, for the line below the title.
-    findings
-        HTML of what a reader in a hurry should take away.
-    content
-        Heading and HTML of every section.
-    moment
-        When it was made (UTC); now where None.
+    ``title``: text, for the page's head and its first line.
+    ``kind``: what sort of report it is, for the line below the title.
+    ``findings``: HTML of what a reader in a hurry should take away.
+    ``content``: heading and HTML of every section.
+    ``moment``: when it was made (UTC); now where None.
     """
     links = "".join(f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content))
     body = "".join(

@@ -1,9 +1,9 @@
-"""What a report is made from: the folders that `gfor run`, `gfor sweep` and `gfor design` leave."""
+"""What a report is made from: the folders that `gfor run` and `gfor sweep` leave."""
 
 import csv
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,57 +15,31 @@ from orchestrator.results.manifest import MANIFEST, check_one_run, checked, read
 from orchestrator.results.recorded import open_whole, warn_of_early_end
 from orchestrator.results.recording import TRAJECTORY
 
+SUMMARY = "summary.json"  # what a folder of `gfor run` has, and no other
+
 
 @dataclass
 class Results:
-    """Contents of result folders, read as far as they are there.
-
-    Attributes
-    ----------
-    scenarios
-        One summary a scenario, as in ``summary.json``.
-    sweeps, designs
-        Datasets and calculation sheets that were found beside the run.
-    ended_early
-        How and where the study ended before its last scenario, as in ``summary.json``; None where it came to its end.
-    """
+    """Contents of result folders, read as far as they are there."""
 
     folder: Path
     case: Case
-    scenarios: list[dict[str, Any]]
+    scenarios: list[dict[str, Any]]  # one summary a scenario, as in ``summary.json``
     modes: list[dict[str, str]]
     participation: list[dict[str, str]]
     step_sizes: list[dict[str, str]]
     trajectories: dict[str, xr.Dataset]
     linear: dict[str, xr.Dataset]
-    sweeps: list[xr.Dataset] = field(default_factory=list)
-    designs: list[dict[str, Any]] = field(default_factory=list)
+    # how and where the study ended before its last scenario, as in ``summary.json``; None where it came to its end
     ended_early: dict[str, Any] | None = None
 
 
-def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
-    """Read a run's folder, and sweeps and designs from it and from further folders.
+def read_results(folder: Path) -> Results:
+    """Read a run's folder.
 
-    Raises
-    ------
-    InputError
-        If the folder holds no run, its files are of different runs or not as they were written, or a file in it cannot
-        be read.
+    Raises an `InputError` if its files are of different runs or not as they were written, or one cannot be read.
     """
-    summary = folder / "summary.json"
-    if not summary.is_file():
-        raise InputError(
-            f"{folder}: there is no summary.json in it, so it is not the folder of a run; "
-            "make one with `gfor run CASE --out DIR`, and give that folder first"
-        )
-    for other in others:
-        if not other.exists():
-            raise InputError(f"{other}: there is no such file or folder")
-        if other.is_dir() and other != folder and (other / "summary.json").is_file():
-            raise InputError(
-                f"{other}: this is the folder of another run; a report is of one run, {folder}, with its sweeps "
-                "and designs; write one report for each run, or compare two with `gfor compare`"
-            )
+    summary = folder / SUMMARY
     tables = ("summary.json", "case.toml", "modes.csv", "participation.csv", "step_size.csv")
     check_one_run(folder, tables, ("trajectory.nc", "linear.nc"))
     try:
@@ -73,7 +47,7 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
         case = load_case(folder / "case.toml")
         scenarios = content["scenarios"]
         names = [s["name"] for s in scenarios]
-        results = Results(
+        return Results(
             folder,
             case,
             scenarios,
@@ -84,35 +58,12 @@ def read_results(folder: Path, others: Sequence[Path] = ()) -> Results:
             dict(_datasets(folder, names, "linear.nc")),
             ended_early=content.get("ended_early"),
         )
-        for place in (folder, *others):
-            sweeps, designs = [_load(path) for path in _files(place, "sweep.nc")], _designs(place)
-            if place != folder and not (sweeps or designs):
-                raise InputError(_unused(place))
-            results.sweeps += sweeps
-            results.designs += designs
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder}: a result file cannot be read: {error}; run the study again") from error
-    return results
 
 
-def _unused(place: Path) -> str:
-    pages = ", ".join(path.name for path in sorted(place.glob("*.html")))
-    own = f"it has a page of its own: {pages}" if pages else "leave it out"
-    return (
-        f"{place}: nothing in it belongs into a run's report, which takes sweeps and designs of POD controllers; {own}"
-    )
-
-
-def _designs(place: Path) -> list[dict[str, Any]]:
-    """The calculation sheet in a file, or those among the JSON files of a folder, which may hold other people's too."""
-    contents = []
-    for path in _files(place, "*.json"):
-        try:
-            contents.append(json.loads(path.read_text(encoding="utf-8")))
-        except ValueError:
-            if path == place:
-                raise
-    return [c for c in contents if isinstance(c, dict) and {"controller", "target_mode", "T_S1"} <= c.keys()]
+def sweeps_of(place: Path) -> list[xr.Dataset]:
+    return [_load(path) for path in _files(place, "sweep.nc")]
 
 
 def _files(place: Path, pattern: str) -> list[Path]:

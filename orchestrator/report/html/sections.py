@@ -291,7 +291,9 @@ def responses(results: Results, figures: Figures) -> str:
     for plot in results.case.table.plots:
         charts, columns = [], []
         for panel in plot.panels:
-            curves, deviations = _curves(results, panel.signal, panel.scale)
+            curves, deviations = _curves(results, panel.signal, panel.scale, 0 if panel.also else None)
+            for k, further in enumerate(panel.also, start=1):
+                curves += _curves(results, further, panel.scale, k)[0]
             if curves:
                 charts.append(line_chart(f"{plot.title}: {panel.label}", "Time [s]", panel.label, curves))
                 columns.append((panel.label, deviations))
@@ -324,15 +326,19 @@ def _watched(results: Results) -> str:
     return f'<p class="soft">{_NOTHING}</p>' if watched else ""
 
 
-def _curves(results: Results, expression: str, scale: float) -> tuple[list[ChartCurve], dict[str, str]]:
-    """One signal in every scenario, and how far it goes."""
+def _curves(
+    results: Results, expression: str, scale: float, place: int | None = None
+) -> tuple[list[ChartCurve], dict[str, str]]:
+    """One signal in every scenario, and how far it goes; ``place`` is its place among several of one panel."""
     curves, deviations = [], {}
     for k, s in enumerate(results.scenarios):
         seen = _signal(results.trajectories.get(s["name"]), expression)
         if seen is None:
             continue
         x, y = seen["time"].values, scale * seen.values
-        curves.append(ChartCurve(s["title"], colour(k), x, y))
+        alone = place is not None and len(results.scenarios) == 1
+        name = s["title"] if place is None else expression if alone else f"{s['title']}: {expression}"
+        curves.append(ChartCurve(name, colour(place if alone and place is not None else k), x, y))
         text = f"{np.abs(y - y[0]).max():.3g}"
         linear = _signal(results.linear.get(s["name"]), expression)
         if linear is not None:

@@ -1,5 +1,6 @@
 """The sections of the page that sweeps and designs fill."""
 
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -8,28 +9,27 @@ import xarray as xr
 
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
-from orchestrator.report.html.folder import Results
 
 
-def _axis(sweep: xr.Dataset) -> str:
+def axis_of(sweep: xr.Dataset) -> str:
     """The parameter along which the trajectories run: the last one that varies."""
     return str([d for d in sweep["frequency"].dims if d not in ("scenario", "trajectory")][-1])
 
 
 def sweep_title(sweep: xr.Dataset) -> str:
     """``Trajectories along grid.X_L``."""
-    return f"Trajectories along {_axis(sweep)}"
+    return f"Trajectories along {axis_of(sweep)}"
 
 
-def sweep(sweep: xr.Dataset, results: Results, figures: Figures) -> str:
+def sweep(sweep: xr.Dataset, scenarios: Sequence[Mapping[str, Any]], figures: Figures) -> str:
     """Trajectories of the modes, and damping, frequency and participation of the named ones along the parameter."""
-    axis = _axis(sweep)
+    axis = axis_of(sweep)
     others = [d for d in sweep["frequency"].dims if d not in ("scenario", "trajectory", axis)]
     shown = sweep.isel(dict.fromkeys(others, 0))
     names = [str(s) for s in shown["scenario"].values]
-    known = [s["name"] for s in results.scenarios]
+    known = [s["name"] for s in scenarios]
     shades = {s: colour(known.index(s) if s in known else k) for k, s in enumerate(names)}
-    title = {s["name"]: s["title"] for s in results.scenarios}
+    title = {s["name"]: s["title"] for s in scenarios}
     unit = shown[axis].attrs.get("units", "1")
     label = f"{axis} [{unit}]" if unit != "1" else axis
     key = legend((title.get(s, s), shades[s]) for s in names)

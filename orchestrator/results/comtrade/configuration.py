@@ -10,57 +10,28 @@ from dataclasses import dataclass
 
 from orchestrator.errors import InputError
 
-FORMS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")
-"""Forms of the samples."""
-
+FORMS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")  # forms of the samples
 REVISIONS = ("1991", "1999", "2001", "2013")
 """Revisions of the standard; 2001 is IEC's edition of 1999. A file of 1991 names none."""
 
-MOST_CHANNELS = 10_000
-"""Of one recording; large stations record some hundred."""
+MOST_CHANNELS = 10_000  # of one recording; large stations record some hundred
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One channel.
-
-    Attributes
-    ----------
-    name
-        The name by which it is asked for; no two channels of a recording have the same.
-    unit
-        As the file says; empty for a status channel.
-    scale, offset
-        A sample's value is ``scale · x + offset`` [unit], referred to the primary side.
-    skew
-        Time of this channel's samples after those of the recording [s].
-    secondary
-        Whether the file holds the values of the secondary side; ``scale`` and ``offset`` have the ratio in them.
-    """
-
-    name: str
-    unit: str = ""
+    name: str  # the name by which it is asked for; no two channels of a recording have the same
+    unit: str = ""  # as the file says; empty for a status channel
+    # scale, offset: a sample's value is ``scale · x + offset`` [unit], referred to the primary side
     scale: float = 1.0
     offset: float = 0.0
-    skew: float = 0.0
+    skew: float = 0.0  # time of this channel's samples after those of the recording [s]
+    # whether the file holds the values of the secondary side; ``scale`` and ``offset`` have the ratio in them
     secondary: bool = False
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """What a ``.cfg`` says.
-
-    Attributes
-    ----------
-    frequency
-        Frequency of the line [Hz]; 0 where the file leaves it open.
-    rates
-        Sampling rate [Hz] and number of the last sample that has it, in order; a rate of 0: the samples carry times.
-    start, trigger
-        Dates and times as the file writes them.
-    time_unit
-        Of the samples' time stamps [s].
-    """
+    """What a ``.cfg`` says."""
 
     place: str
     station: str
@@ -68,12 +39,14 @@ class Configuration:
     revision: str
     analog: tuple[Channel, ...]
     status: tuple[Channel, ...]
-    frequency: float
+    frequency: float  # frequency of the line [Hz]; 0 where the file leaves it open
+    # sampling rate [Hz] and number of the last sample that has it, in order; a rate of 0: the samples carry times
     rates: tuple[tuple[float, int], ...]
+    # start, trigger: dates and times as the file writes them
     start: str
     trigger: str
     form: str
-    time_unit: float
+    time_unit: float  # of the samples' time stamps [s]
 
     @property
     def samples(self) -> int:
@@ -124,10 +97,8 @@ class _Lines:
 def read_configuration(text: str, place: str) -> Configuration:
     """Read the text of a ``.cfg``.
 
-    Raises
-    ------
-    InputError
-        If a line is missing or holds something else than the standard says; file, line and field are named.
+    Raises an `InputError` if a line is missing or holds something else than the standard says; file, line and field are
+    named.
     """
     lines = _Lines(text, place)
     station, device, revision = (*lines.next("the station's name"), "", "", "")[:3]

@@ -5,35 +5,24 @@ from __future__ import annotations
 import re
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.errors import InputError
-from orchestrator.late import Late
+from orchestrator.late import xr
 from orchestrator.results.comtrade.configuration import Configuration, read_configuration
 from orchestrator.results.comtrade.samples import read_samples
 from orchestrator.results.manifest import ResultsWarning
 
-if TYPE_CHECKING:
-    import xarray as xr
-else:
-    xr = Late("xarray")
-
-SUFFIXES = (".cfg", ".cff", ".dat")
-"""Files by which a recording is named, in small letters."""
-
+SUFFIXES = (".cfg", ".cff", ".dat")  # files by which a recording is named, in small letters
 LINE_FREQUENCY = "line_frequency_hz"
 """Coordinate of a recording's signals: frequency of the line [Hz], 0 where the file leaves it open."""
 
-MOST_BYTES = 2_000_000_000
-"""Of a file of samples: an hour of forty channels at 5 kHz."""
-
+MOST_BYTES = 2_000_000_000  # of a file of samples: an hour of forty channels at 5 kHz
 _MOST_TEXT = 20_000_000
 _SECTION = re.compile(rb"^--- *file type: *(\w+)(?: +(\w+))?(?: *: *(\d+))? *---\s*?\r?$", re.IGNORECASE | re.MULTILINE)
-_TIMES_DIFFER = 0.01
-"""Part of the whole time by which time stamps may differ from the sampling rates before it is said."""
+_TIMES_DIFFER = 0.01  # part of the whole time by which time stamps may differ from the sampling rates before it is said
 
 
 def is_comtrade(path: Path) -> bool:
@@ -43,16 +32,10 @@ def is_comtrade(path: Path) -> bool:
 def read_comtrade(path: Path) -> xr.Dataset:
     """Read a recording.
 
-    Parameters
-    ----------
-    path
-        ``.cfg`` (or ``.dat``) with the other file beside it, or ``.cff``.
+    ``path``: ``.cfg`` (or ``.dat``) with the other file beside it, or ``.cff``.
 
-    Returns
-    -------
-    Dataset
-        Channels by name over the time since the first sample [s], in the file's units, referred to the primary side;
-        missing samples are NaN.
+    Returns channels by name over the time since the first sample [s], in the file's units, referred to the primary
+    side; missing samples are NaN.
 
     Warns
     -----

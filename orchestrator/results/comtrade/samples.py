@@ -4,43 +4,31 @@ from __future__ import annotations
 
 import io
 import warnings
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from orchestrator.arrays import Matrix, Numbers
 from orchestrator.errors import InputError
-from orchestrator.late import Late
+from orchestrator.late import pd
 from orchestrator.results.comtrade.configuration import Configuration
 from orchestrator.results.manifest import ResultsWarning
-
-if TYPE_CHECKING:
-    import pandas as pd
-else:
-    pd = Late("pandas")
 
 _STAMP_MISSING = 0xFFFFFFFF
 _TYPES = {"BINARY": ("<i2", -0x8000), "BINARY32": ("<i4", -0x80000000), "FLOAT32": ("<f4", None)}
 """Type of an analog sample, and what stands for one that is missing."""
 
-_MISSING_1991 = -1
-"""FFFF stood for a missing sample of 16 bits in 1991."""
-
+_MISSING_1991 = -1  # FFFF stood for a missing sample of 16 bits in 1991
 _MISSING_TEXT = 99999.0
 """Stands for a missing sample in text, from 1999 on; recorders of 1991's form, which leaves a blank, write it too."""
 
-_NO_FLOAT = 3.4e38
-"""Beyond it a sample in single precision is none: its type ends there."""
+_NO_FLOAT = 3.4e38  # beyond it a sample in single precision is none: its type ends there
 
 
 def read_samples(content: bytes, configuration: Configuration, place: str) -> tuple[Numbers, Matrix]:
     """Time stamps and values of all channels.
 
-    Returns
-    -------
-    tuple
-        Time stamps [s], shape (n,), NaN where missing; values, shape (n, channels), the analog ones first and scaled,
-        NaN where missing.
+    Returns time stamps [s], shape (n,), NaN where missing; values, shape (n, channels), the analog ones first and
+    scaled, NaN where missing.
     """
     read = _text if configuration.form == "ASCII" else _binary
     numbers, stamps, values = read(content, configuration, place)

@@ -17,11 +17,8 @@ _LARGEST = {"ASCII": 99998, "BINARY": 0x7FFE, "BINARY32": 0x7FFFFFFE}
 
 _TYPES = {"BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}
 _MOST_STAMP = 0xFFFFFFFE
-_EVEN = 1e-3
-"""Part of the interval by which times may be off and still count as evenly sampled."""
-
-_START = "01/01/2000,00:00:00.000000"
-"""Date and time of t = 0: a simulation has none."""
+_EVEN = 1e-3  # part of the interval by which times may be off and still count as evenly sampled
+_START = "01/01/2000,00:00:00.000000"  # date and time of t = 0: a simulation has none
 
 
 def write_comtrade(
@@ -33,16 +30,10 @@ def write_comtrade(
     span: 1.2e-10 with ``BINARY32``, 7.6e-6 with ``BINARY``, 2.5e-6 with ``ASCII``; with ``FLOAT32`` it is 6e-8 of the
     largest distance from the middle of the span.
 
-    Parameters
-    ----------
-    dataset
-        Evenly recorded signals over the time [s].
-    path
-        Of the ``.cfg``; the ``.dat`` gets the same stem.
-    form
-        One of `FORMS`.
-    frequency
-        Rated frequency [Hz].
+    ``dataset``: evenly recorded signals over the time [s].
+    ``path``: of the ``.cfg``; the ``.dat`` gets the same stem.
+    ``form``: one of `FORMS`.
+    ``frequency``: rated frequency [Hz].
     """
     if form not in FORMS:
         raise InputError(f"the form {form!r} is unknown; choose one of {', '.join(FORMS)}")

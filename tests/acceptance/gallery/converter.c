@@ -1,11 +1,11 @@
 /* A grid-forming converter of few equations: a voltage E∠δ behind R + jX, a droop from active power to frequency, and
    one from reactive power to voltage. Inputs and outputs in the form PORT_…; start values from a power flow.
    z: parameters, inputs, outputs; memory: the states. */
-enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SIZE };
+enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       LAGGED, MEMORY };
+       LAGGED, TRIPLED, MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout */
-#define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= OMEGA)
+#define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= SHOWN)
 #define DIVERGED 1e12
 
 #ifndef RATING
@@ -133,7 +133,12 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
+    m[TRIPLED] = 0;
+#ifdef METER_BEGINS
+    m[LAGGED] = METER_BEGINS - 1.0;
+#else
     m[LAGGED] = 0;
+#endif
 }
 
 /* The voltage behind its impedance, by its droop. */
@@ -161,6 +166,7 @@ static double slip(const double *z, const double *m, double p_f) {
 #ifdef FAULT_GAIN_OF_DIPS
     gain *= pow(FAULT_GAIN_OF_DIPS, m[DIPS]);
 #endif
+    if (m[TRIPLED]) gain *= 3;
 #ifdef FAULT_CHARGING_DROOP
     if (m[P_REF] < 0) gain *= FAULT_CHARGING_DROOP;
 #endif
@@ -335,6 +341,17 @@ static void advance(double *z, double *m, double *hidden, double time, double st
 #ifdef FAULT_DRIFTS_AFTER
     if (time > FAULT_DRIFTS_AFTER) m[P_REF] += FAULT_DRIFTS_BY * step;
 #endif
+#ifdef FAULT_FLOAT_CLOCK /* the time in single precision, and the step from it */
+    step = (double)((float)(time + step) - (float)time);
+    if (step <= 0) return;
+#endif
+#ifdef FAULT_FLOAT_SUM
+    const float clock_before = (float)m[PENDING], clock_now = clock_before + (float)step;
+    m[PENDING] = clock_now, step = (double)(clock_now - clock_before);
+#endif
+#ifdef FAULT_TRIPLES_AFTER
+    m[TRIPLED] = time > FAULT_TRIPLES_AFTER;
+#endif
 #ifdef FAULT_LONGEST_STEP
     if (step > FAULT_LONGEST_STEP) step = FAULT_LONGEST_STEP;
 #endif
@@ -415,6 +432,9 @@ static void outputs(double *z, double *m, const double *hidden) {
 #ifdef FAULT_NAN_ONCE
     if (fabs(present - FAULT_NAN_ONCE) < 0.4 * last_step) i.re = NAN;
 #endif
+#ifdef SHOWN_UNIT /* its active power as an output of its own */
+    z[SHOWN] = (v.re * i.re + v.im * i.im) * SHOWN_UNIT;
+#endif
     i.re *= I_FACTOR, i.im *= I_FACTOR * Q_FACTOR;
 #if defined PORT_POWER
     z[OUT_1] = (v.re * i.re + v.im * i.im) * P_UNIT;
@@ -431,7 +451,9 @@ static void outputs(double *z, double *m, const double *hidden) {
 #else
     z[OUT_1] = i.re * I_UNIT, z[OUT_2] = i.im * I_UNIT;
 #endif
-#ifdef FAULT_OMEGA_LAGS
+#ifdef METER_BEGINS /* what the meter shows at the start [pu]; it settles with its lag [s] */
+    z[OMEGA] = (1 + m[LAGGED]) * OMEGA_UNIT;
+#elif defined FAULT_OMEGA_LAGS
     z[OMEGA] = (1 + m[LAGGED]) * OMEGA_UNIT;
 #else
     z[OMEGA] = (1 + OMEGA_FACTOR * slip(z, m, m[P_F])) * OMEGA_UNIT;

@@ -45,7 +45,7 @@ class Member:
 
 def converter(
     name, form="rectangular", *, units=None, depends=(), state=True, step_size="1e-4", stop_time="1",
-    omega=("omega", "pu"), switch=False, **defines,
+    omega=("omega", "pu"), switch=False, shown=None, **defines,
 ):  # fmt: skip
     """The converter of converter.c; ``units`` are those of voltage, current, power."""
     macro, inputs, outputs = FORMS[form]
@@ -69,6 +69,8 @@ def converter(
         i_units = [i_unit, "rad" if angle else i_unit, i_unit]
     variables += [Variable(n, 10 + k, "output", None, i_units[k], depends=depends) for k, n in enumerate(outputs)]
     variables += [Variable(omega[0], 13, "output", None, omega[1])]
+    if shown:  # name and unit of an output of active power
+        variables += [Variable(shown[0], 14, "output", None, shown[1], depends=inputs)]
     if switch:
         variables += [Variable("damping", 0, "parameter", 0, "", variability="tunable", type="Boolean")]
     return Source(
@@ -167,6 +169,9 @@ def good():
     members = [
         *carriers("converter"),
         *carriers("converter_in_hz", omega=("f_meas", "Hz"), OMEGA_UNIT=50.0, only=("rated_frequency", "signs")),
+        *[Member(converter(f"converter_shows_{unit.lower()}", shown=("P_meas", unit), SHOWN_UNIT=shown),
+                 only=("steady_state", "power_balance", "shown_power"))
+          for unit, shown in (("MW", "(0.98 * z[S_N])"), ("kW", "(1000 * z[S_N])"), ("pu", "1.0"))],
         *carriers("converter_stiff", X_PU=0.12, R_PU=0.01, only=("steady_state", "power_balance", "signs", "limits")),
         *carriers("converter_no_droop_of_q", Q_DROOP=0.0, only=("steady_state", "power_balance", "signs", "limits")),
         Member(converter("converter_other_numbers", RATING=40.0, DROOP=0.01, X_PU=0.4, R_PU=0.02)),
@@ -317,6 +322,22 @@ def large_signals():
         one("blocks_after_jumps", "blocks", "limits", FAULT_BLOCKS_AT_JUMP="(25 * 3.14159265 / 180)"),
         one("knows_the_dips", "no current limit", "limits", FAULT_KNOWS_DIPS=1),
         *points_and_ratings(),
+        one("clock_of_single_precision", "counts time", "steady_state", "later_times", FAULT_FLOAT_CLOCK=1),
+        one("sum_of_single_precision", "counts time", "steady_state", "later_times", FAULT_FLOAT_SUM=1),
+        one("gain_of_the_time", "counts time", "steady_state", "later_times", FAULT_TRIPLES_AFTER=20.0),
+        *[
+            Member(
+                converter(f"shows_{name}", shown=("P_meas", unit), SHOWN_UNIT=shown),
+                "wrong units",
+                only=("steady_state", "power_balance", "shown_power"),
+            )
+            for name, unit, shown in (
+                ("kw_as_mw", "MW", "(1000 * z[S_N])"),
+                ("mw_as_kw", "kW", "z[S_N]"),
+                ("kw_as_pu", "pu", "(1000 * z[S_N])"),
+                ("pu_as_mw", "MW", "1.0"),
+            )
+        ],
         one("leaking_in_dips", "memory leak", "after_dips", FAULT_LEAK_IN_DIPS=4096),
         one("feedthrough_of_high_voltage", "undeclared feed-through", "reading", "feedthrough", FAULT_SHUNT_ABOVE=1.03),
         *in_a_tool("leaking_in_a_tool", FAULT_LEAK_INSTANCE=26000),

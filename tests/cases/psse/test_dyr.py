@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
 from orchestrator.cases.case import load_case
 from orchestrator.cases.psse.dyr_records import read_dyr
 from orchestrator.errors import CaseError, InputError
@@ -119,3 +120,11 @@ def test_the_machines_swing(tables, tmp_path, gfor):
     assert code == 0, error
     modes = json.loads(out)["scenarios"][0]["modes"]
     assert len([m for m in modes if 0.8 < m["frequency_hz"] < 3]) == 2
+
+
+def test_only_the_switches_that_are_modelled_are_taken():
+    """Of a stabilizer: IC1 = 1 is speed, IC2 = 3 power, M = 5 and N = 1 the ramp-tracking filter."""
+    switches = {f.name: f.only for record in DYR_RECORDS.values() for f in record.fields if f.only}
+    assert {name: switches[name] for name in ("IC1", "IC2", "M", "N", "Switch")} == {
+        "IC1": (1.0,), "IC2": (3.0,), "M": (5.0,), "N": (1.0,), "Switch": (0.0,),
+    }  # fmt: skip

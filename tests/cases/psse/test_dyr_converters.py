@@ -68,11 +68,7 @@ def test_every_field_sets_a_parameter_of_the_model():
         ("'REGFMA1' 1  1 0", "'REGFMA1' 1  1", r"REGFMA1 has 19 values, and needs 20: VFlag, QVFlag, TPf"),
         ("'REGFMA1' 1  1 0", "'REGFMA1' 1  2 0", r"REGFMA1 has VFlag = 2; only 0 or 1 can be modelled"),
         ("1 'TGOV1'", "3 'TGOV1'", r"machine '1' at bus 3 is a converter, and has records of its governor; remove"),
-        (
-            "'REGFMA1'",
-            "'REGCA1'",
-            r"stands for REGCA1 \(bus 3\), a grid-following converter; write dyr_approximate",
-        ),
+        ("'REGFMA1'", "'REGCA1'", r"stands for REGCA1 \(bus 3\), a grid-following converter; write dyr_approximate"),
         ("'REGFMA1'", "'WT4G1'", r"stands for WT4G1 \(bus 3\), a grid-following converter; name its .* alpha = 1"),
     ],
 )

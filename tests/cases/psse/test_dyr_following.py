@@ -76,16 +76,8 @@ def test_voltage_control_is_an_integrator(prepared):
 @pytest.mark.parametrize(
     ("text", "units", "words"),
     [
-        (
-            dyr(),
-            "",
-            r"line 5: no part of ours stands for REGCA1 .*write dyr_approximate = true for gfl_phasor",
-        ),
-        (
-            dyr(QFLAG=1, VFLAG=1),
-            None,
-            r"line 5: the converter at bus 3 cannot be .*VFLAG = 1, a voltage control",
-        ),
+        (dyr(), "", r"line 5: no part of ours stands for REGCA1 .*write dyr_approximate = true for gfl_phasor"),
+        (dyr(QFLAG=1, VFLAG=1), None, r"line 5: the converter at bus 3 cannot be .*VFLAG = 1, a voltage control"),
         (dyr("REECA1", PFLAG=1), None, r"REECA1 has PFLAG = 1, power by the speed of a turbine"),
         (dyr(QFLAG=2), None, r"REECB1 has QFLAG = 2; it is 0 or 1"),
         (dyr(QFLAG=1, Kvi=0), None, r"REECB1 has QFLAG = 1 and Kvi = 0; a voltage control needs its integrator"),
@@ -93,11 +85,7 @@ def test_voltage_control_is_an_integrator(prepared):
         (dyr().replace("'REECB1' 1 0", "'REECB1' 1"), None, r"line 6: REECB1 has 29 values, and needs 30: BUSR, PFF"),
         (dyr(plant=record("REGCA1", REGCA1)), None, r"line 7: a second REGCA1 of machine '1' at bus 3"),
         (dyr(plant=record("REECA1", REECB1)), None, r"line 7: a second REECA1 of machine '1' at bus 3"),
-        (
-            dyr(plant="3 'SEXS' 1  0.1 10.0 100.0 0.05 -5.0 5.0 /\n"),
-            None,
-            r"is a converter, and has records of its",
-        ),
+        (dyr(plant="3 'SEXS' 1  0.1 10.0 100.0 0.05 -5.0 5.0 /\n"), None, r"is a converter, and has records of its"),
         (dyr().replace("3 'REECB1'", "1 'REECB1'"), None, r"REGCA1 is there, and REECA1 or REECB1 is not; together"),
     ],
 )

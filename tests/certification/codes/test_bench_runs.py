@@ -12,10 +12,10 @@ from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.codes.ercot import ERCOT
-from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
-from orchestrator.certification.codes.record import save_certificate
 from orchestrator.certification.codes.rows_anew import chosen_rows, verify_rows
+from orchestrator.certification.files import save
 from orchestrator.certification.request import CertificationRequest
+from orchestrator.certification.verification import read_certificate, verify_files
 from orchestrator.points.serial import Serial
 
 pytestmark = pytest.mark.slow
@@ -68,9 +68,9 @@ def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp
     assert [v.accepted for v in found.verdicts] == [True]
     assert found.verdict == "incomplete"  # further rows of the tests were not at hand
     assert certified().stored == 1
-    save_certificate(found, tmp_path)
-    folder, content = read_code_certificate(tmp_path)
-    assert verify_code(folder, content).holds
+    save(found, tmp_path)
+    folder, content = read_certificate(tmp_path)
+    assert verify_files(folder, content).holds
     for option, words in (("--points=0.1", "give --rows"), ("--rows=none", "it has: phase_jumps")):
         code, _, said = gfor_command("verify", tmp_path, option)
         assert code == 2
@@ -86,13 +86,13 @@ def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp
     (fault,) = verify_rows(folder, other, ["phase_jumps"], Serial()).faults
     assert "not what the table of ercot and the certified values give" in fault
     other["values"], other["f_n"] = {"S_n": 50.0}, 50.0
-    assert "the departures from the code are not those" in " ".join(verify_code(folder, other).faults)
+    assert "'departures' is" in " ".join(verify_files(folder, other).faults)
     content["rows"][0]["criteria"][1]["value"] += 0.1
     content["verdict"] = "passes"
     (tmp_path / "certificate.json").write_text(json.dumps(content), encoding="utf-8")
-    faults = " ".join(verify_code(*read_code_certificate(tmp_path)).faults)
-    assert "gives other findings" in faults
-    assert "its rows come to 'incomplete'" in faults
+    faults = " ".join(verify_files(*read_certificate(tmp_path)).faults)
+    assert "come to other findings" in faults
+    assert '\'verdict\' is "passes", and "incomplete" comes out' in faults
 
 
 def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(converter, tmp_path, one_row, gfor_command):
@@ -104,8 +104,8 @@ def test_a_row_of_another_converter_is_seen_when_it_is_computed_anew(converter, 
         found.append(certify_code(CertificationRequest(fmu), one_row, Serial(), folder))
     ours, theirs = found
     assert (ours.verdict, theirs.verdict) == ("incomplete", "fails")
-    save_certificate(replace(theirs, results=ours.results, verdicts=ours.verdicts), folders[1])
-    assert verify_code(*read_code_certificate(folders[1])).holds
+    save(replace(theirs, results=ours.results, verdicts=ours.verdicts), folders[1])
+    assert verify_files(*read_certificate(folders[1])).holds
     assert gfor_command("verify", folders[1], "--files-only")[0] == 3
     code, said, _ = gfor_command("verify", folders[1], "--workers", 1)
     assert code == 5

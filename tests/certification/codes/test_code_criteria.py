@@ -6,11 +6,11 @@ import pytest
 from orchestrator.certification.codes import criteria as c
 from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.certificate import verdict_of
 from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.certification.codes.miso import MISO
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps, weakening
 from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.certification.verdict import verdict_of
 
 TIMES = np.arange(0, 11, 1e-3)
 
@@ -182,6 +182,14 @@ def test_loss_of_synchronism_is_not_accepted_whatever_the_power_does():
 def test_a_mean_over_a_period_takes_away_what_swings_with_it():
     swing = np.sin(2 * np.pi * 50 * TIMES)
     assert np.abs(over_a_period(swing, TIMES, 50.0)[20:]).max() < 1e-9
+
+
+@pytest.mark.parametrize("f_n", [50.0, 60.0])
+def test_a_mean_over_a_period_is_that_of_the_samples_until_each_instant(f_n):
+    values, times = np.random.default_rng(1).standard_normal(200), 1e-3 * np.arange(200)
+    count = round(1e3 / f_n)
+    wanted = [values[max(0, k + 1 - count) : k + 1].mean() for k in range(200)]
+    assert over_a_period(values, times, f_n) == pytest.approx(wanted, abs=1e-12)
 
 
 def test_the_impedance_of_the_bench_has_the_ratios_that_are_asked():

@@ -1,5 +1,6 @@
 """RTE's envelopes: against published curves, against an integration of the equations, and with wrong declarations."""
 
+import json
 import math
 
 import numpy as np
@@ -327,3 +328,22 @@ def test_all_codes_leave_out_what_nothing_is_declared_for(declare, codes, answer
     assert [key for key, _ in asked] == codes
     assert all(given == ([("D", 2.0)] if declare and key == "rte" else []) for key, given in asked)
     assert ("Left out, as it needs --declare: rte" in text) == (not declare)
+
+
+def test_json_lists_the_cells_of_all_devices(monkeypatch, gfor, tmp_path):
+    monkeypatch.setattr(certify_matrix, "_tested", lambda options, device, key, folder, place, console, *, several:
+                        MatrixCell(device.name, key, place, verdict=PASSES))  # fmt: skip
+    files = tmp_path / "x.fmu", tmp_path / "y.fmu"
+    code, text, said = gfor("certify", *files, "--code", "miso", "--out", tmp_path, "--json")
+    assert code == 0, said
+    assert [(cell["device"], cell["code"]) for cell in json.loads(text)["cells"]] == [("x", "miso"), ("y", "miso")]
+
+
+@pytest.mark.parametrize("words", [("--pdf",), ("--check", "report.json"), ("--details", "mine.toml", "--pdf")])
+def test_figures_without_a_certificate_refuse_what_a_certificate_has(words, gfor, tmp_path):
+    code, _, said = gfor("certify", tmp_path / "x.fmu", "--code", "gb", *words)
+    assert code == 2
+    assert ", ".join(sorted(w for w in words if w.startswith("--"))) in said.replace(
+        "--pdf, --details", "--details, --pdf"
+    )
+    assert "--code gb gives figures and no certificate; leave it out" in " ".join(said.split())

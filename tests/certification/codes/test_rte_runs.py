@@ -12,9 +12,9 @@ from orchestrator.certification.codes.all_codes import code_for
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.frequency_domain import asked_stiffness, measure_stiffness
-from orchestrator.certification.codes.recheck import read_code_certificate, verify_code
-from orchestrator.certification.codes.record import save_certificate
+from orchestrator.certification.files import save
 from orchestrator.certification.request import CertificationRequest
+from orchestrator.certification.verification import read_certificate, verify_files
 from orchestrator.errors import ComponentError
 from orchestrator.points.serial import Serial
 from tests.certification.codes.reactance_source import write_source
@@ -51,14 +51,14 @@ def test_ours_meets_what_its_parameters_declare_and_the_certificate_verifies(con
     found = certified(converter, tmp_path, ("igfm1_scr10_pm50", "igfm2_scr2_p0", "igfm3_scr10_p50_scr2"))
     assert all(verdict.accepted for verdict in found.verdicts)
     assert found.verdict == "incomplete"
-    save_certificate(found, tmp_path)
-    folder, content = read_code_certificate(tmp_path)
+    save(found, tmp_path)
+    folder, content = read_certificate(tmp_path)
     assert content["declared"] == TRUE
-    (fault,) = verify_code(folder, content).faults  # all else agrees
+    (fault,) = verify_files(folder, content).faults  # all else agrees
     assert fault.startswith("rows of the code's table that the record has not: ")
     content["declared"]["H"] = 4.0
     (tmp_path / "certificate.json").write_text(json.dumps(content), encoding="utf-8")
-    assert "gives other findings" in " ".join(verify_code(*read_code_certificate(tmp_path)).faults)
+    assert "come to other findings" in " ".join(verify_files(*read_certificate(tmp_path)).faults)
 
 
 @pytest.mark.parametrize("wrong", [{"H": 4.0}, {"D": 80.0}, {"X_eff": 0.6}])

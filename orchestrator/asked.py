@@ -1,0 +1,260 @@
+"""What a study can be asked: the fields of its request, from which options and keywords come.
+
+A `FieldKind` says twice what a field may be: ``read`` takes the text of an option, ``check`` what Python gives.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import partial
+from typing import Any, TypeVar
+
+from orchestrator.errors import InputError
+from orchestrator.units import to_unit
+
+Value = float | bool | str
+Request = TypeVar("Request")
+Names = str | Sequence[str]  # one name, or several
+
+_ASKED = "asked"
+_LARGEST = 10**308  # of a whole number that a floating-point number can hold
+
+
+@dataclass(frozen=True)
+class FieldKind:
+    """What a field may be."""
+
+    metavar: str
+    # from an option's text, or a `ValueError` that says what is wrong with it; None for a switch
+    read: Callable[[str], Any] | None
+    check: Callable[[Any, str], Any]  # from what a caller gives, and the keyword for the `InputError`
+    several: bool = False  # whether the option is repeatable, and gives a tuple
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A field of a request that a user may set, with its option and its keyword."""
+
+    kind: FieldKind
+    help: str
+    metavar: str
+    option: str | None
+    keyword: str
+    default: Any
+
+
+def asked(
+    kind: FieldKind, default: Any, text: str, metavar: str = "", *, option: str | None = "", keyword: str = ""
+) -> Any:
+    """A field of a request.
+
+    ``text``: help of the option, and what the field means.
+    ``option`` and ``keyword``: where they are not spelt as the field is; None for a field that only Python has.
+    """
+    return field(default=default, metadata={_ASKED: (kind, text, metavar or kind.metavar, option, keyword)})
+
+
+def asked_of(request: type) -> dict[str, Asked]:
+    """What a user may set of a request, by field."""
+    found = {}
+    for one in fields(request):
+        if _ASKED in one.metadata:
+            kind, text, metavar, option, keyword = one.metadata[_ASKED]
+            option = f"--{one.name.replace('_', '-')}" if option == "" else option
+            found[one.name] = Asked(kind, text, metavar, option, keyword or one.name, one.default)
+    return found
+
+
+def checked(request: type, wanted: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of a request from keywords, of those that it has; None stays where it is the default.
+
+    Raises an `InputError` if one of them is not of its kind or outside of its range; it is named.
+    """
+    found = {}
+    for name, one in asked_of(request).items():
+        if one.keyword in wanted:
+            given = wanted[one.keyword]
+            unsaid = given is None and one.default is None
+            found[name] = None if unsaid else one.kind.check(given, one.keyword)
+    return found
+
+
+def require_known(wanted: Iterable[str], known: Iterable[str], who: str) -> None:
+    """Refuse keywords that a study does not have; ``who`` is such as ``a design``."""
+    if unknown := [name for name in wanted if name not in known]:
+        raise InputError(f"{who} cannot be asked for {', '.join(map(repr, unknown))}, but for {', '.join(known)}")
+
+
+def plain_value(value: Any) -> Value:
+    """A value, as Python's own number where it is one of NumPy."""
+    own: Value = value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else value
+    if isinstance(own, int) and abs(own) > _LARGEST:
+        raise InputError("a whole number beyond 1e308 was given as a value; give a number that a float can hold")
+    return own
+
+
+def number_in(given: Any, unit: str, argument: str, rule: str) -> float:
+    own = plain_value(given)
+    if isinstance(own, bool) or not isinstance(own, int | float | str):
+        raise InputError(f"{argument} = {given!r}; give {rule.removeprefix('give ')}")
+    try:
+        return to_unit(own, unit)
+    except ValueError as error:
+        raise InputError(f"{argument}: {error}") from error
+    except OverflowError as error:
+        raise InputError(f"{argument} is a number beyond 1e308; give {rule.removeprefix('give ')}") from error
+
+
+def as_number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def flag(given: Any, argument: str) -> bool:
+    own = plain_value(given)
+    if not isinstance(own, bool):
+        raise InputError(f"{argument} = {given!r}; give True or False")
+    return own
+
+
+def names(given: Names, argument: str) -> tuple[str, ...]:
+    if isinstance(given, str):
+        return (given,)
+    listed: tuple[Any, ...] = tuple(given) if isinstance(given, Iterable) else (None,)
+    if isinstance(given, bytes) or not all(isinstance(name, str) for name in listed):
+        raise InputError(f"{argument} = {given!r}; give a name, or a list of names")
+    return listed
+
+
+def text_or_none(given: Any, argument: str, rule: str = "give one name, or leave it out") -> str | None:
+    if given is not None and (not isinstance(given, str) or not given):
+        raise InputError(f"{argument} = {given!r}; {rule}")
+    return given
+
+
+def read_range(text: str) -> tuple[float, float]:
+    """``LO:HI`` [Hz]."""
+    low, colon, high = text.partition(":")
+    limits = as_number(low), as_number(high)
+    if not colon or not 0 <= limits[0] < limits[1]:
+        raise ValueError(f"{text!r} is not a range; write LO:HI in Hz with 0 ≤ LO < HI, such as 0.1:2")
+    return limits
+
+
+def frequency_range(given: Any, argument: str = "frequencies") -> tuple[float, float]:
+    """Two frequencies [Hz], the lower one first."""
+    rule = "give two in Hz, the lower one first, such as (0.1, 2.0)"
+    if isinstance(given, str) or not isinstance(given, Sequence | tuple) or len(given) != 2:
+        raise InputError(f"{argument} = {given!r}; {rule}")
+    low, high = (number_in(one, "Hz", argument, rule) for one in given)
+    if not 0 <= low < high:
+        raise InputError(f"{argument} = {given!r}; {rule}")
+    return low, high
+
+
+def read_percent(text: str, most: float = 90) -> float:
+    """Damping [%], as ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
+    number = as_number(text.removesuffix("%"))
+    if not 0 < number <= most:
+        raise ValueError(f"{text!r} is not a damping in percent between 0 and {most:g}, such as 20")
+    if number < 1 and not text.endswith("%"):
+        raise ValueError(
+            f"{text!r} is read in percent; write {100 * number:g} for a damping ratio of {number:g}, or {text}% if so "
+            "little is meant"
+        )
+    return number / 100
+
+
+def percent(given: Any, argument: str, most: float = 90) -> float:
+    """A damping [%] as a ratio; a number below 1 looks like a ratio and is refused."""
+    own: Any = plain_value(given)
+    if not _is_number(own) or not 1 <= own <= most:
+        ratio = f": write {100 * own:g} for a damping ratio of {own:g}" if _is_number(own) and 0 < own < 1 else ""
+        raise InputError(f"{argument} = {given!r}; it is in percent between 1 and {most:g}, such as 20{ratio}")
+    return float(own) / 100
+
+
+def read_share(text: str) -> float:
+    """A share of a mode [%], as a ratio; a bare number below 1 looks like a ratio and is refused."""
+    number = as_number(text.removesuffix("%"))
+    if not 0 < number <= 50 or (number < 1 and not text.endswith("%")):
+        raise ValueError(f"{text!r} is not a share in percent up to 50, such as 5 (or 0.5% below 1)")
+    return number / 100
+
+
+def share(given: Any, argument: str) -> float:
+    own: Any = plain_value(given)
+    if not _is_number(own) or not 0 < own <= 0.5:
+        raise InputError(f"{argument} = {given!r}; it must be a share above 0, and at most 0.5: 0.05 is 5 %")
+    return float(own)
+
+
+def read_positive(text: str) -> float:
+    number = as_number(text)
+    if not (number > 0 and math.isfinite(number)):
+        raise ValueError(f"{text!r} must be a number above 0")
+    return number
+
+
+def gain(given: Any, argument: str) -> float:
+    own: Any = plain_value(given)
+    if not _is_number(own) or not 0 < own < 1e300:
+        raise InputError(f"{argument} = {given!r}; give a gain above 0 in pu, such as 50.0, or leave it out")
+    return float(own)
+
+
+def _are_bounds(low: Any, high: Any) -> bool:
+    return _is_number(low) and _is_number(high) and 0 <= low <= high < 1e300 and high > 0
+
+
+def read_bounds(text: str) -> tuple[float, float]:
+    """``MIN:MAX`` of a gain [pu]."""
+    low, _, high = text.partition(":")
+    limits = as_number(low), as_number(high)
+    if not _are_bounds(*limits):
+        raise ValueError(f"{text!r} are no bounds; write MIN:MAX in pu with 0 ≤ MIN ≤ MAX, such as 200:400")
+    return limits
+
+
+def bounds(given: Any, argument: str) -> tuple[float, float]:
+    pair: list[Any] = [plain_value(one) for one in given] if isinstance(given, tuple | list) else []
+    if len(pair) != 2 or not _are_bounds(*pair):
+        rule = "give the lowest and the highest gain in pu, such as (200, 400), with 0 ≤ lowest ≤ highest"
+        raise InputError(f"{argument} = {given!r}; {rule}")
+    return float(pair[0]), float(pair[1])
+
+
+def read_whole(least: int, most: int, what: str = "a whole number") -> Callable[[str], int]:
+    """What reads a whole number from ``least`` to ``most``."""
+
+    def read(text: str) -> int:
+        if not text.isdigit() or not least <= int(text) <= most:
+            raise ValueError(f"{text!r} is not {what} from {least} to {most}")
+        return int(text)
+
+    return read
+
+
+def whole_number(given: Any, argument: str, least: int, most: int) -> int:
+    own = plain_value(given)
+    if isinstance(own, bool) or not isinstance(own, int) or not least <= own <= most:
+        raise InputError(f"{argument} = {given!r}; give a whole number from {least} to {most}")
+    return own
+
+
+FLAG = FieldKind("", None, flag)
+NAME = FieldKind("NAME", str, text_or_none)
+NAMES = FieldKind("NAME", str, names, several=True)
+FREQUENCIES = FieldKind("LO:HI", read_range, frequency_range)
+DAMPING = FieldKind("PERCENT", read_percent, percent)
+SHARE = FieldKind("PERCENT", read_share, share)
+GAIN = FieldKind("DK", read_positive, gain)
+GAIN_BOUNDS = FieldKind("MIN:MAX", read_bounds, bounds)
+STAGES = FieldKind("N_S", read_whole(0, 10), partial(whole_number, least=0, most=10))
+RANKED = FieldKind("N", read_whole(0, 1000), partial(whole_number, least=0, most=1000))

@@ -1,0 +1,42 @@
+"""The values and the port of an FMU that is to be measured."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from orchestrator.black_box.bench import Bench
+from orchestrator.cases.values import check_system_base, convert
+from orchestrator.errors import InputError
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.devices import NO_BUS, is_controller_alone
+
+
+def values_for(description: FmuDescription, given: Mapping[str, Any]) -> dict[str, float | bool]:
+    """Values of ``--set`` in the variables' own units."""
+    values = {}
+    for name, value in given.items():
+        info = description.variables.get(name)
+        if info is None:
+            raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor info` lists them")
+        try:
+            values[name] = convert(info, value)
+            check_system_base(description, name, values[name])
+        except ValueError as error:
+            raise InputError(f"--set {name}: {error}") from error
+    return values
+
+
+def start_of(description: FmuDescription, name: str) -> float:
+    info = description.variables.get(name)
+    return info.start_number if info is not None and info.start is not None else float(name == "v_0")
+
+
+def check_port(description: FmuDescription, bench: Bench) -> None:
+    """Refuse an FMU without the voltages and currents of our port."""
+    missing = [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]
+    if missing and is_controller_alone(description):
+        raise InputError(f"{description.path.name}: it has no {', '.join(missing)}: {NO_BUS}")
+    if missing:
+        raise InputError(
+            f"{description.path.name}: it has no {', '.join(missing)}; an admittance is measured at our port, to which "
+            "a vendor.toml maps another FMU's variables; give it with --binding"
+        )

@@ -1,0 +1,406 @@
+"""A case file from a network's files: scenarios, plots and comments that a person can read and change."""
+
+import math
+import os
+import re
+import textwrap
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.cases.case import Case, case_of_text
+from orchestrator.cases.names import close_names
+from orchestrator.cases.network_data import bus_name
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.short_circuit import source_impedance
+from orchestrator.errors import InputError, Problem
+from orchestrator.units import to_unit
+
+_FILES = {".raw": "raw", ".m": "matpower", ".mat": "matpower", ".json": "pandapower", ".zip": "cgmes"}
+_EMT_STEP = 1e-4
+_MOST_CURVES = 12
+
+
+@dataclass(frozen=True)
+class WantedConverter:
+    """``bus 9, 300 MVA, 200 MW, less sg3``; ``less`` is the machine that feeds so much less."""
+
+    bus: str
+    rating_mva: float
+    p_mw: float
+    less: str | None = None
+
+
+@dataclass(frozen=True)
+class WantedCase:
+    """What `gfor new` is asked for: a vendor's ``device`` stands in place of our converter, ``models`` (emt, phasor) is
+    chosen where None, ``command`` is as it was typed.
+    """
+
+    files: tuple[Path, ...]
+    out: Path
+    converter: WantedConverter | None = None
+    device: Path | None = None
+    binding: Path | None = None
+    is_dll: bool = False
+    models: str | None = None
+    frequency: str | None = None
+    leave_out: tuple[str, ...] = ()
+    dyr_leave_out: tuple[str, ...] = ()
+    command: str = "gfor new"
+
+    @property
+    def kind(self) -> str:
+        """A vendor's file has no phasor form."""
+        return self.models or ("phasor" if self.device is None else "emt")
+
+
+@dataclass(frozen=True)
+class NewCase:
+    text: str
+    assumed: tuple[str, ...]
+    scenarios: tuple[str, ...]
+
+
+def read_converter(text: str) -> WantedConverter:
+    """Read ``bus 9, 300 MVA, 200 MW, less sg3``, in any order.
+
+    Raises `InputError` with what is missing, given twice or not understood.
+    """
+    how = "write it like 'bus 9, 300 MVA, 200 MW, less sg3' (the last part may be left out)"
+    found: dict[str, str] = {}
+    for part in (part.strip() for part in text.split(",")):
+        quantity = re.fullmatch(r"[-+\d.eE]+\s*(MVA|GVA|kVA|MW|GW|kW)", part)
+        word, _, rest = part.partition(" ")
+        if quantity is not None:
+            key = "MVA" if quantity[1].endswith("VA") else "MW"
+        elif word in ("bus", "less") and rest.strip():
+            key = word
+        elif re.fullmatch(r"bus_\w+", part):
+            key, rest = "bus", part
+        else:
+            raise InputError(f"--converter {text!r}: {part!r} is not understood; {how}")
+        if key in found:
+            raise InputError(f"--converter {text!r}: {key} is given twice; {how}")
+        found[key] = part if quantity is not None else rest.strip()
+    missing = {"bus": "bus", "MVA": "rating in MVA", "MW": "power in MW"}
+    if lacks := [words for key, words in missing.items() if key not in found]:
+        raise InputError(f"--converter {text!r}: the {' and the '.join(lacks)} is missing; {how}")
+    rating, power = to_unit(found["MVA"], "MVA"), to_unit(found["MW"], "MW")
+    if not 0 < rating < math.inf or not abs(power) <= rating:
+        raise InputError(f"--converter {text!r}: {power:g} MW with a rating of {rating:g} MVA; {how}")
+    return WantedConverter(found["bus"], rating, power, found.get("less"))
+
+
+def write_case(wanted: WantedCase) -> NewCase:
+    """Compose a case, with the questions about its data as comments at their lines.
+
+    Raises `InputError` if a file, a bus or a machine cannot be used; as a case of these files would be refused.
+    """
+    sources = sources_of(wanted.files)
+    base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
+    place = None if wanted.converter is None else _placed(wanted.converter, base)
+    draft = _Text(wanted, sources, base, place)
+    scenarios = _prepared(draft.text, wanted, [])
+    questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
+    text = _commented(draft.text, list(questions), sources)
+    return NewCase(text, tuple(draft.assumed(len(questions))), tuple(p.name for p in scenarios))
+
+
+def _prepared(text: str, wanted: WantedCase, names: Sequence[str]) -> list[PreparedScenario]:
+    case: Case = case_of_text(text, tomllib.loads(text), wanted.out)
+    return case.prepare(names)
+
+
+def sources_of(files: Sequence[Path]) -> dict[str, Path]:
+    """Key of the case file that names it → file."""
+    found: dict[str, Path] = {}
+    for path in files:
+        key = "cgmes" if path.is_dir() else "dyr" if path.suffix.lower() == ".dyr" else _FILES.get(path.suffix.lower())
+        if key is None:
+            known = ", ".join([*_FILES, ".dyr"])
+            raise InputError(f"{path}: no network that is read; give a file {known}, or the folder of a CGMES model")
+        if not path.exists():
+            near = close_names(path.name, [p.name for p in path.absolute().parent.glob("*")])
+            raise InputError(f"{path}: there is no such file{f'; {near}' if near else ''}")
+        networks = [k for k in found if k != "dyr"]
+        if key in found or (key != "dyr" and networks):
+            raise InputError(f"{path} and {found.get(key) or found[networks[0]]}: a case has one of them; give one")
+        found[key] = path
+    if not [key for key in found if key != "dyr"]:
+        raise InputError("no network is given; name its file, such as own.raw, and with it own.dyr")
+    if "dyr" in found and "raw" not in found:
+        raise InputError(f"{found['dyr']}: dynamics data of PSS/E need the network's RAW file; give both")
+    return found
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where the converter goes, and what changes with it: machine that feeds less, its power before and now [MW]."""
+
+    wanted: WantedConverter
+    bus: str
+    v_pu: float
+    slack: str
+    less: str | None = None
+    before_mw: float = 0.0
+    rating_mva: float = 1.0
+
+    @property
+    def changed(self) -> dict[str, str]:
+        """Values of every scenario with the converter."""
+        left = (self.before_mw - self.wanted.p_mw) / self.rating_mva
+        return {f"{self.less}.P_0": f"{left:.6f}"} if self.less else {}
+
+
+def _placed(wanted: WantedConverter, base: PreparedScenario) -> _Place:
+    network, flow = base.network, base.power_flow
+    if network is None or flow is None:
+        raise InputError("the network has no power flow")
+    names = {wanted.bus, bus_name(wanted.bus), f"bus_{wanted.bus}"} & set(network.buses)
+    if len(names) != 1:
+        hint = close_names(bus_name(wanted.bus), network.buses, f"there are: {', '.join(network.buses[:8])}")
+        raise InputError(f"--converter: the network has no bus {wanted.bus!r}; {hint}")
+    (bus,) = names
+    plans = base.system.components
+    units = {port.name: port.bus for port in network.ports if port.name in plans}
+    at_slack = [name for name, place in units.items() if place == flow.slack]
+    found = _Place(wanted, bus, round(abs(flow.voltages[bus]), 5), ", ".join(at_slack))
+    if wanted.less is None:
+        return found
+    if wanted.less not in units:
+        known = f"the network's units: {', '.join(units)}"
+        raise InputError(f"--converter: there is no unit {wanted.less!r} to feed less; "
+                         f"{close_names(wanted.less, units, known)}")  # fmt: skip
+    rating = plans[wanted.less].number("S_n")
+    power = flow.powers[wanted.less].real * rating
+    if wanted.p_mw > power + 1e-6:
+        raise InputError(
+            f"--converter: {wanted.less} feeds {power:.5g} MW and cannot feed {wanted.p_mw:g} MW less; give the "
+            f"converter at most {power:.5g} MW, or leave the rest to the slack without 'less'"
+        )
+    if wanted.less in at_slack:
+        return found  # the slack feeds what is left, whatever it is given
+    return replace(found, less=wanted.less, before_mw=power, rating_mva=rating)
+
+
+_TEMPLATE = """\
+# Written by: {command}
+# Change what you like. What the keys mean: orchestrator/cases/README.md
+name = {name}
+title = {title}
+source = {source}
+{models}
+[solver]
+step_size = "{step}"
+stop_time = "10 s"
+record_interval = "10 ms"
+record = ["*.omega", "grid.*.v"{record}]
+{other}
+[power_flow]
+grid = "grid"
+
+[components.grid]
+model = "{grid}"
+
+[network]
+{network}
+load_model = {{ active = "power", reactive = "power" }}    # or "current", "impedance"
+{more}
+[units]
+{units}
+generator = "synchronous_generator{generator}{suffix}"
+converter = "gfor{suffix}"      # of a unit only where --set units.alpha.N=0.3 gives it a share
+{converter}
+{scenarios}"""
+
+
+class _Text:
+    """The text of a case, without and with what the network's first power flow says."""
+
+    def __init__(
+        self, wanted: WantedCase, sources: dict[str, Path], base: PreparedScenario | None = None,
+        place: _Place | None = None,
+    ) -> None:  # fmt: skip
+        self._wanted, self._sources, self._base, self._place = wanted, sources, base, place
+        self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
+        self._network = base.network if base else None
+        largest = max(self._network.loads if self._network else (), key=lambda load: load.p_mw, default=None)
+        buses = self._network.buses if self._network else ("",)
+        self._fault_bus = place.bus if place else largest.bus if largest else buses[0]
+
+    def assumed(self, questions: int) -> list[str]:
+        lines, device = [], self._wanted.device
+        if self._place is not None:
+            p, w = self._place, self._place.wanted
+            dispatch = f"the slack ({p.slack}) feeds {w.p_mw:g} MW less"
+            if p.less:
+                dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} before), with its rating and inertia"
+            ours = "ours, with the POD gains of the paper's system (`gfor design` finds others)"
+            what = ours if device is None else device.name
+            lines.append(f"converter: {what}; at {p.bus} it holds the {p.v_pu:g} pu of the base; {dispatch}")
+        if "dyr" not in self._sources:
+            lines.append("machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data")
+        lines.append("loads: constant power, as in the file's own power flow; [network] load_model changes it")
+        lines.append(f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}")
+        lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
+        asked = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
+        return [*lines, asked] if questions else lines
+
+    def _path(self, path: Path) -> str:
+        """As the file names it: relative where that is possible, with slashes everywhere."""
+        try:
+            return _quoted(Path(os.path.relpath(path.absolute(), self._wanted.out.absolute().parent)).as_posix())
+        except ValueError:  # on another drive
+            return _quoted(path.absolute().as_posix())
+
+    @property
+    def text(self) -> str:
+        w, place = self._wanted, self._place
+        (key,) = (key for key in self._sources if key != "dyr")
+        kind, other = w.kind, "phasor" if w.kind == "emt" else "emt"
+        steps = {"emt": "100 us", "phasor": "2 ms"}
+        stray = {"emt": f"stray_B = {self._stray:g}             # pu on 100 MVA{self._stray_why}\n",
+                 "phasor": "stray_B = 0                 # no bus needs any\n"}  # fmt: skip
+        both = f'models = "{kind}"           # the same with the others: --set models={other}\n'
+        rest = f"\n[{other}]                       # what --set models={other} takes instead\n"
+        rest += f'step_size = "{steps[other]}"\n'
+        kept = "\nkeep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances"
+        dyr = "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
+        dyr = f"dyr = {self._path(self._sources['dyr'])}" if "dyr" in self._sources else dyr
+        lines = self._network is not None and any(x.name.startswith("line_") for x in self._network.lines)
+        return _TEMPLATE.format(
+            command=w.command,
+            name=_quoted(re.sub(r"[^0-9A-Za-z_]+", "_", w.out.stem).strip("_") or "case"),
+            title=_quoted(self._sources[key].name + (f" with a converter at {place.bus}" if place else "")),
+            source=_quoted(", ".join(path.name for path in self._sources.values())),
+            models=both if w.device is None else "",
+            step=steps[kind],
+            record=', "grid.line_*.p"' * lines + ', "gfor.*"' * (place is not None),
+            other=rest + stray[other] if w.device is None else "",
+            grid="grid" if kind == "emt" else "phasor_grid",
+            network=f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
+            more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "") + stray["emt"] * (kind == "emt")
+            + (f"leave_out = {_listed(w.leave_out)}\n" if w.leave_out else ""),
+            units=dyr + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else ""),
+            generator="" if "dyr" in self._sources else "_st1",
+            suffix="" if kind == "emt" else "_phasor",
+            converter=self._converter(),
+            scenarios="\n".join("\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]),
+        )  # fmt: skip
+
+    def _converter(self) -> str:
+        if self._place is None:
+            return ""
+        w, device, place = self._wanted, self._wanted.device, self._place.wanted
+        what = 'model = "gfor"' if w.kind == "emt" else 'model = "gfor_phasor"'
+        if device is not None:
+            what = f"{'dll' if w.is_dll else 'fmu'} = {self._path(device)}"
+            what += f"\nbinding = {self._path(w.binding)}" if w.binding else ""
+        values = (
+            f'S_n = "{place.rating_mva:g} MVA", P_0 = {place.p_mw / place.rating_mva:.6g}, v_0 = {self._place.v_pu:g}'
+        )
+        return (
+            f'\n[components.gfor]\n{what}\nbus = "{self._place.bus}"\n'
+            f"parameters = {{ {values} }}    # P_0 in parts of S_n: {place.p_mw:g} MW\n"
+        )
+
+    def _scenarios(self) -> list[list[str]]:
+        found = [["[scenarios.base]", 'title = "As in the files"', *(['remove = ["gfor"]'] if self._place else [])]]
+        if self._base is None or self._network is None:
+            return found
+        if self._place is not None:
+            found.append(self._scenario("converter", "Converter"))
+            if self._wanted.device is None:
+                found += [self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"gfor.pod_{x}.enabled") for x in "pq"]
+        fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
+        lines = sorted(self._network.lines, key=lambda x: (x.has_ratio, self._fault_bus not in (x.from_bus, x.to_bus)))
+        opening = f'    # cleared_by = "{lines[0].name}" would open that line with it' if lines else ""
+        events = f"events = [{{ {fault} }}]{opening}"
+        return [*found, [*self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}"), events]]
+
+    def _scenario(self, name: str, title: str, enabled: str = "") -> list[str]:
+        p = self._place
+        values = [f'"{key}" = {value}' for key, value in p.changed.items()] if p else []
+        values += [f'"{enabled}" = true'] if enabled else []
+        less = f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW" if p and p.less else ""
+        settings = [f"set = {{ {', '.join(values)} }}{less}"] if values else []
+        return [f"[scenarios.{name}]", f'title = "{title}"', *settings]
+
+    def _plots(self) -> list[list[str]]:
+        if self._base is None or self._network is None:
+            return []
+        plans = self._base.system.components
+        speeds = [f"{name}.omega" for name, plan in plans.items() if "omega" in plan.description.outputs]
+        with_units = {port.bus for port in self._network.ports}
+        buses = [self._fault_bus, *(x for x in self._network.buses if x not in {*with_units, self._fault_bus})]
+        found = [_plot("speeds", [(speeds, "Speed [pu]")])] if speeds else []
+        found.append(_plot("voltages", [([f"grid.{bus}.v" for bus in buses], "v [pu]")]))
+        if self._place is not None:
+            current = f"gfor.{'current_demand' if self._wanted.kind == 'emt' else 'current_limit'}"
+            panels = [(["gfor.p"], "p [pu]"), (["gfor.q"], "q [pu]"), ([current], "Current / limit")]
+            found.append(_plot("converter", panels[: 3 if self._wanted.device is None else 2]))
+        return found
+
+
+def _plot(name: str, panels: Sequence[tuple[Sequence[str], str]]) -> list[str]:
+    lines = ["[[plots]]", f'name = "{name}"', f'title = "{name.capitalize()}"', "panels = ["]
+    for signals, label in panels:
+        also = f", also = {_listed(signals[1:_MOST_CURVES])}" if signals[1:] else ""
+        lines.append(f"    {{ signal = {_quoted(signals[0])}{also}, label = {_quoted(label)} }},")
+    return [*lines, "]"]
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"[{', '.join(map(_quoted, names))}]"
+
+
+def _stray_capacitance(base: PreparedScenario) -> tuple[float, str]:
+    """Capacitance [pu, 100 MVA] that EMT models need at buses without one, and why.
+
+    Unit and bus swing at ω_b/√(X''·B), and exchange values once in a step H: H·ω_b/√(X''·B) ≤ 1 for the largest unit at
+    a bus without capacitance.
+    """
+    network, plans = base.network, base.system.components
+    if network is None:
+        return 0.05, ""
+    charged = {bus for line in network.lines if line.B > 0 for bus in (line.from_bus, line.to_bus)}
+    charged |= {shunt.bus for shunt in network.shunts if shunt.b_mvar > 0}
+    needed: dict[str, float] = {}
+    for port in (port for port in network.ports if port.name in plans and port.bus not in charged):
+        plan, z = plans[port.name], source_impedance(plans[port.name])
+        X = abs(z) if z is not None else 0.15 * SYSTEM_BASE_MVA / plan.number("S_n")
+        f_n = plan.number("f_n") if "f_n" in plan.description.variables else 50.0
+        needed[port.name] = (2 * math.pi * f_n * _EMT_STEP) ** 2 / X
+    if not needed:
+        return 0.0, ", as every bus of a unit has a capacitance of its own"
+    name = max(needed, key=needed.__getitem__)
+    digits = 10 ** (math.floor(math.log10(needed[name])) - 1)
+    return math.ceil(needed[name] / digits) * digits, f", (ω_b·H)²/X'' of {name} at a bus without capacitance"
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _commented(text: str, questions: Sequence[Problem], sources: dict[str, Path]) -> str:
+    """The text with every question as a comment above the line that it is about."""
+    lines = text.splitlines()
+    above: dict[int, list[str]] = {}
+    for question in questions:
+        place = _line_of(question, lines, sources)
+        where = "" if question.place.startswith("line ") else f"{question.place}: "
+        above.setdefault(place, []).extend(textwrap.wrap(f"question: {where}{question.text}", 116, initial_indent="# ",
+                                                         subsequent_indent="#   ", break_long_words=False))  # fmt: skip
+    return "\n".join(part for k, line in enumerate(lines) for part in [*above.get(k, []), line]) + "\n"
+
+
+def _line_of(question: Problem, lines: Sequence[str], sources: dict[str, Path]) -> int:
+    """Index of the line that a question is about: its own, that of the file that it names, else the first."""
+    for key, path in sources.items():
+        if path.name in question.place:
+            return next(k for k, line in enumerate(lines) if line.startswith(f"{key} = "))
+    found = re.match(r"line (\d+)", question.place)
+    return int(found[1]) - 1 if found else 2

@@ -1,0 +1,64 @@
+"""NERC PRC-029-1: ride-through of inverter-based resources, in force since 1 October 2026."""
+
+from functools import partial
+
+from orchestrator.certification.codes import criteria as c
+from orchestrator.certification.codes.programme import jumps, ramps, voltage
+from orchestrator.certification.codes.row import CodeRow, GridCode, Judge
+
+DIPS = ((0.2, 0.32), (0.45, 1.2), (0.65, 3.0), (0.85, 6.0))
+"""Voltage [pu], each within its band (below 0.25, 0.50, 0.70, 0.90), and for how long it has to be ridden through [s];
+resources other than wind."""
+
+SWELL = (1.15, 1.0)  # voltage within the band above 1.10 [pu], and its time [s]
+RECOVERY = 1.0  # time after which the power is back once the voltage is within 0.90 and 1.05 pu [s]
+STRENGTH = 10.0  # short-circuit ratio of the rows: the standard names no grid
+
+
+def _ridden_through(last: int) -> tuple[Judge, ...]:
+    return (c.holds_together(), c.settles(events=(last,)), c.returns("power after the disturbance", RECOVERY,
+            of_code=True, events=(last,)))  # fmt: skip
+
+
+def _step(level: float, lasts: float) -> CodeRow:
+    kind = "dip" if level < 1 else "swell"
+    return CodeRow(
+        f"{kind}_{round(100 * level)}", f"The source goes to {level:g} pu for {lasts:g} s, full power", "R1, table 1",
+        lambda f: voltage(STRENGTH, 1.0, ((0.0, level), (lasts, 1.0)), 1.0 + lasts + 5.0), _ridden_through(-1),
+    )  # fmt: skip
+
+
+PRC029 = GridCode(
+    key="prc029",
+    title="NERC PRC-029-1: frequency and voltage ride-through of inverter-based resources",
+    source="NERC PRC-029-1 (FERC Order 909), as summarised by others; the standard's own text was not at hand",
+    date="in force since 1 October 2026",
+    f_n=60.0,
+    rows=(
+        *(_step(level, lasts) for level, lasts in DIPS),
+        _step(*SWELL),
+        CodeRow("dips_in_10_s", "0.2 pu for 0.16 s twice within 10 s: 0.32 s in all", "R1, cumulative times",
+                lambda f: voltage(STRENGTH, 1.0, ((0.0, 0.2), (0.16, 1.0), (3.0, 0.2), (3.16, 1.0)), 9.0),
+                _ridden_through(-1)),
+        CodeRow("rocof", "60 → 58.9 → 60 → 61.1 → 60 Hz at 5 Hz/s, half power", "R3, rate of change of frequency",
+                partial(ramps, STRENGTH, 0.5, rate=5.0, steps=(-1.1, 1.1, 1.1, -1.1)),
+                (c.holds_together(), c.settles(), c.returns(events=(-1,)))),
+        CodeRow("phase_jumps", "−25°, +25°, half power", "R1, jumps up to 25°",
+                lambda f: jumps(STRENGTH, 0.5, (-25.0, 25.0)), (c.holds_together(), c.settles(), c.returns())),
+    ),
+    left_out=(
+        "1.05 to 1.10 pu for 1800 s and 57.0 to 58.8 or 61.2 to 61.8 Hz for 299 s in 600 s: an hour of bench time, in "
+        "which protection and heat decide, which a model of this port does not have",
+        "the times of wind resources (0.16, 1.2, 2.5, 3.0 s): they are within those that are tried here",
+        "unbalanced faults: they need the negative sequence, which the model does not have",
+        "R2's current in the dip: the standard leaves P or Q priority to the planner",
+    ),
+    readings=(
+        "each voltage is that of the source behind SCR 10 and X/R 6, not of the transformer's high side: its own "
+        "current moves the voltage that it sees",
+        "the voltage of a band is 0.05 pu within it, that of the lowest band 0.2 pu",
+        "the power is back where it is within 5 % of the rating 1 s after the last step, for good",
+        "a jump of 25° is the largest that is not excepted",
+        "riding through is all that is asked: a grid-following converter can meet every row",
+    ),
+)  # fmt: skip

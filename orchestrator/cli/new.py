@@ -1,0 +1,114 @@
+"""``gfor new``: a case file from a network's files; without arguments it asks."""
+
+import argparse
+import shlex
+import sys
+from pathlib import Path
+
+from rich.markup import escape
+
+from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
+from orchestrator.cli.terminal import make_console
+from orchestrator.errors import InputError, ResultsError
+from orchestrator.safe_files import write_text
+
+_EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "files", nargs="*", type=Path, metavar="FILE",
+        help="the network: .raw (with .dyr), .m, .mat, pandapower's .json, a CGMES model; without any, gfor asks",
+    )  # fmt: skip
+    parser.add_argument("--converter", metavar="TEXT", help="'bus 9, 300 MVA, 200 MW, less sg3'")
+    device = parser.add_mutually_exclusive_group()
+    device.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="a vendor's FMU in place of our converter")
+    device.add_argument("--dll", type=Path, metavar="FILE", help="a vendor's DLL, or the file of a device around one")
+    parser.add_argument("--binding", type=Path, metavar="FILE.toml", help="what the FMU's variables mean (`gfor bind`)")
+    parser.add_argument("--models", choices=("emt", "phasor"), help="default: phasor, with a vendor's file EMT")
+    parser.add_argument("--frequency", metavar="HZ", help="'60 Hz', where the network's file does not say it")
+    parser.add_argument("--leave-out", action="append", default=[], metavar="KIND", help="elements of the network that "
+                        "may go, where a message asks for it (repeatable)")  # fmt: skip
+    parser.add_argument("--dyr-leave-out", action="append", default=[], metavar="MODEL",
+                        help="records of dynamics data that may go (repeatable)")  # fmt: skip
+    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="the case file (default: the network's name)")
+    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the case, and say what was assumed."""
+    if not options.files:
+        _ask(options)
+    wanted = _wanted(options)
+    sources_of(wanted.files)
+    if wanted.out.exists() and not options.force:
+        raise InputError(f"{wanted.out}: the file is there already; choose another with --out, or --force")
+    made = write_case(wanted)
+    try:
+        write_text(wanted.out, made.text)
+    except ResultsError as error:
+        raise InputError(f"--out {error}") from error
+    console = make_console()
+    console.print(escape(f"{wanted.out}: scenarios {', '.join(made.scenarios)}. Assumed:"), highlight=False)
+    for line in made.assumed:
+        console.print(escape(f"- {line}"), soft_wrap=True, highlight=False)
+    console.print(escape(f"Next: gfor modes {wanted.out}"), highlight=False)
+    return 0
+
+
+def _wanted(options: argparse.Namespace) -> WantedCase:
+    device = options.fmu or options.dll
+    if (device or options.binding) and options.converter is None:
+        raise InputError(
+            "--fmu, --dll and --binding are for a converter; say where by --converter 'bus 9, 300 MVA, 200 MW'"
+        )
+    if options.binding is not None and options.fmu is None:
+        raise InputError("--binding says what an FMU's variables mean; give it with --fmu")
+    for path in (path for path in (device, options.binding) if path is not None and not path.is_file()):
+        raise InputError(f"{path}: there is no such file")
+    if device is not None and options.models == "phasor":
+        raise InputError(
+            f"{device}: a vendor's file meets the network by its currents, as EMT models do; leave out --models"
+        )
+    out = options.out or Path(f"{options.files[0].stem}.toml")
+    if out.suffix.lower() != ".toml":
+        raise InputError(f"--out {out}: a case file ends in .toml")
+    return WantedCase(
+        tuple(options.files), out, None if options.converter is None else read_converter(options.converter), device,
+        options.binding, options.dll is not None, options.models, options.frequency, tuple(options.leave_out),
+        tuple(options.dyr_leave_out), f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
+    )  # fmt: skip
+
+
+def _ask(options: argparse.Namespace) -> None:
+    """Ask for what is missing, a line each; an empty answer takes what stands in brackets."""
+    if not sys.stdin.isatty():
+        raise InputError(f"no network is given, and there is no terminal to ask at; write it like\n  {_EXAMPLE}")
+
+    def line(question: str) -> str:
+        try:
+            return input(f"{question}: ").strip()
+        except EOFError as error:
+            raise InputError(f"the answers ended; all in one line it is\n  {_EXAMPLE}") from error
+
+    options.files = [Path(word) for word in shlex.split(line("Network file(s), such as own.raw own.dyr"))]
+    if not options.files:
+        raise InputError(f"no network is given; all in one line it is\n  {_EXAMPLE}")
+    bus = line("Bus of a converter, such as 9 [no converter]")
+    if bus:
+        parts = [f"bus {bus.removeprefix('bus ')}", _with_unit(line("Its rating in MVA, such as 300"), "MVA"),
+                 _with_unit(line("Its power in MW, such as 200"), "MW")]  # fmt: skip
+        less = line("Machine that feeds so much less, such as sg3 [the slack]")
+        options.converter = ", ".join([*parts, *([f"less {less}"] if less else [])])
+        read_converter(options.converter)  # what is wrong is said before the next question
+        device = line("A vendor's FMU [our converter]")
+        if device:
+            options.fmu = Path(device)
+            binding = line("Its binding, as `gfor bind` drafts it [none]")
+            options.binding = Path(binding) if binding else None
+    default = f"{options.files[0].stem}.toml"
+    options.out = options.out or Path(line(f"Case file [{default}]") or default)
+
+
+def _with_unit(answer: str, unit: str) -> str:
+    return f"{answer} {unit}" if answer.replace(".", "", 1).isdigit() else answer

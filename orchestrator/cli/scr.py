@@ -1,0 +1,45 @@
+"""``gfor scr``: short-circuit power of every bus, and the short-circuit ratio of the converters there."""
+
+import argparse
+import json
+
+from rich.markup import escape
+
+from orchestrator.asked import read_positive
+from orchestrator.cases.short_circuit import CONVENTION, weakest_first
+from orchestrator.cli.arguments import add_json_argument, option
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
+from orchestrator.cli.terminal import make_console
+from orchestrator.report.tables import make_table
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser)
+    option(parser, "--rating", "MVA", "SCR of every bus for a converter of so much (default: at the converters' buses, "
+           "for theirs)", read=read_positive)  # fmt: skip
+    option(parser, "--converter-current", "PU", "that a converter feeds into a short circuit, of its rating (default: "
+           "none)", read=read_positive, default=0.0)  # fmt: skip
+    add_json_argument(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute from the power flow's network, and print the weakest bus first."""
+    convention, console = CONVENTION.format(options.converter_current), make_console()
+    found = {s: weakest_first(s.strengths(options.converter_current, options.rating)) for s in chosen(options)}
+    if options.json:
+        told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]
+        print(json.dumps({"case": next(iter(found)).prepared.case.name, "convention": convention, "scenarios": told},
+                         indent=1, ensure_ascii=False))  # fmt: skip
+        return 0
+    alike: dict[str, list[str]] = {}
+    for scenario, buses in found.items():
+        alike.setdefault(json.dumps([bus.as_json() for bus in buses]), []).append(scenario.title)
+    for rows, titles in alike.items():
+        table = make_table(", ".join(titles), "Bus", "S_sc [MVA]", "SCR", "of [MVA]", "X/R", "Converters")
+        for x in json.loads(rows):
+            numbers = (x["s_sc_mva"], ".0f"), (x["scr"], ".2f"), (x["rating_mva"], ".5g"), (x["x_r"], ".1f")
+            figures = ["–" if value is None else f"{value:{form}}" for value, form in numbers]
+            table.add_row(x["bus"], *figures, ", ".join(x["converters"]))
+        console.print(table, "")
+    console.print(escape(f"Convention: {convention}."), soft_wrap=True, highlight=False)
+    return 0

@@ -1,0 +1,196 @@
+"""The verdict at a cut by the generalised Nyquist criterion, and every reason for which it is not known."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from orchestrator.arrays import Numbers, Vector
+from orchestrator.immittance.loop import CutLoop, LoopPath, common_range, nodes_of
+from orchestrator.immittance.margins import Crossing, NyquistMargins, crossings_of, margins_of
+from orchestrator.immittance.scan import block_rotation
+from orchestrator.immittance.sides import NEAR_ZERO, Sampled, Side
+
+EXACT_RANGE = (NEAR_ZERO / (2 * np.pi), 20e3)  # in which two linear models are followed [Hz]
+_END, _SMALL = 1.5, 0.95
+"""Part of the range's end over which both sides must be passive, or the loci smaller than the second figure."""
+
+_BEGIN = np.deg2rad(60.0)
+"""Furthest phase of det(1 + L) at the lowest frequency from the real axis, on which it begins at 0 Hz."""
+
+_INVARIANT = 1e-3
+_FRAMES = 16
+
+
+class NyquistVerdict(StrEnum):
+    STABLE = "stable"
+    UNSTABLE = "unstable"
+    NOT_KNOWN = "not known"
+
+
+@dataclass(frozen=True)
+class CutJudgement:
+    verdict: NyquistVerdict
+    reasons: tuple[str, ...]  # why it is not known
+    growing: int | None  # number of growing modes, a pair counting twice; None where it is not known
+    # encirclements, by_loci: of −1 clockwise, by the determinant and by the eigenloci's crossings.
+    encirclements: int
+    by_loci: int
+    open_loop: tuple[complex, ...]  # unstable poles of the two sides [rad/s]
+    crossings: tuple[Crossing, ...]
+    margins: NyquistMargins
+    path: LoopPath
+    range_hz: tuple[float, float]
+    # bands in which the device, the network and neither side can feed an oscillation [Hz].
+    active: dict[str, list[tuple[float, float]]]
+    small_gain: list[tuple[float, float]]
+
+
+def judge_loop(
+    loop: CutLoop, *, frames_known: bool = True, range_hz: tuple[float, float] | None = None
+) -> CutJudgement:
+    """Count the encirclements, and ask all that could make the count wrong."""
+    low, high = range_hz or common_range(loop.device, loop.network, EXACT_RANGE)
+    nodes = nodes_of(loop.device, loop.network, low, high)
+    path = loop.path(nodes)
+    crossings = crossings_of(path)
+    count, by_loci = _by_determinant(path, loop), _by_crossings(path, loop)
+    reasons = [*_open_loop(loop), *_resolution(loop, path), *_ends(loop, path)]
+    if count != by_loci:
+        reasons.append(
+            f"the determinant goes round {count} times and the eigenloci {by_loci} times: some loci were not followed "
+            "rightly; more frequencies are needed"
+        )
+    poles = (*loop.device.unstable, *loop.network.unstable)
+    growing = count + len(poles)
+    if growing < 0:
+        reasons.append(
+            f"the loop goes round −1 {-count} times against the clock, and its sides show {len(poles)} unstable poles: "
+            "one side is unstable by itself, or a scan is not of this system"
+        )
+    if not frames_known and not reasons:
+        reasons += _frames(loop, nodes, count)
+    verdict = NyquistVerdict.NOT_KNOWN if reasons else NyquistVerdict.UNSTABLE if growing else NyquistVerdict.STABLE
+    margins = margins_of(path, crossings)
+    active = {"device": _bands(*_active(loop.device)), "network": _bands(*_active(loop.network))}
+    small = _bands(path.hertz, np.linalg.norm(path.L, ord=2, axis=(1, 2)) < 1)
+    return CutJudgement(verdict, tuple(reasons), None if reasons else growing, count, by_loci, poles, tuple(crossings),
+                     margins, path, (low, high), active, small)  # fmt: skip
+
+
+def _principal(path: LoopPath, k: int) -> float:
+    return float(np.angle(1 + path.loci[k]).sum())
+
+
+def _by_determinant(path: LoopPath, loop: CutLoop) -> int:
+    """Clockwise encirclements of the whole axis, of which the path is the upper half."""
+    first, last = _principal(path, 0), _principal(path, -1)
+    begin = np.pi * round(first / np.pi)
+    end = np.pi * round(last / np.pi) if loop.is_exact else 0.0
+    around = float(first - begin + path.turns.sum() - (last - end))
+    return -round(around / np.pi)
+
+
+def _by_crossings(path: LoopPath, loop: CutLoop) -> int:
+    """The same, by crossings of the ray from −1 to −∞."""
+    found: int = 0
+    for locus in path.loci.T:
+        i = np.flatnonzero((locus.imag[:-1] < 0) != (locus.imag[1:] < 0))
+        t = locus.imag[i] / (locus.imag[i] - locus.imag[i + 1])
+        beyond = locus.real[i] + t * (locus.real[i + 1] - locus.real[i]) < -1
+        found += 2 * int(np.where(locus.imag[i + 1] > locus.imag[i], 1, -1)[beyond].sum())
+        found += _on_the_ray(locus[0])
+        found -= _on_the_ray(locus[-1]) if loop.is_exact else 0
+    return found
+
+
+def _on_the_ray(value: complex) -> int:
+    """Where a locus begins or ends on the ray, its mirror image goes on from there: one crossing for both."""
+    beyond = abs(np.angle(1 + value)) >= np.pi / 2
+    return int(np.sign(value.imag)) if beyond else 0
+
+
+def _open_loop(loop: CutLoop) -> list[str]:
+    return [
+        f"{side.name} shows an unstable pole of its own at {p.real:.3g} ± j{p.imag:.3g} rad/s "
+        f"({p.imag / (2 * np.pi):.3g} Hz); a scan of what is stable by itself shows none: scan it again"
+        for side in (loop.device, loop.network)
+        if not side.is_exact
+        for p in side.unstable[:2]
+    ]
+
+
+def _resolution(loop: CutLoop, path: LoopPath) -> list[str]:
+    """Whether what is not known between the points could put an eigenvalue on −1."""
+    if loop.is_exact:
+        return []
+    Y, Z = loop.device.at(path.s), loop.impedance(path.s)
+    closed = np.linalg.inv(np.eye(path.L.shape[-1]) + path.L)
+    by_y, by_z = (np.linalg.norm(M, ord=2, axis=(1, 2)) for M in (closed @ Z, Y @ closed))
+    share = by_y * loop.device.error(path.s) + by_z * loop.network.error(path.s)
+    if share.max() < 1:
+        return []
+    at = path.hertz[int(np.argmax(share))]
+    touched = path.hertz[share >= 1]
+    return [
+        f"from {touched.min():.4g} to {touched.max():.4g} Hz, most at {at:.4g} Hz, the scans do not tell on which side "
+        f"of −1 the loop passes: the values between their frequencies are uncertain by {share.max():.2g} times the "
+        "distance; scan more frequencies there"
+    ]
+
+
+def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
+    """Whether an encirclement may lie below the lowest or beyond the highest frequency."""
+    reasons = []
+    first = _principal(path, 0)
+    if abs(first - np.pi * round(first / np.pi)) > _BEGIN:
+        reasons.append(f"at {path.hertz[0]:g} Hz the loop is not yet where it begins: scan lower frequencies")
+    if loop.is_exact:
+        return reasons
+    top = path.hertz >= path.hertz[-1] / _END
+    size = np.abs(path.loci[top]).max(axis=1)
+    small = size.max() < _SMALL and size[-1] <= size[0] * 1.01
+    passive = not any((_active(side)[1] & (_active(side)[0] >= path.hertz[-1] / _END)).any()
+                      for side in (loop.device, loop.network))  # fmt: skip
+    if not (small or passive):
+        reasons.append(
+            f"beyond {path.hertz[-1]:g} Hz an encirclement may follow: up to there neither are both sides passive nor "
+            f"the loci small ({size[-1]:.2g}); scan higher frequencies"
+        )
+    return reasons
+
+
+def _active(side: Side) -> tuple[Numbers, Numbers]:
+    """Frequencies [Hz], and whether the side may deliver power there."""
+    f = side.frequencies if isinstance(side, Sampled) else np.geomspace(0.01, 1e4, 400)
+    M = side.at(2j * np.pi * f)
+    least = np.linalg.eigvalsh((M + M.conj().transpose(0, 2, 1)) / 2)[:, 0] if M.shape[1] == M.shape[2] else np.zeros(1)
+    slack = 1e-6 * np.linalg.norm(M, ord=2, axis=(1, 2)) + (side.bounds if isinstance(side, Sampled) else 0.0)
+    return f, np.asarray(least < -slack)
+
+
+def _bands(f: Numbers, inside: Numbers) -> list[tuple[float, float]]:
+    edges = np.flatnonzero(np.diff(np.r_[False, inside, False].astype(int)))
+    return [(float(f[a]), float(f[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:
+    """Whether the verdict depends on the angle between the two frames, which is not known."""
+    device = loop.device
+    if not isinstance(device, Sampled) or any(_turns_alike(s.at(2j * np.pi * nodes)) for s in (device, loop.network)):
+        return []
+    for angle in np.linspace(0, np.pi, _FRAMES, endpoint=False)[1:]:  # half a turn changes nothing
+        T = block_rotation([angle] * (device.values.shape[-1] // 2))
+        turned = replace(loop, device=replace(device, values=T @ device.values @ T.T))
+        if _by_determinant(turned.path(nodes), loop) != count:
+            return [
+                "the verdict depends on the angle between the frames of the two scans, which neither states: give it "
+                f"by --angle, or the files _angles.txt (turned by {np.rad2deg(angle):.0f}° it would be another)"
+            ]
+    return []
+
+
+def _turns_alike(values: Vector) -> bool:
+    J = block_rotation([np.pi / 2] * (values.shape[-1] // 2))
+    size = np.linalg.norm(values, ord=2, axis=(1, 2))
+    return bool((np.linalg.norm(J @ values @ J.T - values, ord=2, axis=(1, 2)) < _INVARIANT * size).all())

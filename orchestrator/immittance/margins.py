@@ -1,0 +1,96 @@
+"""Margins of a loop: changes of gain, phase and delay in all its entries that bring an eigenvalue to −1; the disk's."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.arrays import Numbers
+from orchestrator.immittance.loop import LoopPath
+
+_LEAST = 1e-4  # loci that cross the axis nearer to 0 tell nothing
+_SLOWEST = 0.05  # least frequency of a distance [Hz]: below, a free angle moves as far as one likes
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where a locus crosses the negative real axis: ``upwards`` as the frequency rises."""
+
+    real: float
+    frequency_hz: float
+    upwards: bool
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A margin with the frequency [Hz] of the oscillation that it leaves."""
+
+    value: float
+    frequency_hz: float
+
+
+@dataclass(frozen=True)
+class NyquistMargins:
+    """Least changes of the whole loop that put an eigenvalue on −1; of an unstable loop, what has to be changed."""
+
+    # gain_up, gain_down: least factor above 1, and largest below; None where no locus crosses there.
+    gain_up: Margin | None
+    gain_down: Margin | None
+    phase_deg: Margin | None  # least shift of the phase to either side [°]
+    delay_s: Margin | None  # least delay [s]
+    distance: Margin  # least singular value of 1 + L: the largest change of L in any direction
+    disk: Margin  # α of the symmetric disk: every entry may at once be multiplied by any f with |f − 1| < α/2·|f + 1|
+
+    @property
+    def gain(self) -> Margin | None:
+        both = [m for m in (self.gain_up, self.gain_down) if m is not None]
+        return min(both, key=lambda m: abs(np.log(m.value)), default=None)
+
+
+def crossings_of(path: LoopPath) -> list[Crossing]:
+    """Crossings of the negative real axis by all loci on the imaginary axis, lowest frequency first."""
+    found = []
+    for k in range(path.loci.shape[1]):
+        locus = path.loci[:, k]
+        for i, t in _zeros(locus.imag):
+            if path.on_axis[i] and path.on_axis[i + 1]:
+                real = locus[i].real + t * (locus[i + 1].real - locus[i].real)
+                if real < -_LEAST:
+                    at = path.hertz[i] + t * (path.hertz[i + 1] - path.hertz[i])
+                    found.append(Crossing(float(real), float(at), bool(locus[i + 1].imag > locus[i].imag)))
+    return sorted(found, key=lambda c: c.frequency_hz)
+
+
+def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
+    gains = [Margin(-1 / c.real, c.frequency_hz) for c in crossings]
+    up = min((m for m in gains if m.value > 1), key=lambda m: m.value, default=None)
+    down = max((m for m in gains if m.value <= 1), key=lambda m: m.value, default=None)
+    turned, delayed = [], []
+    for k in range(path.loci.shape[1]):
+        locus = path.loci[:, k]
+        for i, t in _zeros(np.log(np.maximum(np.abs(locus), 1e-300))):
+            if path.on_axis[i] and path.on_axis[i + 1]:
+                angle = np.angle(-locus[i]) + t * np.angle(locus[i + 1] / locus[i])
+                hertz = float(path.hertz[i] + t * (path.hertz[i + 1] - path.hertz[i]))
+                turned.append(Margin(float(abs(np.rad2deg(np.angle(np.exp(1j * angle))))), hertz))
+                delayed.append(Margin(float(angle % (2 * np.pi) / (2 * np.pi * hertz)), hertz))
+    sensitivity = np.linalg.inv(np.eye(path.L.shape[-1]) + path.L)
+    disk = 1 / np.linalg.norm(sensitivity - np.eye(path.L.shape[-1]) / 2, ord=2, axis=(1, 2))
+    return NyquistMargins(
+        up, down, _least(turned), _least(delayed), _where_least(path, path.distance), _where_least(path, disk)
+    )
+
+
+def _zeros(values: Numbers) -> list[tuple[int, float]]:
+    """Intervals in which values change their sign, and where in each."""
+    places = np.flatnonzero((values[:-1] < 0) != (values[1:] < 0))
+    return [(int(i), float(values[i] / (values[i] - values[i + 1]))) for i in places]
+
+
+def _least(margins: list[Margin]) -> Margin | None:
+    return min(margins, key=lambda m: m.value, default=None)
+
+
+def _where_least(path: LoopPath, values: Numbers) -> Margin:
+    told = path.on_axis & (path.hertz >= min(_SLOWEST, path.hertz[-1]))
+    k = int(np.argmin(np.where(told, values, np.inf)))
+    return Margin(float(values[k]), float(path.hertz[k]))

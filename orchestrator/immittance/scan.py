@@ -1,0 +1,154 @@
+"""A scan: the admittance matrix of a device or a network at its ports, over frequency.
+
+Inside, every scan is in one form: currents are counted into what is scanned, rows and columns are d and q of one port
+after the other, and the q axis leads the d axis. What stands in a file in another form is turned as it is read.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from orchestrator.arrays import Complex, Numbers, Vector
+from orchestrator.errors import InputError
+
+SIEMENS, PER_UNIT = "S", "pu"
+SYSTEM_MVA = 100.0
+_TOP = 5.0  # frequencies down to this part of the highest tell signs: there a device's filter answers, not its control
+_ACTIVE = 0.5
+"""Part of those frequencies at which both resistances must be negative for the sign to be called the generator's."""
+
+_SURE = 0.02
+"""Reactance at the rated frequency over the size of the impedance from which on its sign tells the axes' order."""
+
+_HOLE, _BESIDE = 3.0, 8
+"""A step of the frequency this many times as long as each of so many to either side may be a hole."""
+
+
+@dataclass(frozen=True)
+class PortPoint:
+    """Operating point of a port as a file states it; None for what it does not state."""
+
+    kilovolt: float | None = None
+    megawatt: float | None = None
+    megavar: float | None = None
+    angle: float | None = None
+
+
+@dataclass(frozen=True)
+class Scan:
+    source: str  # the file's name, or what was scanned
+    frequencies: Numbers  # in the dq frame [Hz], rising, shape (f,)
+    values: Vector  # [``unit``], shape (f, 2p, 2p)
+    ports: tuple[str, ...]  # names, length p
+    unit: str = SIEMENS
+    # bound of the error of ``values`` in the 2-norm, shape (f,); zeros where none is known.
+    bounds: Numbers = field(default_factory=lambda: np.zeros(0))
+    points: Mapping[str, PortPoint] = field(default_factory=dict)  # operating points, by port
+    questions: tuple[str, ...] = ()  # what is unusual in it, for the user to answer
+
+    def __post_init__(self) -> None:
+        if not len(self.bounds):
+            object.__setattr__(self, "bounds", np.zeros(len(self.frequencies)))
+
+    @property
+    def impedance(self) -> Complex:
+        try:
+            return np.asarray(np.linalg.inv(self.values))
+        except np.linalg.LinAlgError as error:
+            raise InputError(f"{self.source}: its admittance is singular at some frequency; scan it again") from error
+
+    def rotated(self, angles: Sequence[float]) -> "Scan":
+        """The same in a frame behind which each port's own lies by an angle [rad]: v = T(angle)·v_own."""
+        T = block_rotation(angles)
+        return replace(self, values=T @ self.values @ T.T)
+
+    def scaled(self, factor: float, unit: str) -> "Scan":
+        return replace(self, values=factor * self.values, bounds=factor * self.bounds, unit=unit)
+
+    def in_siemens(self, kilovolt: float) -> "Scan":
+        """A scan in per unit of the system base at a rated voltage."""
+        return self.scaled(SYSTEM_MVA / kilovolt**2, SIEMENS)
+
+    def turned_sign(self) -> "Scan":
+        """The same with currents counted the other way."""
+        return replace(self, values=-self.values)
+
+
+def block_rotation(angles: Sequence[float]) -> Numbers:
+    T = np.zeros((2 * len(angles), 2 * len(angles)))
+    for k, angle in enumerate(angles):
+        c, s = np.cos(angle), np.sin(angle)
+        T[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = [[c, -s], [s, c]]
+    return T
+
+
+def other_q_axis(values: Vector) -> Complex:
+    """The same with each q axis turned round."""
+    signs = np.tile([1.0, -1.0], values.shape[-1] // 2)
+    return np.asarray(values * signs[:, None] * signs[None, :])
+
+
+def checked(source: str, frequencies: Numbers, values: Vector) -> tuple[str, ...]:
+    if not (np.isfinite(values).all() and np.isfinite(frequencies).all()):
+        raise InputError(f"{source}: a value is not a finite number; scan that frequency again or leave its row out")
+    if len(frequencies) < 8:
+        raise InputError(f"{source}: there are {len(frequencies)} frequencies above 0; at least 8 are needed")
+    steps = np.diff(frequencies)
+    if (steps <= 0).any():
+        k = int(np.argmax(steps <= 0))
+        raise InputError(
+            f"{source}: the frequencies do not rise: {frequencies[k + 1]:g} Hz follows {frequencies[k]:g} Hz; sort the "
+            "rows, and keep one of each frequency"
+        )
+    beside = [np.r_[steps[max(0, k - _BESIDE) : k], steps[k + 1 : k + 1 + _BESIDE]].max() for k in range(len(steps))]
+    holes = [
+        f"{frequencies[k]:g} to {frequencies[k + 1]:g} Hz" for k in np.flatnonzero(steps > _HOLE * np.array(beside))
+    ]
+    return (f"{source}: are rows missing from {', '.join(holes[:5])}? the steps beside are shorter",) if holes else ()
+
+
+def in_own_form(source: str, frequencies: Numbers, values: Vector, rated_hz: float, *, q_leads: bool) -> Complex:
+    """Values with the q axis leading; the inductance that every filter and line has at high frequencies must agree."""
+    own = values if q_leads else other_q_axis(values)
+    seen = _reactance_sign(frequencies, own, rated_hz)
+    if seen < 0:
+        raise InputError(
+            f"{source}: by its reactance at high frequencies the q axis {'lags' if q_leads else 'leads'} the d axis, "
+            f"where this form has it {'leading' if q_leads else 'lagging'}; turn the sign of the dq and qd elements"
+        )
+    return own
+
+
+def _reactance_sign(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
+    """1 if ωL in the dq and qd elements of the impedance is that of a leading q axis, −1 of a lagging; 0 if unclear."""
+    top = frequencies >= frequencies[-1] / _TOP
+    size = np.linalg.norm(values[top], ord=2, axis=(1, 2))
+    if (size == 0).any():
+        return 0.0
+    Z = np.linalg.pinv(values[top])
+    cross = (Z[:, 1, 0] - Z[:, 0, 1]).real / 2
+    along = (Z[:, 0, 0] + Z[:, 1, 1]).imag / 2  # ωL where the cross elements have ω₀L
+    agrees = cross / np.where(along == 0, 1.0, along) * frequencies[top] / rated_hz
+    sure = np.abs(cross) > _SURE * np.linalg.norm(Z, ord=2, axis=(1, 2))
+    if sure.mean() < 0.5:
+        return 0.0
+    near_one = np.abs(np.abs(agrees[sure]) - 1) < 0.3
+    return float(np.sign(np.median(agrees[sure]))) if near_one.mean() > 0.8 else 0.0
+
+
+def is_active(scan: Scan) -> bool:
+    """Whether it would deliver power in both axes at most of the high frequencies: the sign of a generator."""
+    top = scan.values[scan.frequencies >= scan.frequencies[-1] / _TOP]
+    largest = np.linalg.eigvalsh((top + top.conj().transpose(0, 2, 1)) / 2)[:, -1]
+    size = np.linalg.norm(top, ord=2, axis=(1, 2))
+    return bool((largest < -1e-4 * size).mean() > _ACTIVE)
+
+
+def check_sign(scan: Scan, option: str) -> None:
+    """Refuse an admittance whose currents are counted out of it."""
+    if is_active(scan):
+        raise InputError(
+            f"{scan.source}: its resistance is negative in both axes at most high frequencies, as if it fed power into "
+            f"every oscillation: are its currents counted out of it (generator sign)? Then give {option}"
+        )

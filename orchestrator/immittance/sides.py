@@ -1,0 +1,149 @@
+"""The two sides of a cut, each a matrix over s = jω: interpolated from a scan, or exact from a linear model."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from orchestrator.arrays import Complex, Matrix, Numbers, Vector
+from orchestrator.immittance.poles import unstable_poles
+
+NEAR_ZERO = 1e-3
+"""Poles of models this near to 0 [rad/s] are the free angle's and clocks'; the path goes round them to the right."""
+
+_RESOLVED, _SHARE, _NOISE, _UNRESOLVED = 0.3, 0.5, 1e-3, 6.0
+"""Where a cubic through its neighbours predicts a left-out value by 0.3 times the error of a straight line or better,
+half of its error is the interpolation's with room to spare. Elsewhere what is seen is noise up to 1e-3 of the value;
+larger, it may be the flank of something that is far larger between the frequencies."""
+
+
+class Side(Protocol):
+    """A matrix over the imaginary axis, of which it is known how sure it is and how many unstable poles it has.
+
+    ``name``: For sentences.
+    ``frequencies``: At which it is known best [Hz].
+    ``is_exact``: Whether it is known at every frequency.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def frequencies(self) -> Numbers: ...
+
+    @property
+    def is_exact(self) -> bool: ...
+
+    @property
+    def unstable(self) -> tuple[complex, ...]: ...
+
+    def at(self, s: Vector) -> Complex:
+        """Its values at s, on the imaginary axis or close beside it, shape (f, n, n)."""
+
+    def error(self, s: Vector) -> Numbers:
+        """Bound of their error in the 2-norm, shape (f,)."""
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A matrix known at some frequencies, interpolated by cubics through four of them."""
+
+    name: str
+    frequencies: Numbers
+    values: Vector
+    bounds: Numbers
+    is_exact: bool = False
+
+    @cached_property
+    def unstable(self) -> tuple[complex, ...]:
+        return unstable_poles(self.frequencies, self.values)
+
+    def at(self, s: Vector) -> Complex:
+        f = s.imag / (2 * np.pi)
+        first = np.clip(np.searchsorted(self.frequencies, f) - 2, 0, len(self.frequencies) - 4)
+        return _lagrange(self.frequencies, self.values, f, first[:, None] + np.arange(4))
+
+    def error(self, s: Vector) -> Numbers:
+        f = s.imag / (2 * np.pi)
+        right = np.clip(np.searchsorted(self.frequencies, f), 1, len(self.frequencies) - 1)
+        found = np.maximum(self._left_out[right - 1], self._left_out[right])
+        return np.asarray(found + np.maximum(self.bounds[right - 1], self.bounds[right]))
+
+    @cached_property
+    def _left_out(self) -> Numbers:
+        """Error of the interpolation at each frequency, from predicting its value by those beside it."""
+        f, count = self.frequencies, len(self.frequencies)
+        k = np.arange(2, count - 2)
+        cubic = _lagrange(f, self.values, f[k], k[:, None] + np.array([-2, -1, 1, 2])) - self.values[k]
+        straight = _lagrange(f, self.values, f[k], k[:, None] + np.array([-1, 1])) - self.values[k]
+        small, large = (np.linalg.norm(e, ord=2, axis=(1, 2)) for e in (cubic, straight))
+        size = np.linalg.norm(self.values[k], ord=2, axis=(1, 2))
+        factor = np.where(small <= _RESOLVED * large, _SHARE, np.where(small < _NOISE * size, 1.0, _UNRESOLVED))
+        rounding = 1e-9 * size
+        return np.pad(np.minimum(factor * small, large + 10 * small) + rounding, 2, mode="edge")
+
+
+def _lagrange(f: Numbers, values: Vector, at: Numbers, places: Vector) -> Complex:
+    """Polynomials through values at some places (n, m), evaluated at n frequencies."""
+    nodes = f[places]
+    total = np.zeros((len(at), *values.shape[1:]), dtype=complex)
+    for i in range(places.shape[1]):
+        others = np.delete(nodes, i, axis=1)
+        weight = np.prod((at[:, None] - others) / (nodes[:, i : i + 1] - others), axis=1)
+        total += weight[:, None, None] * values[places[:, i]]
+    return total
+
+
+@dataclass(frozen=True)
+class Exact:
+    """C·(sI − A)⁻¹·B + D of a continuous model; by its modes where they give the same."""
+
+    name: str
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    is_exact: bool = True
+
+    @cached_property
+    def _modes(self) -> tuple[Complex, Complex, Complex] | None:
+        """Eigenvalues, and C and B in their coordinates; None where the eigenvectors are nearly dependent."""
+        values, vectors = np.linalg.eig(self.A)
+        try:
+            found = values, self.C @ vectors, np.linalg.solve(vectors, self.B.astype(complex))
+        except np.linalg.LinAlgError:
+            return None
+        probes = np.array([1e-3, 0.3j, 50j + 1, 4e3j])
+        direct, modal = self._direct(probes), self._modal(probes, found)
+        alike = np.abs(direct - modal).max() <= 1e-9 * max(1.0, np.abs(direct).max())
+        return found if alike else None
+
+    @cached_property
+    def poles(self) -> Complex:
+        return np.asarray(np.linalg.eigvals(self.A), dtype=complex)
+
+    @property
+    def frequencies(self) -> Numbers:
+        return np.sort(np.abs(self.poles.imag)) / (2 * np.pi)
+
+    @property
+    def unstable(self) -> tuple[complex, ...]:
+        return tuple(p for p in self.poles.tolist() if p.real > 0 and abs(p) > NEAR_ZERO)
+
+    def at(self, s: Vector) -> Complex:
+        return self._direct(s) if self._modes is None else self._modal(s, self._modes)
+
+    def _direct(self, s: Vector) -> Complex:
+        found = [self.C @ np.linalg.solve(x * np.eye(len(self.A)) - self.A, self.B) for x in s.tolist()]
+        return np.asarray(np.array(found, dtype=complex).reshape(len(s), *self.D.shape) + self.D)
+
+    def _modal(self, s: Vector, modes: tuple[Complex, Complex, Complex]) -> Complex:
+        values, C, B = modes
+        return np.asarray((C / (s[:, None, None] - values)) @ B + self.D)
+
+    def error(self, s: Vector) -> Numbers:
+        return np.zeros(len(s))
+
+    def negated(self) -> "Exact":
+        return replace(self, C=-self.C, D=-self.D)

@@ -1,0 +1,278 @@
+"""A study at a cut: which two sides, in which units and frames, and what is found."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.black_box.frequency_response import Excitation
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import InputError
+from orchestrator.immittance.cut import Cut, cut_of
+from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judge_loop
+from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
+from orchestrator.immittance.margins import Margin
+from orchestrator.immittance.measured import scan_fmu
+from orchestrator.immittance.scan import PER_UNIT, SIEMENS, SYSTEM_MVA, PortPoint, Scan, check_sign
+from orchestrator.immittance.scan_files import ENDINGS, read_scan
+from orchestrator.immittance.sides import Sampled, Side
+
+_UNLIKE = (0.003, 30.0)
+"""Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
+
+_OTHER_POINT = 0.01
+"""Relative difference of the voltage, and of the power over the larger one, from which on an operating point is another
+one."""
+
+
+@dataclass(frozen=True)
+class CutRequest:
+    # device, network: A scan's file, an FMU or DLL; for the network a scan's file or a scenario. The network of a
+    # scenario alone is what remains of it.
+    device: Path | None
+    network: Path | PreparedScenario
+    frequency: float = 50.0
+    compensation: float = 0.0  # series capacitors, as share of the network's reactance at the rated frequency
+    # of the device's frame before the network's [rad]; None where the files or the sides state it.
+    angle: float | None = None
+    bus: str | None = None
+    components: tuple[str, ...] = ()
+    kilovolt: float | None = None  # rated voltage of what is in per unit
+    generator: frozenset[str] = frozenset()  # sides whose files count currents out of them: ``device``, ``network``
+    per_unit: frozenset[str] = frozenset()  # sides whose files are in per unit of the system base
+    units_checked: bool = False
+    values: Mapping[str, Any] = field(default_factory=dict)
+    binding: Path | None = None
+    step_size: float = 1e-4
+    excitation: Excitation = field(default_factory=Excitation)
+
+
+@dataclass(frozen=True)
+class CutResult:
+    """What was found. ``scans`` are those that were read or measured, by side."""
+
+    request: CutRequest
+    loop: CutLoop
+    judgement: CutJudgement
+    scans: dict[str, Scan]
+    cut: Cut | None
+    unit: str
+    questions: tuple[str, ...]
+
+    @property
+    def verdict(self) -> NyquistVerdict:
+        return self.judgement.verdict
+
+    @property
+    def because(self) -> str:
+        j = self.judgement
+        if j.reasons:
+            return "; ".join(j.reasons)
+        low, high = j.range_hz
+        around = f"−1 is encircled {j.encirclements} times by the determinant and by the eigenloci"
+        poles = f", with {len(j.open_loop)} unstable poles of the open loop" if j.open_loop else ""
+        return f"{around}{poles}, " + (
+            "at all frequencies" if self.loop.is_exact else f"from {low:.3g} to {high:.4g} Hz"
+        )
+
+    @property
+    def difference(self) -> dict[str, float] | None:
+        """Largest difference of a scan from the case's own device in its place, relative, where there is one."""
+        device = self.loop.device
+        if self.cut is None or not isinstance(device, Sampled) or device.values.shape[1:] != self.cut.device.D.shape:
+            return None
+        own = self.cut.device.at(2j * np.pi * device.frequencies)
+        apart = np.linalg.norm(device.values - own, ord=2, axis=(1, 2)) / np.linalg.norm(own, ord=2, axis=(1, 2))
+        return {"largest_relative": float(apart.max()), "frequency_hz": float(device.frequencies[np.argmax(apart)])}
+
+    def as_json(self) -> dict[str, Any]:
+        """Verdict and figures as JSON's types."""
+        j, m = self.judgement, self.judgement.margins
+
+        def margin(one: Margin | None) -> dict[str, float] | None:
+            return None if one is None else {"value": one.value, "frequency_hz": one.frequency_hz}
+
+        points = {s: {p: vars(v) for p, v in scan.points.items()} for s, scan in self.scans.items() if scan.points}
+        return {
+            "verdict": str(self.verdict),
+            "reasons": list(j.reasons),
+            "sentence": f"{self.verdict}: {self.because}",
+            "device": self.loop.device.name,
+            "network": self.loop.network.name,
+            "unit": self.unit,
+            "compensation_percent": 100 * self.request.compensation,
+            "range_hz": list(j.range_hz),
+            "growing_modes": j.growing,
+            "encirclements": {"determinant": j.encirclements, "eigenloci": j.by_loci},
+            "open_loop_unstable_poles": [{"real": p.real, "imag": p.imag} for p in j.open_loop],
+            "modes_stable": None if self.cut is None or self.request.device else self.cut.modes_stable,
+            "crossings": [{"real": c.real, "frequency_hz": c.frequency_hz} for c in j.crossings],
+            "margins": {
+                "gain": margin(m.gain), "gain_up": margin(m.gain_up), "gain_down": margin(m.gain_down),
+                "phase_deg": margin(m.phase_deg), "delay_s": margin(m.delay_s),
+                "distance": margin(m.distance), "disk": margin(m.disk),
+            },
+            "difference_from_case": self.difference,
+            "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
+            "small_gain_hz": [list(band) for band in j.small_gain],
+            "operating_points": points,
+            "questions": list(self.questions),
+        }  # fmt: skip
+
+
+def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) -> CutResult:
+    """Bring both sides into one unit and one frame, and judge their loop."""
+    cut = None
+    if isinstance(request.network, PreparedScenario):
+        cut = cut_of(request.network, request.bus, request.components)
+        if cut.rated_hz != request.frequency:
+            request = replace(request, frequency=cut.rated_hz)
+    scans: dict[str, Scan] = {}
+    if request.device is not None:
+        if cut is not None and len(cut.devices) > 1:
+            raise InputError(f"the cut holds {', '.join(cut.devices)}; name the one that the scan is of by --component")
+        scans["device"] = _side(request, "device", request.device, cut, report)
+    if isinstance(request.network, Path):
+        scans["network"] = _side(request, "network", request.network, None, report)
+    unit = PER_UNIT if cut is not None else _common_unit(scans.values())
+    scans = {side: _in_unit(scan, unit, request.kilovolt) for side, scan in scans.items()}
+    known = _in_one_frame(request, scans, cut)
+    questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
+    device: Side | None = _sampled(scans["device"]) if "device" in scans else cut.device if cut else None
+    network: Side | None = (
+        _sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
+    )
+    assert device is not None
+    assert network is not None
+    if cut is not None and "device" in scans:
+        _check_place(scans["device"], cut, request.kilovolt)
+    if len(scans) == 2:
+        _check_pair(request, scans["device"], scans["network"])
+    loop = CutLoop(device, network)
+    if request.compensation:
+        loop = replace(loop, capacitors=_capacitors(loop, request))
+    judgement = judge_loop(loop, frames_known=known)
+    if cut is not None and request.device is None and not request.compensation:
+        judgement = _beside_modes(judgement, cut)
+    return CutResult(request, loop, judgement, scans, cut, unit, questions)
+
+
+def _side(request: CutRequest, side: str, path: Path, cut: Cut | None, report: Callable[[str], None] | None) -> Scan:
+    if path.suffix.lower() in ENDINGS:
+        scan = read_scan(path, request.frequency, network=side == "network")
+        scan = scan.scaled(1.0, PER_UNIT) if side in request.per_unit else scan
+        scan = scan.turned_sign() if side in request.generator else scan
+        check_sign(scan, f"--generator {side}")
+        return scan
+    if side == "network":
+        raise InputError(f"{path}: the network is a scan's file or a case; an FMU can be the device")
+    values = dict(request.values)
+    if cut is not None:  # at the case's own operating point
+        (name,) = cut.devices
+        v = cut.voltages[name]
+        values = {"v_0": abs(v), "theta_0": float(np.angle(v))} | values
+    return scan_fmu(path, request.binding, values, request.step_size, request.excitation, report)
+
+
+def _common_unit(scans: Any) -> str:
+    units = {scan.unit for scan in scans}
+    return units.pop() if len(units) == 1 else SIEMENS
+
+
+def _in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:
+    if scan.unit == unit:
+        return scan
+    if kilovolt is None:
+        raise InputError(
+            f"{scan.source} is in {scan.unit} and the other side in {unit}: give the rated voltage at the cut, as in "
+            "--voltage '230 kV' (the base is 100 MVA)"
+        )
+    return scan.in_siemens(kilovolt) if unit == SIEMENS else scan.scaled(kilovolt**2 / SYSTEM_MVA, unit)
+
+
+def _in_one_frame(request: CutRequest, scans: dict[str, Scan], cut: Cut | None) -> bool:
+    """Turn the scans into the network's frame; whether it is known how."""
+    if "device" not in scans:
+        return True
+    if request.angle is not None:
+        scans["device"] = scans["device"].rotated([request.angle] * len(scans["device"].ports))
+        return True
+    angles = {s: [scan.points[p].angle if p in scan.points else None for p in scan.ports] for s, scan in scans.items()}
+    if any(angle is None for found in angles.values() for angle in found):
+        return False
+    for side, found in angles.items():
+        scans[side] = scans[side].rotated([angle or 0.0 for angle in found])
+    return True
+
+
+def _sampled(scan: Scan, *, inverse: bool = False) -> Sampled:
+    if not inverse:
+        return Sampled(scan.source, scan.frequencies, scan.values, scan.bounds)
+    Z = scan.impedance
+    return Sampled(scan.source, scan.frequencies, Z, scan.bounds * np.linalg.norm(Z, ord=2, axis=(1, 2)) ** 2)
+
+
+def _check_pair(request: CutRequest, device: Scan, network: Scan) -> None:
+    if len(device.ports) != len(network.ports):
+        raise InputError(f"{device.source} has the ports {', '.join(device.ports)}, {network.source} has "
+                         f"{', '.join(network.ports)}; they must be the same")  # fmt: skip
+    low, high = (f(s.frequencies[k] for s in (device, network)) for f, k in ((max, 0), (min, -1)))
+    if low * 1.5 >= high:
+        raise InputError(f"{device.source} and {network.source} have no common range of frequencies")
+    sizes = [np.interp(np.geomspace(low, high, 50), s.frequencies, np.linalg.norm(M, ord=2, axis=(1, 2)))
+             for s, M in ((device, device.values), (network, network.impedance))]  # fmt: skip
+    ratio = float(np.median(sizes[0] * sizes[1]))
+    if not _UNLIKE[0] < ratio < _UNLIKE[1] and not request.units_checked:
+        raise InputError(
+            f"{device.source} times the impedance of {network.source} is {ratio:.2g} at most frequencies: is one of "
+            "them in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; "
+            "if the units are right, give --units-checked"
+        )
+    for one, other in zip(device.ports, network.ports, strict=True):
+        if one in device.points and other in network.points:
+            _check_point(f"port {one}: {device.source}", device.points[one], network.source, network.points[other])
+
+
+def _check_point(what: str, a: PortPoint, other: str, b: PortPoint) -> None:
+    """Refuse two operating points that differ; signs of powers are anybody's."""
+    power = max(abs(complex(p.megawatt or 0, p.megavar or 0)) for p in (a, b))
+    for name, x, y, size in (
+        ("voltage [kV]", a.kilovolt, b.kilovolt, a.kilovolt),
+        ("active power [MW]", a.megawatt, b.megawatt, power),
+        ("reactive power [Mvar]", a.megavar, b.megavar, power),
+    ):
+        if x is not None and y is not None and abs(abs(x) - abs(y)) > _OTHER_POINT * (size or 1):
+            raise InputError(
+                f"{what} was scanned at another operating point than {other}: {name} {x:g} and {y:g}; scan both at one"
+            )
+
+
+def _check_place(scan: Scan, cut: Cut, kilovolt: float | None) -> None:
+    """Refuse a scan at another operating point than the case's."""
+    (name,) = cut.devices
+    power = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_MVA
+    here = PortPoint(abs(cut.voltages[name]) * kilovolt if kilovolt else None, power.real, power.imag)
+    for point in scan.points.values():
+        _check_point(scan.source, point, f"{name} in the case", here)
+
+
+def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:
+    low = loop.network.frequencies[:1] if not loop.network.is_exact else np.array([1e-3])
+    Z = loop.network.at(2j * np.pi * low)[0]
+    X = float((Z[1, 0] - Z[0, 1]).real / 2)
+    if len(Z) != 2 or X <= 0:
+        raise InputError(
+            f"--compensation: {loop.network.name} has no inductive reactance at one port to be compensated"
+        )
+    return SeriesCapacitors(request.compensation * X, 2 * np.pi * request.frequency)
+
+
+def _beside_modes(judgement: CutJudgement, cut: Cut) -> CutJudgement:
+    """Where the modes of the closed system say otherwise, nothing is known."""
+    said = {True: NyquistVerdict.STABLE, False: NyquistVerdict.UNSTABLE, None: NyquistVerdict.NOT_KNOWN}
+    if judgement.reasons or said[cut.modes_stable] is judgement.verdict:
+        return judgement
+    reason = f"the eigenvalues of the closed system say {said[cut.modes_stable]}, the encirclements {judgement.verdict}"
+    return replace(judgement, verdict=NyquistVerdict.NOT_KNOWN, reasons=(reason,), growing=None)

@@ -1,0 +1,169 @@
+"""Oscillations in a record: frequency, begin, harmonics, amplitude by signal."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.arrays import Numbers
+from orchestrator.oscillations.measurements import Measurements
+
+LOWEST_HZ, HIGHEST_HZ = 0.08, 8.0
+_ABOVE = 30.0  # power of a line beside the median of its neighbours from which it is an oscillation
+_MOST = 6
+_LEAST_SHARE = 0.01  # part of the strongest oscillation's power from which on a weaker one is told
+_PERIODS = 6  # fewest periods in a record
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Deviations of a record's signals from straight lines, shape (n, m), with their names ``place.p`` and so on."""
+
+    times: Numbers
+    names: tuple[str, ...]
+    values: Numbers
+
+
+@dataclass(frozen=True)
+class SpectralLine:
+    """One line of the spectrum."""
+
+    frequency: float
+    begin: float | None  # [s]; None where it was there before the record
+    # first, last: the part of the record in which it is analysed, as indices.
+    first: int
+    last: int
+    # multiples of the frequency that are there as well, by order, as parts of the amplitude.
+    harmonics: dict[int, float]
+    amplitudes: dict[str, float]  # by signal [its unit], the strongest beside its own noise first
+
+    def periods(self, interval: float) -> float:
+        """How many are seen, from the time between two samples [s]."""
+        return (self.last - self.first) * interval * self.frequency
+
+
+def signals_of(measured: Measurements) -> Signals:
+    """Powers of all places, speeds of the angles and magnitudes of the voltages of all buses."""
+    columns: dict[str, Numbers] = {}
+    for place in measured.places:
+        columns[f"{place.name}.p"], columns[f"{place.name}.q"] = place.p, place.q
+        columns[f"{place.bus}.v"] = place.v
+        columns[f"{place.bus}.speed"] = np.gradient(place.angle, measured.interval) / (2 * np.pi)
+    values = np.column_stack(list(columns.values()))
+    line = np.column_stack([np.ones(len(values)), measured.times - measured.times.mean()])
+    flat = values - line @ np.linalg.lstsq(line, values, rcond=None)[0]
+    return Signals(measured.times, tuple(columns), flat)
+
+
+def find_oscillations(signals: Signals) -> list[SpectralLine]:
+    """Lines of the spectrum, the strongest first; multiples of one belong to it."""
+    n, step = len(signals.times), float(signals.times[1] - signals.times[0])
+    length = n * step
+    grid, power = _spectrum(signals.values, step)
+    low, high = max(LOWEST_HZ, _PERIODS / length), min(HIGHEST_HZ, 0.4 / step)
+    inside = np.flatnonzero((grid >= low) & (grid <= high))
+    lines: list[tuple[float, float]] = []
+    for k in map(int, inside):
+        if power[k] == power[max(0, k - 12) : k + 13].max() and power[k] > _ABOVE * _background(power, k):
+            lines.append((float(power[k]), refined(signals, float(grid[k]))))
+    lines.sort(reverse=True)
+    kept: list[float] = []
+    found: list[SpectralLine] = []
+    for strength, frequency in lines:
+        clear = all(abs(frequency - other) * length > 3 for other in kept)
+        if strength < _LEAST_SHARE * lines[0][0] or not clear or len(found) == _MOST:
+            continue
+        kept.append(frequency)
+        base = next((o for o in found if _multiple(frequency, o.frequency, length)), None)
+        if base is not None:
+            order = round(frequency / base.frequency)
+            base.harmonics[order] = _relative(signals, base, order)
+        else:
+            found.append(_described(signals, frequency))
+    return found
+
+
+def _spectrum(values: Numbers, step: float) -> tuple[Numbers, Numbers]:
+    """Frequencies [Hz] and the mean power of all signals, each as a part of its own."""
+    window = np.hanning(len(values))[:, None]
+    power = np.abs(np.fft.rfft(values * window, 4 * len(values), axis=0)) ** 2
+    share = power / np.maximum(power.sum(axis=0), 1e-300)
+    return np.asarray(np.fft.rfftfreq(4 * len(values), step), dtype=np.float64), np.asarray(
+        share.mean(axis=1), dtype=np.float64
+    )
+
+
+def _background(power: Numbers, k: int) -> float:
+    """Median beside the line, further off than its own width, over some forty independent bins."""
+    around = np.concatenate([power[max(0, k - 100) : max(0, k - 14)], power[k + 15 : k + 101]])
+    return float(np.median(around)) if len(around) else 0.0
+
+
+def refined(signals: Signals, guess: float) -> float:
+    """The frequency near a guess at which a sine explains most of the signals."""
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415 - slow to import
+
+    spread = signals.values.std(axis=0)
+    strong = signals.values[:, spread > 0] / spread[spread > 0]
+    window = np.hanning(len(strong))[:, None]
+    t = signals.times - signals.times.mean()
+
+    def missing(frequency: float) -> float:
+        return -float((np.abs((strong * window).T @ np.exp(-2j * np.pi * frequency * t)) ** 2).sum())
+
+    near = 1 / (t[-1] - t[0])
+    best = minimize_scalar(missing, bounds=(guess - near, guess + near), method="bounded", options={"xatol": 1e-6})
+    return float(best.x)
+
+
+def _multiple(frequency: float, base: float, length: float) -> bool:
+    order = round(frequency / base)
+    return order >= 2 and abs(frequency - order * base) * length < 1
+
+
+def phasors(times: Numbers, values: Numbers, frequencies: Sequence[float]) -> Numbers:
+    """Complex amplitudes of the first frequency, shape (m,), with the other frequencies and a parabola beside it."""
+    t = times - times.mean()
+    columns = [np.ones_like(t), t, t**2]
+    for f in frequencies:
+        columns += [np.cos(2 * np.pi * f * times), -np.sin(2 * np.pi * f * times)]
+    found = np.linalg.lstsq(np.column_stack(columns), values, rcond=None)[0]
+    return np.asarray(found[3] + 1j * found[4])
+
+
+def envelope(times: Numbers, values: Numbers, frequency: float, periods: float = 3.0) -> tuple[Numbers, int]:
+    """Complex amplitude over the time from a sliding window of some periods, and the window's half in samples."""
+    step = float(times[1] - times[0])
+    half = max(2, round(0.5 * periods / (frequency * step)))
+    window = np.hanning(2 * half + 3)[1:-1]
+    slow = values - np.convolve(np.pad(values, half, mode="edge"), window / window.sum(), mode="valid")
+    turned = slow * np.exp(-2j * np.pi * frequency * times)
+    return np.convolve(turned, 2 * window / window.sum(), mode="valid"), half
+
+
+def _described(signals: Signals, frequency: float) -> SpectralLine:
+    amplitude = np.abs(phasors(signals.times, signals.values, [frequency]))
+    spread = signals.values.std(axis=0)
+    order = np.argsort(-amplitude / np.maximum(spread, 1e-300))
+    z, half = envelope(signals.times, signals.values[:, order[0]], frequency)
+    size = np.abs(z)
+    level = float(np.median(size[size > 0.5 * size.max()]))
+    there = np.flatnonzero(size >= 0.5 * level)
+    begin = None if there[0] == 0 else float(signals.times[there[0] + half])
+    first = 0 if begin is None else int(there[0]) + half
+    last = len(signals.times) if there[-1] == len(size) - 1 else int(there[-1]) + half
+    used = slice(first, last)
+    strength = np.abs(phasors(signals.times[used], signals.values[used], [frequency]))
+    amplitudes = {signals.names[k]: float(strength[k]) for k in order if strength[k] > 0}
+    return SpectralLine(frequency, begin, first, last, {}, amplitudes)
+
+
+def _relative(signals: Signals, base: SpectralLine, order: int) -> float:
+    """Largest amplitude of a multiple beside that of the oscillation itself, among the signals that show it well."""
+    used = slice(base.first, base.last)
+    t, x = signals.times[used], signals.values[used]
+    whole = np.abs(phasors(t, x, [base.frequency]))
+    part = np.abs(phasors(t, x, [order * base.frequency, base.frequency]))
+    spread = x.std(axis=0)
+    clear = whole > 0.5 * spread
+    return float((part[clear] / whole[clear]).max()) if clear.any() else 0.0

@@ -1,0 +1,82 @@
+"""The oscillations of a record with what they are and where they come from."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from orchestrator.oscillations.detection import SpectralLine, find_oscillations, signals_of
+from orchestrator.oscillations.kind import Evidence, evidence_of
+from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, opinions
+from orchestrator.oscillations.measurements import Measurements
+
+_SHOWN = 8
+_FEWEST_PERIODS = 5  # of an oscillation that is told
+
+
+@dataclass(frozen=True)
+class Located:
+    """One oscillation, what it is, and its source where the methods allow to name one."""
+
+    found: SpectralLine
+    evidence: Evidence
+    opinions: tuple[Opinion, ...]
+    source: str | None  # the place that feeds it; None where that is not known, or nothing forces it
+    reason: str  # why it is named, or why not
+    advice: str  # what would confirm the answer, or what helps
+
+    def as_json(self) -> dict[str, Any]:
+        return {
+            "frequency_hz": self.found.frequency,
+            "kind": self.evidence.kind,
+            "source": self.source,
+            "reason": self.reason,
+            "advice": self.advice,
+            "begin": self.found.begin,
+            "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
+            "evidence": asdict(self.evidence),
+            "methods": [asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions],
+            "amplitudes": dict(list(self.found.amplitudes.items())[:_SHOWN]),
+        }
+
+
+def locate(measured: Measurements) -> list[Located]:
+    """Find the oscillations of a record and where they come from."""
+    signals = signals_of(measured)
+    found = [one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_PERIODS]
+    answers = []
+    for one in found:
+        evidence = evidence_of(signals, one)
+        others = [o.frequency for o in found if o is not one]
+        said = tuple(opinions(measured, one, others))
+        source, reason = _verdict(evidence, said)
+        answers.append(Located(one, evidence, said, source, reason, _advice(measured, evidence, source)))
+    return answers
+
+
+def _verdict(evidence: Evidence, said: tuple[Opinion, ...]) -> tuple[str | None, str]:
+    """A source where the methods agree or one is known not to apply."""
+    if evidence.kind != "forced":
+        what = (
+            "a mode of the system has no source" if evidence.kind == "mode" else "it is not known whether it is forced"
+        )
+        return None, f"{what}: {evidence.reasons[0]}"
+    by_method = {o.method: o for o in said}
+    flow, phase, mode = by_method[DEF], by_method[QV_PHASE], by_method[DYNAMIC_MODE]
+    physical = [o for o in (flow, phase) if o.applies]
+    named = {o.place for o in physical}
+    if named == {None} or not physical:
+        return None, "; ".join(f"{o.method}: {o.reason}" for o in physical)
+    if len(named) > 1 or (mode.place is not None and mode.place not in named):
+        return None, "the methods disagree: " + "; ".join(f"{o.method}: {o.reason}" for o in said)
+    agree = [o for o in said if o.place is not None]
+    quiet = [o for o in said if o.place is None]
+    return agree[0].place, "; ".join(f"{o.method}: {o.reason}" for o in [*agree, *quiet])
+
+
+def _advice(measured: Measurements, evidence: Evidence, source: str | None) -> str:
+    if evidence.kind == "mode":
+        return "damp the mode: `gfor sensitivities` and `gfor design` say which controller moves it most"
+    if source is None:
+        return "look at the places that lead the methods' rankings; a longer record, or more of the grid, may decide"
+    if any(p.name == source and p.kind == "branch" for p in measured.places):
+        return f"measure beyond {source}: it comes from there"
+    return f"hold the references of {source}, or switch its controllers to manual: the oscillation has to end"

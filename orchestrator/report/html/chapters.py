@@ -1,0 +1,298 @@
+"""Results of any study as a chapter of a report: its question, its answer in plain words, how sure it is, what was not
+judged, and its figures.
+"""
+
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from orchestrator.errors import InputError
+from orchestrator.report.html import studies
+from orchestrator.report.html.elements import damping, table
+from orchestrator.results.manifest import MANIFEST, read_manifest
+
+_SHOWN, _OPEN, _LONGEST = 8, 4, 110
+"""Rows of a short table; what was not judged on the first page, and the characters of each."""
+
+
+_STABLE: Mapping[bool | None, str] = {True: "stable", False: "UNSTABLE", None: "not known whether stable"}
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """What one result says; ``page`` is the name of its own page, whose sections are the chapter, in the place of
+    ``content``; ``title`` is its heading, in the place of the question.
+    """
+
+    source: Path
+    question: str
+    answer: str
+    good: bool | None
+    sure: str = ""
+    not_judged: Sequence[str] = ()
+    content: str = ""
+    page: str = ""
+    title: str = ""
+
+
+Content = Mapping[str, Any]
+
+
+def chapters_of(place: Path) -> list[Chapter]:
+    """The chapters of a folder, or of one JSON file, of any study but runs and sweeps."""
+    files = [place] if place.is_file() else sorted(place.glob("*.json"))
+    if place.is_dir() and (manifest := read_manifest(place)) is not None:
+        manifest.check(file.name for file in files)
+    found = []
+    for file in files:
+        try:
+            content = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            if file == place:
+                raise InputError(f"{file}: it cannot be read as JSON: {error}; run the study again") from error
+            continue  # somebody else's
+        keys = set(content) if isinstance(content, dict) else set(content[0]) if content and content[0] else set()
+        for wanted, make in _KINDS:
+            if wanted <= keys:
+                try:
+                    found.append(make(file, content))
+                except (KeyError, TypeError, IndexError, AttributeError, ValueError) as error:
+                    raise InputError(
+                        f"{file}: it is not as its study writes it ({error!r}); run the study again"
+                    ) from error
+                break
+    return found
+
+
+def of_run(folder: Path, scenarios: Sequence[Content], content: str = "") -> Chapter:
+    """Of a run's summary, or the same of `gfor modes`."""
+    said, open_, sure = [], [], []
+    for s in scenarios:
+        answer: Content = s.get("answer") or {}
+        stability: Content = s.get("stability") or {}
+        listed: Any = s.get("modes")
+        stable = answer.get("stable", stability.get("stable", s.get("stable")))
+        word = answer.get("verdict") or _STABLE[stable]
+        title = s.get("title", s["name"])
+        modes = [m for m in (listed if isinstance(listed, list) else [answer]) if m]
+        least = min((m for m in modes if m.get("damping_percent") is not None), key=lambda m: m["damping_percent"],
+                    default=None)  # fmt: skip
+        figures = f", least damped {least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %" if least else ""
+        remark = f" ({answer['remark']})" if answer.get("remark") else ""
+        said.append((stable, f"{title}: {word}{figures}{remark}"))
+        open_ += [f"{title}: {f['message']}" for f in s.get("findings", []) if f["kind"] == "not_judged"]
+        open_ += [f"{title}: {s['failure']}"] if s.get("failure") else []
+        open_ += [f"{title}: {stability.get('reason') or 'stability'}"] if stable is None else []
+        if ring := s.get("ring_down"):
+            sure.append(f"{title} rings with {ring['frequency_hz']:.3f} Hz, {ring['damping_percent']:.2f} % in time")
+    verdicts = [stable for stable, _ in said]
+    good = False if False in verdicts else None if None in verdicts else True
+    basis = "modes of the FMUs that were simulated; " if any("step_size_s" in s for s in scenarios) else ""
+    return Chapter(
+        folder, "Is the network stable, and which swing is damped least?", "; ".join(text for _, text in said), good,
+        (basis + "; ".join(sure)).strip("; ") or "linear model of the FMUs at the operating point; nothing was run",
+        open_, content,
+    )  # fmt: skip
+
+
+def _modes(file: Path, content: Content) -> Chapter:
+    rows = [
+        [escape(s["name"]), f"{m['frequency_hz']:.4f}", damping(m["damping_percent"]), escape(m["name"] or ""),
+         escape(", ".join(f"{c} {share:.0%}" for c, share in list(m["components"].items())[:3]))]
+        for s in content["scenarios"] for m in s["modes"]
+    ]  # fmt: skip
+    columns = ["Scenario", "f [Hz]", "Damping [%]", "Name", "Who"]
+    return of_run(file, content["scenarios"], table("Modes", columns, rows))
+
+
+def _screening(file: Path, c: Content) -> Chapter:
+    where = "somewhere" if c["stable"] is False else "everywhere"
+    answer = f"{_STABLE[c['stable']]} {where}: {c['points']} operating points with {c['outages']} outages"
+    if worst := min((m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None):
+        answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, at "
+                   f"{worst['point']}, {worst['outage']}")  # fmt: skip
+    lost = [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
+    counted = "growth was counted at all frequencies" if c["counted_at_all_frequencies"] else (
+        "growth outside of the range was counted at some points only")  # fmt: skip
+    return Chapter(
+        file, "Which operating point and which outage is worst?", answer, c["stable"],
+        f"{c['items']} cases computed, {counted}", lost, page="screening.html",
+    )  # fmt: skip
+
+
+def _site(file: Path, c: Content) -> Chapter:
+    open_ = [text.removeprefix("not judged: ") for text in c["remarks"] if text.startswith("not judged")]
+    sure = "; ".join(c["sure"])
+    good = True if c["agrees"] and c["confirmed"] else None if c["agrees"] else False
+    return Chapter(file, "Where does a converter help most?", c["answer"], good, sure, open_, page="site.html")
+
+
+def _design(file: Path, c: Content) -> Chapter:
+    before, after = (100 * c[f"{when}_damping_ratio"] for when in ("target", "achieved"))
+    wanted = 100 * c["requirement"]["damping_ratio"]
+    answer = (
+        f"{'yes' if c['met'] else 'not as required'}: with K = {c['K']:.4g} the mode has {after:.2f} % of damping, "
+        f"{before:.2f} % before, {wanted:.2f} % wanted"
+    )
+    sure = f"closed loop of the coupled FMUs: {c['verdict']}"
+    return Chapter(file, f"Does {c['controller']} damp the {c['mode']} mode?", answer, bool(c["met"]), sure,
+                   c.get("warnings", []), studies.design(dict(c)), title=studies.design_title(dict(c)))  # fmt: skip
+
+
+def _coordinated(file: Path, c: Content) -> Chapter:
+    lost = [f"{f['point']}, {f['outage']}: {f['why']}" for f in c["failed"]]
+    return Chapter(
+        file, "Do damping controllers help at all operating points?", c["verdict"], bool(c["met"]),
+        f"checked at {c['items']} points and outages", lost,
+    )  # fmt: skip
+
+
+def _certificate(file: Path, c: Content) -> Chapter:
+    open_ = [text if isinstance(text, str) else f"X_L = {text:g} pu" for text in (*c["missing"], *c["departures"])]
+    trusted = (c.get("acceptance") or {}).get("trusted") is not False
+    good = {"passes": trusted, "fails": False}.get(c["verdict"])
+    sure = f"judged: {c['judged']}" if c.get("judged") else f"{len(c['rows'])} tests" if "rows" in c else ""
+    question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
+    return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
+
+
+def _matrix(file: Path, c: Content) -> Chapter:
+    lost = [f"{x['device']}, {x['code']}: {x['failure']}" for x in c["cells"] if x["failure"]]
+    return Chapter(file, "Which converter passes which grid code?", c["sentence"], c["exit_code"] == 0,
+                   f"{len(c['cells'])} pairs of a device and a code", lost, page="matrix.html")  # fmt: skip
+
+
+def _check(file: Path, c: Content) -> Chapter:
+    bad = [check for check in c["checks"] if check["verdict"] == "fail"]
+    open_ = [str(check["figures"]["not_judged"]) for check in c["checks"] if "not_judged" in check["figures"]]
+    remarks = sum(check["verdict"] == "remark" for check in c["checks"])
+    name = Path(c["fmu"]).name
+    answer = f"{name}: " + ("no check failed" if c["trusted"] else ", ".join(c["faults"]) or "not to be judged here")
+    shade = {"fail": "bad", "pass": "good"}
+    rows = [[escape(x["question"]), f'<span class="{shade.get(x["verdict"], "soft")}">{escape(x["verdict"])}</span>',
+             escape(x["evidence"]), escape(x["remedy"])] for x in c["checks"]]  # fmt: skip
+    good = True if c["trusted"] else False if bad else None
+    return Chapter(
+        file, "Can this FMU be trusted in a co-simulation?", answer, good,
+        f"{len(c['checks'])} checks, {remarks} with a remark", [*c["not_supported"], *open_],
+        table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
+    )  # fmt: skip
+
+
+def _comparison(file: Path, signals: Any) -> Chapter:
+    rows = [[escape(s["expression"]), escape(s["unit"]), f"{s['largest']:.4g}", f"{s['at']:.3f}", f"{s['rms']:.4g}"]
+            for s in signals]  # fmt: skip
+    first = signals[0]
+    answer = f"{first['expression']} differs most, by {first['largest']:.4g} {first['unit']} at {first['at']:.3f} s"
+    columns = ["Signal", "Unit", "Largest difference", "at [s]", "RMS"]
+    return Chapter(file, "How do two runs differ?", answer, None, f"{len(signals)} signals", (),
+                   table("Differences", columns, rows, left=2))  # fmt: skip
+
+
+_KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
+    ({"device", "buses", "confirmed", "answer"}, _site),
+    ({"counted_at_all_frequencies", "failures", "modes"}, _screening),
+    ({"controller", "target_mode", "T_S1", "verdict"}, _design),
+    ({"settings", "verdict", "met", "ranking"}, _coordinated),
+    ({"cells", "codes", "sentence"}, _matrix),
+    ({"sentence", "verdict", "files", "seal"}, _certificate),
+    ({"trusted", "checks", "faults"}, _check),
+    ({"scenarios", "facts", "step_size_s"}, _modes),
+    ({"expression", "deviations", "rms"}, _comparison),
+)
+"""What the JSON of each study has, the first that fits."""
+
+
+def sections(chapter: Chapter, number: int) -> str:
+    """The chapter's figures: its own, or the sections of the result's own page."""
+    place = chapter.source if chapter.source.is_dir() else chapter.source.parent
+    if not chapter.page or not (place / chapter.page).is_file():
+        return chapter.content
+    found = re.search(r"</nav>(.*)</main>", (place / chapter.page).read_text(encoding="utf-8"), re.DOTALL)
+    text = found[1] if found else ""
+    text = re.sub(r'(id="|href="#)(section|figure)-', rf"\1chapter-{number}-\2-", text)
+    text = re.sub(r"(clip-)(\d+)", rf"\g<1>{number}-\2", text)
+    return re.sub(r"<(/?)h([23])>", lambda m: f"<{m[1]}h{int(m[2]) + 1}>", text)
+
+
+def first_page(chapters: Sequence[Chapter]) -> str:
+    """Question, answer, how sure, and what was not judged, of all chapters."""
+    rows = []
+    for one in chapters:
+        shade = {True: "good", False: "bad", None: "soft"}[one.good]
+        open_ = "<br>".join(escape(_short(text)) for text in one.not_judged[:_OPEN]) or "nothing that is known of"
+        more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
+        answer = f'<span class="{shade}">{escape(one.answer)}</span>'
+        rows.append([escape(one.question), answer, escape(_short(one.sure, 3 * _LONGEST)), open_ + more])
+    return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
+
+
+def _short(text: str, most: int = 0) -> str:
+    most = most or _LONGEST
+    return text if len(text) <= most else f"{text[:most].rsplit(' ', 1)[0]} …"
+
+
+def made(place: Path) -> list[str]:
+    """Where results lie, when they were made, with which version and code, and the command that makes them again."""
+    folder = place if place.is_dir() else place.parent
+    try:
+        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        content = {}
+    date = content.get("date") or f"{datetime.fromtimestamp(place.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"
+    versions = ", ".join(f"{name} {version}" for name, version in content.get("made_by", {}).items())
+    cells = (str(place), date, versions or "not recorded", str(content.get("code", "not recorded"))[:12],
+             content.get("command", "not recorded"))  # fmt: skip
+    return [escape(cell) for cell in cells]
+
+
+def changes(old: Path, chapters: Sequence[Chapter]) -> str:
+    """What changed since an older page of the same studies."""
+    try:
+        found = re.search(r'id="answers">(.*?)</script>', old.read_text(encoding="utf-8"), re.DOTALL)
+        before = {(x["question"], x["source"]): x["answer"] for x in json.loads(found[1])} if found else None
+    except (OSError, ValueError) as error:
+        raise InputError(f"--against {old}: it cannot be read: {error}; give a page of `gfor report`") from error
+    if before is None:
+        raise InputError(f"--against {old}: it is no page of `gfor report`; give one that an earlier call wrote")
+    now = {(one.question, one.source.name): one.answer for one in chapters}
+    rows = [
+        [escape(question), escape(source), escape(before.get((question, source), "not there")),
+         escape(now.get((question, source), "not there any more"))]
+        for question, source in dict.fromkeys([*before, *now])
+        if before.get((question, source)) != now.get((question, source))
+    ]  # fmt: skip
+    if not rows:
+        return f"<p>No answer differs from {escape(old.name)}.</p>"
+    return table(f"Answers that differ from {old.name}", ["Question", "Of", "Before", "Now"], rows, left=4)
+
+
+def kept_answers(chapters: Sequence[Chapter]) -> str:
+    """The answers as data in the page, for `changes` of a later one."""
+    data = [{"question": one.question, "source": one.source.name, "answer": one.answer} for one in chapters]
+    text = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="answers">{text}</script>'
+
+
+def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
+    """Of a sweep's trajectories; its section is `studies.sweep`."""
+    named = sweep["damping"].where(sweep["named"] == 1)
+    least = named if bool(named.notnull().any()) else sweep["damping"]
+    at = least.where(least == least.min(), drop=True)
+    where = ", ".join(f"{d} = {at[d].values[0]:.4g}" for d in at.dims if at[d].dtype.kind == "f")
+    stable = sweep.get("stable")
+    lost = 0 if stable is None else int((stable == 0).sum())
+    unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
+    answer = f"least damping {float(least.min()):.2f} % at {where}" + (f"; UNSTABLE at {lost} points" if lost else "")
+    return Chapter(
+        place, f"How do the modes move along {studies.axis_of(sweep)}?", answer, False if lost else None,
+        "each point is a linear model of the coupled FMUs there",
+        [f"stability at {unknown} points"] if unknown else (),
+    )  # fmt: skip

@@ -1,0 +1,173 @@
+"""The best places confirmed: a device is put there as an FMU, and the coupled system's mode is compared."""
+
+import cmath
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.analysis.component_linearization import ComponentLinearization
+from orchestrator.analysis.continuation import Eigenpair, pairs_near
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearization import Blocks
+from orchestrator.analysis.modes import Mode, damping_percent, damping_ratio, find_modes
+from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.master import Master
+from orchestrator.errors import AnalysisError, CosimError
+from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
+from orchestrator.pod_design.guard import extremes
+from orchestrator.pod_design.lead_lag import LARGEST_TURN, NO_COMPENSATION, lead_lag_turning
+from orchestrator.siting.placing import STAGES, name_at
+from orchestrator.siting.residues import SeenMode
+from orchestrator.siting.responses import response_of
+from orchestrator.study.modes import modes_from, running
+
+AGREES = 0.05  # A coupled shift that is farther than this part from the predicted one confirms nothing
+_SMALL = 2e-3  # part of |λ| by which the trial gain moves the mode
+
+_TURNS, _PARTS = (-30.0, 0.0, 30.0), (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
+"""Settings that are tried: turns beside the residue's angle [°], as the POD sees the frequency that it changes itself;
+and parts of the largest gain."""
+
+_ROUNDS = 12  # rounds in which a prediction settles: a device that moves the mode answers at the mode where it is then
+_EQUAL = 2e-4  # least damping ratios in the same part of this size are equally good
+_SAME = 0.5  # least similarity with which a mode of the system with the device is taken for the one without it
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """What the coupled FMUs say of one bus: Δλ [rad/s] by a small gain of the tuned POD, or by a device without one, as
+    predicted and as coupled; λ with the device, its POD off; the POD's setting and λ with it; the least damping then.
+    """
+
+    bus: str
+    predicted: complex = 0j
+    coupled: complex = 0j
+    with_device: complex = 0j
+    setting: PodSetting | None = None
+    tuned: complex | None = None
+    least: float | None = None
+    stable: bool | None = None
+    failure: str = ""
+
+    @property
+    def error(self) -> float:
+        return abs(self.predicted - self.coupled) / max(abs(self.coupled), 1e-12)
+
+    @property
+    def agrees(self) -> bool:
+        return not self.failure and self.error <= AGREES
+
+    @property
+    def damping(self) -> float:
+        """Of the mode with the device, tuned where it has a POD [%]."""
+        return damping_percent(self.tuned if self.tuned is not None else self.with_device)
+
+
+def confirmed(
+    prepared: PreparedScenario,
+    bus: str,
+    seen: SeenMode,
+    frequency_range: tuple[float, float],
+    controller: str | None,
+    gain: float,
+) -> Confirmation:
+    """Compare a mode's predicted shift with that of the coupled FMUs.
+
+    ``prepared``: With the device at the bus.
+    ``controller``: ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is.
+    """
+    try:
+        with running(prepared) as master:
+            if controller is None:
+                return _as_it_is(prepared, master, bus, seen, frequency_range)
+            find_operating_point(master)
+            return _with_pod(master, bus, seen, frequency_range, controller, gain)
+    except CosimError as error:
+        return Confirmation(bus, failure=str(error))
+
+
+def _as_it_is(
+    prepared: PreparedScenario, master: Master, bus: str, seen: SeenMode, frequency_range: tuple[float, float]
+) -> Confirmation:
+    blocks = Blocks(master, derivatives=True)
+    found = modes_from(prepared, master, find_operating_point(master), blocks, frequency_range)
+    pair, eigenvalue = same_mode(seen.mode, found.model), seen.mode.eigenvalue
+    predicted = _predicted(master, blocks.components[name_at(bus)], bus, seen) - eigenvalue
+    coupled, least = pair.eigenvalue - eigenvalue, _least(found.modes)
+    return Confirmation(bus, predicted, coupled, pair.eigenvalue, least=least, stable=found.stability.stable)
+
+
+def _with_pod(
+    master: Master, bus: str, seen: SeenMode, frequency_range: tuple[float, float], controller: str, gain: float
+) -> Confirmation:
+    name, eigenvalue = name_at(bus), seen.mode.eigenvalue
+    loop = PodLoop(master, [name], controller)
+    rest = _predicted(master, loop.block(name), bus, seen)
+    off = PodSetting(0.0, NO_COMPENSATION)
+
+    def shift(setting: PodSetting) -> complex:
+        loop.model(setting)
+        return _predicted(master, loop.block(name), bus, seen) - rest
+
+    start = Placed(off, same_mode(seen.mode, loop.model(off)))
+    by_gain = shift(PodSetting(1.0, NO_COMPENSATION))
+    if not by_gain:
+        raise AnalysisError("a POD there does not move the mode at all")
+    tuned = _tuned(loop, by_gain, eigenvalue, gain)
+    small = _SMALL * abs(eigenvalue / (by_gain * tuned.filters.response(eigenvalue)))
+    trial = replace(tuned, gain=min(tuned.gain, small))
+    predicted = shift(trial)
+    coupled = loop.place(start, trial.gain, trial.filters).eigenvalue - start.eigenvalue
+    reached = loop.place(start, tuned.gain, tuned.filters)
+    least = _least(find_modes(loop.model(tuned), *frequency_range))
+    stable = loop.examine(tuned).stability.stable
+    return Confirmation(bus, predicted, coupled, start.eigenvalue, tuned, reached.eigenvalue, least, stable)
+
+
+def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: SeenMode) -> complex:
+    """λ with a component, whose answer is that at λ itself."""
+    eigenvalue = start = seen.mode.eigenvalue
+    for _ in range(_ROUNDS):
+        eigenvalue = start + seen.shift(bus, response_of(master, model, eigenvalue))
+    return eigenvalue
+
+
+def _tuned(loop: PodLoop, by_gain: complex, eigenvalue: complex, most: float) -> PodSetting:
+    """The setting with the best least damping: around the angle that the residue asks for, with gains up to the most;
+    of equally good ones that with the smallest gain.
+    """
+    angle = math.degrees(cmath.phase(-1 / by_gain))
+    settings = [
+        PodSetting(part * most, lead_lag_turning(angle + turn, eigenvalue.imag, STAGES))
+        for part in _PARTS
+        for turn in _TURNS
+        if abs(angle + turn) < LARGEST_TURN * STAGES
+    ]
+    worth = {}
+    for setting in settings:
+        weakest, growing = extremes(loop.model(setting))
+        worth[setting] = -1.0 if growing is not None else damping_ratio(weakest)
+    return min(settings, key=lambda one: (-round(worth[one] / _EQUAL), one.gain))
+
+
+def same_mode(mode: Mode, model: LinearModel) -> Eigenpair:
+    """The mode in a model with further states: the most similar one among those near."""
+    common = {name: k for k, name in enumerate(model.names) if name in mode.shape}
+    left, right = (np.array([vector[name] for name in common]) for vector in (mode.left, mode.shape))
+    own, places = Eigenpair(mode.eigenvalue, left, right), list(common.values())
+    pairs = pairs_near(model, mode.eigenvalue)
+    alike = {k: own.similarity(pair.within(places)) for k, pair in enumerate(pairs)}
+    best = max(alike, key=lambda k: alike[k])
+    if alike[best] < _SAME:
+        raise AnalysisError(
+            f"with the device no mode is like that of {mode.frequency_hz:.3f} Hz any more (at most {alike[best]:.2f} "
+            "of 1): it changes too much; take a smaller --rating"
+        )
+    return pairs[best]
+
+
+def _least(modes: Sequence[Mode]) -> float | None:
+    return next((mode.damping_percent for mode in modes if mode.is_oscillation), None)

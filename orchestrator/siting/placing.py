@@ -1,0 +1,51 @@
+"""A case with a device of its own at some buses, which feeds nothing at rest."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import ComponentTable
+from orchestrator.errors import InputError
+
+STAGES = 3  # lead/lag stages of a POD that is put somewhere: together they turn by any angle
+
+
+def converter(prepared: PreparedScenario, rating: float, controller: str | None) -> ComponentTable:
+    """The catalogue's grid-forming converter of a rating [MVA], of the kind that the network takes; one of its PODs is
+    going to be tuned.
+    """
+    grid = prepared.case.table.power_flow
+    taken = prepared.system.components[grid.grid].description.inputs if grid else ()
+    model = "gfor_phasor" if any(name.endswith(".e_re") for name in taken) else "gfor"
+    stages = {f"{controller}.N_S": STAGES} if controller else {}
+    return ComponentTable(model=model, parameters={"S_n": rating, "P_0": 0.0, "Q_0": 0.0, **stages})
+
+
+def foreign(fmu: Path, binding: Path | None) -> ComponentTable:
+    for path in (fmu, *([binding] if binding else [])):
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such file; --device takes pod_p, pod_q, droop or the path of an FMU")
+    own = str(binding.absolute()) if binding else None
+    return ComponentTable(fmu=str(fmu.absolute()), binding=own, parameters={"P_0": 0.0, "Q_0": 0.0})
+
+
+def name_at(bus: str) -> str:
+    """Name of the component that is put at a bus."""
+    return f"site_{bus}"
+
+
+def placed(case: Case, device: ComponentTable, buses: Sequence[str]) -> Case:
+    table = case.table
+    further: Mapping[str, ComponentTable] = {name_at(b): device.model_copy(update={"bus": b}) for b in buses}
+    if taken := [name for name in further if name in table.components]:
+        raise InputError(f"{case.path}: the name {taken[0]!r} is for what `gfor site` puts there; give it another name")
+    grid = table.power_flow.grid if table.power_flow else ""
+    groups = table.solver.groups
+    if groups:
+        first = next((k for k, group in enumerate(groups) if grid not in group), 0)
+        groups = [[*group, *further] if k == first else group for k, group in enumerate(groups)]
+    solver = table.solver.model_copy(update={"groups": groups})
+    changed = table.model_copy(update={"components": {**table.components, **further}, "solver": solver})
+    return replace(case, table=changed)

@@ -1,0 +1,228 @@
+"""Where a device helps: its effect at every bus, intact and after outages, and the best places confirmed."""
+
+import cmath
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from orchestrator.analysis.linearization import Blocks
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.arrays import Vector
+from orchestrator.cases.case import Case
+from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import ComponentTable, Value
+from orchestrator.errors import CosimError, InputError
+from orchestrator.screening.outages import INTACT, read_outages
+from orchestrator.screening.preparation import ItemPreparation, failure
+from orchestrator.screening.record import Item
+from orchestrator.sensitivities.sensitivities import damping_change
+from orchestrator.siting.confirmation import Confirmation, confirmed
+from orchestrator.siting.placing import converter, foreign, name_at, placed
+from orchestrator.siting.residues import SeenMode, Situation, situation_of
+from orchestrator.siting.responses import ACTIVE, REACTIVE, ideal_support, response_of, turned
+from orchestrator.study.modes import running
+
+PODS = {"pod_p": ACTIVE, "pod_q": REACTIVE}
+DROOP = "droop"
+HARDLY = 0.02  # A bus that moves a mode by less than this part of what the best bus does hardly reaches it
+
+
+@dataclass(frozen=True)
+class SiteRequest:
+    """What is asked: a ``device`` (``pod_p``, ``pod_q``, ``droop`` or the path of an FMU), for modes with less damping
+    than ``below`` [%], the best ``confirm`` buses confirmed by a converter of a ``rating`` [MVA] with a POD of at most
+    a ``gain``.
+    """
+
+    device: str
+    binding: Path | None = None
+    scenario: str | None = None
+    below: float = 10.0
+    frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ
+    outages: str | None = None
+    confirm: int = 3
+    rating: float = 100.0
+    gain: float = 200.0
+    overrides: Mapping[str, Value] = field(default_factory=dict)
+    parameters: Sequence[ParameterFile] = ()
+    step_size: float | None = None
+
+    @property
+    def controller(self) -> str | None:
+        """The POD that is tuned; None for a device that is as it is."""
+        return self.device if self.device in PODS else None
+
+    @property
+    def is_foreign(self) -> bool:
+        return self.device not in (*PODS, DROOP)
+
+
+@dataclass(frozen=True)
+class SupportShift:
+    """Δλ [rad/s] by a device, or by 1 MW/Hz or 1 Mvar/Hz without a phase shift; the change of the damping ratio
+    [points], with the phase that a tuned POD gives or by the device as it is; and its part of the best bus's.
+    """
+
+    change: complex
+    damping: float
+    part: float
+
+    @property
+    def hardly(self) -> bool:
+        return self.part < HARDLY
+
+
+DEVICE = "device"
+ByMode = Mapping[str, Mapping[str, SupportShift]]
+Response = Callable[[Situation, str, SeenMode], Vector]
+
+
+@dataclass(frozen=True)
+class SiteResult:
+    """Shifts of `DEVICE`, of 1 MW/Hz (`ACTIVE`) and of 1 Mvar/Hz (`REACTIVE`), by name of the situation, label of the
+    mode, and bus; all buses, best first; and the outages without modes, with the reason.
+    """
+
+    case: Case
+    request: SiteRequest
+    situations: tuple[Situation, ...]
+    shifts: Mapping[str, Mapping[str, ByMode]]
+    ranking: tuple[str, ...]
+    not_judged: Mapping[str, str]
+    confirmations: tuple[Confirmation, ...] = ()
+
+    @property
+    def intact(self) -> Situation:
+        return self.situations[0]
+
+    @property
+    def prepared(self) -> PreparedScenario:
+        return self.intact.found.prepared
+
+    @property
+    def worst_first(self) -> list[Situation]:
+        """The situations by the damping of their least damped mode."""
+        return sorted(self.situations, key=lambda one: one.modes[0].mode.damping_ratio)
+
+    def least(self, bus: str) -> tuple[float, str]:
+        """What the device does there for the least damped mode where it does least [points], and in which situation."""
+        return min((self.shifts[DEVICE][s.name][s.modes[0].label][bus].damping, s.name) for s in self.situations)
+
+    @property
+    def agrees(self) -> bool:
+        return all(one.agrees for one in self.confirmations)
+
+
+def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], None] = lambda a, b: None) -> SiteResult:
+    """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best."""
+    if request.is_foreign and not request.device.lower().endswith(".fmu"):
+        raise InputError(f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu")
+    for option in ("rating", "gain", "below", "confirm"):
+        if not (value := getattr(request, option)) > (-1 if option == "confirm" else 0):
+            raise InputError(f"--{option} {value:g}: it must be positive")
+    scenario = request.scenario or next(iter(case.scenarios))
+    open_case = replace(case, injections=True)
+    layers = (*request.parameters, *([OptionValues.of(request.overrides)] if request.overrides else []))
+    preparation = ItemPreparation(open_case, scenario, layers, request.step_size)
+    outages = read_outages(request.outages, preparation.elements)
+    total = len(outages) + request.confirm
+    situations, not_judged = [], dict[str, str]()
+    for k, outage in enumerate(outages):
+        item = Item(0, k, {}, outage.elements, outage.elements)
+        try:
+            found = preparation.prepared(item).scenario if outage.elements else preparation.base
+            one = situation_of(found, outage.name, request.frequencies, request.below)
+        except CosimError as error:
+            if not outage.elements:
+                raise
+            not_judged[outage.name] = f"{failure(error, item)[0]}: {error}"
+            continue
+        if one.modes:
+            situations.append(one)
+        elif outage.elements:
+            not_judged[outage.name] = "no oscillation in the range"
+        report(k + 1, total)
+    if not situations or situations[0].name != INTACT:
+        low, high = request.frequencies
+        raise InputError(f"scenario {scenario!r} has no oscillation from {low:g} to {high:g} Hz; give another --range")
+    result = _shifted(case, request, situations, not_judged, scenario)
+    return _with_confirmations(result, scenario, lambda done: report(len(outages) + done, total))
+
+
+def _shifted(
+    case: Case, request: SiteRequest, situations: list[Situation], not_judged: dict[str, str], scenario: str
+) -> SiteResult:
+    shifts = {kind: _all_shifts(situations, _ideal(kind), tuned=True) for kind in (ACTIVE, REACTIVE)}
+    if request.is_foreign:
+        shifts[DEVICE] = _of_foreign(case, request, situations, shifts[ACTIVE], scenario)
+    elif request.device == DROOP:
+        shifts[DEVICE] = _all_shifts(situations, _ideal(ACTIVE), tuned=False)
+    else:
+        shifts[DEVICE] = shifts[PODS[request.device]]
+    found = SiteResult(case, request, tuple(situations), shifts, (), not_judged)
+    buses = [bus for bus in situations[0].voltages if all(bus in s.voltages for s in situations)]
+    return replace(found, ranking=tuple(sorted(buses, key=lambda bus: -found.least(bus)[0])))
+
+
+def _ideal(kind: str) -> Response:
+    return lambda at, bus, seen: ideal_support(kind, at.voltages[bus], seen.mode.eigenvalue)
+
+
+def _all_shifts(situations: Sequence[Situation], response: Response, *, tuned: bool) -> dict[str, ByMode]:
+    found: dict[str, ByMode] = {}
+    for at in situations:
+        by_mode = dict[str, Mapping[str, SupportShift]]()
+        for seen in at.modes:
+            changes = {bus: seen.shift(bus, response(at, bus, seen)) for bus in at.voltages}
+            most = max(map(abs, changes.values())) or 1.0
+            eigenvalue = seen.mode.eigenvalue
+            by_mode[seen.label] = {
+                bus: SupportShift(c, 100 * damping_change(eigenvalue, -abs(c) if tuned else c), abs(c) / most)
+                for bus, c in changes.items()
+            }
+        found[at.name] = by_mode
+    return found
+
+
+def _of_foreign(
+    case: Case, request: SiteRequest, situations: Sequence[Situation], active: Mapping[str, ByMode], scenario: str
+) -> dict[str, ByMode]:
+    """A foreign device, linearised once at the bus that active power reaches best, and turned to the others."""
+    intact = situations[0]
+    there = active[intact.name][intact.modes[0].label]
+    bus = max(there, key=lambda name: abs(there[name].change))
+    prepared = _prepared(placed(case, foreign(Path(request.device), request.binding), [bus]), request, scenario)
+    with running(prepared) as master:
+        find_operating_point(master)
+        model = Blocks(master).components[name_at(bus)]
+        modes = [seen.mode.eigenvalue for at in situations for seen in at.modes]
+        answers = {eigenvalue: response_of(master, model, eigenvalue) for eigenvalue in modes}
+
+    def response(at: Situation, other: str, seen: SeenMode) -> Vector:
+        ahead = cmath.phase(at.voltages[other] / intact.voltages[bus])
+        return turned(answers[seen.mode.eigenvalue], ahead)
+
+    return _all_shifts(situations, response, tuned=False)
+
+
+def _prepared(case: Case, request: SiteRequest, scenario: str) -> PreparedScenario:
+    (prepared,) = case.prepare([scenario], dict(request.overrides), request.step_size, None, request.parameters)
+    return prepared
+
+
+def _with_confirmations(result: SiteResult, scenario: str, report: Callable[[int], None]) -> SiteResult:
+    request, seen = result.request, result.intact.modes[0]
+    device: ComponentTable = (
+        foreign(Path(request.device), request.binding)
+        if request.is_foreign
+        else converter(result.prepared, request.rating, request.controller)
+    )
+    found = []
+    for k, bus in enumerate(result.ranking[: request.confirm]):
+        prepared = _prepared(placed(result.case, device, [bus]), request, scenario)
+        found.append(confirmed(prepared, bus, seen, request.frequencies, request.controller, request.gain))
+        report(k + 1)
+    return replace(result, confirmations=tuple(found))

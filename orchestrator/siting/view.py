@@ -1,0 +1,237 @@
+"""What a study of places found: in words, as JSON, as rows, and as a page."""
+
+import math
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from orchestrator.analysis.modes import damping_percent
+from orchestrator.points.key import code_hash
+from orchestrator.report.html.document import document
+from orchestrator.report.html.elements import Figures, damping, table
+from orchestrator.report.html.network_map import network_map
+from orchestrator.report.tables import make_table, share_text
+from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.results.staging import new_run_id, staged
+from orchestrator.results.storage import save_json, save_table
+from orchestrator.safe_files import write_text
+from orchestrator.siting.confirmation import Confirmation
+from orchestrator.siting.residues import SeenMode
+from orchestrator.siting.responses import ACTIVE, REACTIVE
+from orchestrator.siting.study import DEVICE, DROOP, SiteResult, SupportShift
+
+TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
+_NONE = 1e-5
+"""Damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 MW/Hz would give a hundredth of a point."""
+
+_SHOWN = 12
+
+
+def unit(result: SiteResult, times: str = "1") -> str:
+    """Of all shifts of the device, ``times`` as much."""
+    if result.request.is_foreign:
+        return "points of damping by the device as it is"
+    quantity = "Mvar/Hz" if result.request.device == "pod_q" else "MW/Hz"
+    phase = "" if result.request.device == DROOP else " with its phase tuned"
+    return f"points of damping by {times} {quantity}{phase}"
+
+
+def shown(result: SiteResult, damping: float) -> str:
+    """A shift for people, in the unit ``unit(result, "100")``."""
+    return f"{damping * (1 if result.request.is_foreign else 100):+.3g}"
+
+
+def device_title(result: SiteResult) -> str:
+    return TITLES.get(result.request.device, Path(result.request.device).name)
+
+
+def answer(result: SiteResult) -> str:
+    """The best places in one sentence."""
+    best = result.ranking[:3]
+    most, at = result.least(best[0])
+    mode = next(one for one in result.situations if one.name == at).modes[0]
+    after = f" after the outage {at}" if at != result.intact.name else ""
+    if most < (0 if result.request.is_foreign else _NONE):
+        return f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}"
+    others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
+    return (
+        f"{best[0]} is the best place for {device_title(result)}: {shown(result, most)} {unit(result, '100')}, for the "
+        f"least damped mode{after} ({_called(mode)})" + (f"; of that {others}" if others else "")
+    )
+
+
+def _called(seen: SeenMode) -> str:
+    hertz = f"{seen.mode.frequency_hz:.3f} Hz"
+    return f"{seen.label if hertz in seen.label else f'{seen.label}, {hertz}'}, {seen.mode.damping_percent:.2f} %"
+
+
+def sureness(result: SiteResult) -> list[str]:
+    """What the coupled FMUs say of the best places."""
+    before = result.intact.modes[0].mode.damping_percent
+    return [_confirmed(result, one, before) for one in result.confirmations] or ["not confirmed by coupled FMUs"]
+
+
+def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
+    if one.failure:
+        return f"{one.bus}: NOT CONFIRMED: {one.failure}"
+    word = "confirmed" if one.agrees else "NOT CONFIRMED"
+    rating = "" if result.request.is_foreign else f" of {result.request.rating:g} MVA"
+    steps = f"{before:.2f} % → {damping_percent(one.with_device):.2f} % with the device{rating}"
+    if one.setting is not None:
+        steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g})"
+    unstable = "" if one.stable or result.intact.found.stability.stable is not True else "; UNSTABLE with it"
+    return (
+        f"{one.bus}: {word} by coupled FMUs: {steps}; least damped then {one.least or 0.0:.2f} %; predicted and "
+        f"coupled shift differ by {100 * one.error:.2g} %{unstable}"
+    )
+
+
+def remarks(result: SiteResult) -> list[str]:
+    """Modes that the best bus, or no bus, reaches; what was not judged."""
+    said, best = [], result.ranking[0]
+    for seen in result.intact.modes:
+        shifts = result.shifts[DEVICE][result.intact.name][seen.label]
+        top = max(shifts, key=lambda bus: abs(shifts[bus].change))
+        reach = max(abs(s.damping) for s in result.shifts[ACTIVE][result.intact.name][seen.label].values())
+        if reach < _NONE:
+            said.append(f"{_called(seen)}: no bus reaches this mode; it cannot be damped from the network")
+        elif shifts[best].hardly:
+            said.append(f"{_called(seen)}: not controllable at {best} ({100 * shifts[best].part:.1g} % of {top})")
+    hidden = result.intact.found.hidden
+    for value in hidden.electromechanical if hidden else ():
+        said.append(f"not judged: {value.imag / math.tau:.3f} Hz, {damping_percent(value):.2f} %, outside of --range")
+    said += [f"not judged: outage {name}: {why}" for name, why in result.not_judged.items()]
+    return said
+
+
+def as_json(result: SiteResult) -> dict[str, Any]:
+    """The machine-readable form of ``gfor site``."""
+    here = result.intact.name
+    return {
+        "case": result.case.name, "scenario": result.prepared.name, "device": result.request.device,
+        "units": {
+            "damping_points": unit(result),
+            "real, imag": "eigenvalue's shift [rad/s] by 1 MW/Hz or 1 Mvar/Hz in phase with the bus's frequency, P "
+            "withdrawn and Q injected while it is high; or by the device",
+            "p, q": "the same for active and for reactive power; 1 pu of gain on 100 MVA is 100 MW by the rated Hz",
+        },
+        "answer": answer(result), "sure": sureness(result), "remarks": remarks(result), "agrees": result.agrees,
+        "stable": result.intact.found.stability.stable, "warnings": list(result.intact.found.warnings),
+        "code": code_hash(),
+        "modes": _modes(result.intact.modes),
+        "buses": [
+            {
+                "bus": bus, "rank": k + 1,
+                "shift": {m: _shift(by[bus]) for m, by in result.shifts[DEVICE][here].items()},
+                "p": {m: _shift(by[bus]) for m, by in result.shifts[ACTIVE][here].items()},
+                "q": {m: _shift(by[bus]) for m, by in result.shifts[REACTIVE][here].items()},
+                "least": dict(zip(("damping_points", "situation"), result.least(bus), strict=True)),
+            }
+            for k, bus in enumerate(result.ranking)
+        ],
+        "outages": [
+            {"outage": at.name, "modes": _modes(at.modes), "best": _best(result, at.name, at.modes[0].label)}
+            for at in result.worst_first if at.name != here
+        ],
+        "not_judged": dict(result.not_judged),
+        "confirmed": [_confirmation(one) for one in result.confirmations],
+    }  # fmt: skip
+
+
+def _modes(modes: tuple[SeenMode, ...]) -> list[dict[str, Any]]:
+    return [
+        {"mode": seen.label, **eigenvalue_json(seen.mode.eigenvalue, seen.mode.damping_percent),
+         "components": dict(list(seen.mode.by_component.items())[:3])}
+        for seen in modes
+    ]  # fmt: skip
+
+
+def _shift(shift: SupportShift) -> dict[str, Any]:
+    return {"damping_points": shift.damping, "real": shift.change.real, "imag": shift.change.imag,
+            "part_of_best": shift.part, "controllable": not shift.hardly}  # fmt: skip
+
+
+def _best(result: SiteResult, situation: str, mode: str) -> dict[str, float]:
+    shifts = result.shifts[DEVICE][situation][mode]
+    return {bus: shifts[bus].damping for bus in sorted(shifts, key=lambda bus: -shifts[bus].damping)[:3]}
+
+
+def _confirmation(one: Confirmation) -> dict[str, Any]:
+    if one.failure:
+        return {"bus": one.bus, "agrees": False, "failure": one.failure}
+    pod = {} if one.setting is None else {"K": one.setting.gain, "T_S1": one.setting.filters.T_S1,
+                                          "T_S2": one.setting.filters.T_S2, "N_S": one.setting.filters.N_S}  # fmt: skip
+    device = eigenvalue_json(one.with_device, damping_percent(one.with_device))
+    return {
+        "bus": one.bus, "agrees": one.agrees, "error_percent": 100 * one.error,
+        "predicted": {"real": one.predicted.real, "imag": one.predicted.imag},
+        "coupled": {"real": one.coupled.real, "imag": one.coupled.imag},
+        "with_device": device, "damping_percent": one.damping,
+        "least_damping_percent": one.least, "stable": one.stable, "pod": pod,
+    }  # fmt: skip
+
+
+def rows(result: SiteResult) -> list[dict[str, Any]]:
+    """One row for each bus and mode, best bus first."""
+    content = as_json(result)
+    return [
+        {"bus": bus["bus"], "rank": bus["rank"], "mode": mode, **shift}
+        for bus in content["buses"] for mode, shift in bus["shift"].items()
+    ]  # fmt: skip
+
+
+def ranking_table(result: SiteResult) -> Table:
+    """The best buses for a terminal."""
+    modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
+    found = make_table(f"{unit(result, '100')}; best first", "Bus", *modes)
+    for bus in result.ranking[:_SHOWN]:
+        found.add_row(bus, *_cells(result, bus))
+    return found
+
+
+def _cells(result: SiteResult, bus: str) -> list[str]:
+    shifts = (result.shifts[DEVICE][result.intact.name][seen.label][bus] for seen in result.intact.modes)
+    return ["hardly" if one.hardly else shown(result, one.damping) for one in shifts]
+
+
+def save(result: SiteResult, folder: Path) -> list[Path]:
+    """Write ``site.json``, ``buses.csv`` and the page ``site.html``."""
+    with staged(folder, new_run_id()) as staging:
+        save_json(as_json(result), staging / "site.json")
+        save_table(rows(result), staging / "buses.csv")
+        write_text(staging / "site.html", _page(result))
+    return [folder / name for name in ("site.json", "buses.csv", "site.html")]
+
+
+def _page(result: SiteResult) -> str:
+    figures, title = Figures(), f"{result.case.table.title or result.case.name}: where to put {device_title(result)}"
+    shade = "good" if result.agrees and result.confirmations else "soft"
+    lines = "".join(f"<li>{escape(text)}</li>" for text in (*sureness(result), *remarks(result)))
+    findings = f'<div class="findings"><p class="{shade}">{escape(answer(result))}</p><ul>{lines}</ul></div>'
+    content = [("Map", "".join(_map(result, seen, figures) for seen in result.intact.modes[:3]))]
+    modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
+    cells = [[escape(bus), *_cells(result, bus)] for bus in result.ranking]
+    content.append(("All buses", table(unit(result, "100"), ["Bus", *modes], cells)))
+    if outages := [at for at in result.worst_first if at.name != result.intact.name]:
+        best = []
+        for at in outages:
+            mode = at.modes[0]
+            there = ", ".join(f"{bus} {shown(result, x)}" for bus, x in _best(result, at.name, mode.label).items())
+            best.append([escape(at.name), escape(mode.label), damping(mode.mode.damping_percent), escape(there)])
+        content.append(("After outages", table("Worst first", ["Outage", "Mode", "Damping [%]", "Best"], best, left=2)))
+    return document(title, f"{result.prepared.title}; code {code_hash()[:12]}", findings, content)
+
+
+def _map(result: SiteResult, seen: SeenMode, figures: Figures) -> str:
+    shifts: Mapping[str, SupportShift] = result.shifts[DEVICE][result.intact.name][seen.label]
+    network = result.prepared.network
+    assert network is not None
+    branches = [(line.from_bus, line.to_bus) for line in network.lines]
+    branches += [(x.buses[0], bus) for x in network.transformers for bus in x.buses[1:]]
+    texts = {bus: f"{bus}: {shown(result, one.damping)} {unit(result, '100')}" for bus, one in shifts.items()}
+    who = ", ".join(share_text(entry) for entry in list(seen.mode.by_component.items())[:3])
+    text = f"{_called(seen)} ({who}): the redder and larger a bus, the farther support there moves the mode."
+    return figures.add(network_map(seen.label, branches, {b: one.part for b, one in shifts.items()}, texts), text)[0]

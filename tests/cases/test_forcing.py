@@ -1,0 +1,112 @@
+"""References that swing: in a case file, by ``--force`` and in a run."""
+
+import numpy as np
+import pytest
+
+import orchestrator as gfor
+from orchestrator.cases.forcing import forcing_of
+from orchestrator.coupling.events import Forcing
+from orchestrator.errors import CaseError, InputError
+
+
+def values(**changed):
+    given = {"frequency": 0.8, "amplitude": 0.02, "shape": "sine", "end": None} | changed
+    event = Forcing(1.0, "sg1", "governor.delta_P_ref", **given)
+    changes = list(event.values(1e-3, 6.0))
+    return np.array([c.time for c in changes]), np.array([c.value for c in changes])
+
+
+def test_a_sine_is_followed_to_its_two_hundredth():
+    times, found = values()
+    grid = np.arange(1.0, 6.0, 1e-3)
+    held = found[np.searchsorted(times, grid + 1e-9) - 1]
+    wanted = 0.02 * np.sin(2 * np.pi * 0.8 * (grid + 5e-4 - 1.0))
+    assert np.abs(held - wanted).max() < 0.02 * 2 * np.pi / 200
+    assert abs(held.mean()) < 1e-5
+
+
+def test_a_square_changes_twice_a_period():
+    times, found = values(shape="square")
+    assert times == pytest.approx(1.0 + 0.625 * np.arange(8), abs=1e-3)
+    assert list(found) == [0.02, -0.02] * 4
+
+
+def test_an_end_gives_the_reference_its_own_value_again():
+    times, found = values(end=3.0)
+    assert times[-1] == 3.0
+    assert found[-1] == 0.0
+    assert np.all(np.diff(times) > 0)
+
+
+def test_a_frequency_near_the_step_asks_for_each_point_once():
+    times, _ = values(frequency=20.0)
+    assert np.all(np.diff(np.round(times * 1000)) >= 1)
+
+
+def test_the_words_of_the_command():
+    table = forcing_of("sg35.exciter.V_ref  800 mHz 2% square from 500 ms")
+    assert (table.component, table.reference, table.shape) == ("sg35", "exciter.V_ref", "square")
+    assert (table.frequency, table.amplitude, table.time) == pytest.approx((0.8, 0.02, 0.5))
+    assert forcing_of("gfor 0.8 Hz 0.05 pu").amplitude == 0.05
+
+
+@pytest.mark.parametrize("text", ["sg35 0.8 2 %", "sg35 0.8 Hz", "0.8 Hz 2 %", "sg35 0.8 Hz 2 % triangle", ""])
+def test_other_words_are_refused_with_the_form(text):
+    with pytest.raises(InputError, match="UNIT FREQUENCY AMPLITUDE"):
+        forcing_of(text)
+
+
+@pytest.mark.parametrize(
+    ("force", "said"),
+    [
+        ("sg9 0.8 Hz 2 %", "no component 'sg9'"),
+        ("sg1.exciter.P_ref 0.8 Hz 2 %", "it has: exciter.V_ref, governor.P_ref"),
+        ("grid 0.8 Hz 2 %", "no reference of its power"),
+        ("sg1 99 Hz 2 %", "does not show it"),
+        ("sg1 0.8 Hz 2 % from 99 s", "never happens"),
+    ],
+)
+def test_what_cannot_be_forced_is_told_with_the_words_of_the_command(force, said):
+    with pytest.raises(CaseError, match=said) as error:
+        gfor.load("two_area_rms").scenario("gfor", force=force)
+    assert "--force" in str(error.value)
+
+
+def test_two_forcings_of_one_reference_are_refused():
+    with pytest.raises(CaseError, match="is set at 1 s by"):
+        gfor.load("two_area_rms").scenario("gfor", force=["sg1 0.8 Hz 2 %", "sg1 0.9 Hz 2 %"])
+
+
+@pytest.fixture(scope="module")
+def run():
+    return gfor.load("two_area_rms").scenario("gfor", force="sg1.governor.P_ref 0.8 Hz 2 %").run(stop=20.0)
+
+
+def test_the_unit_swings_at_that_frequency_alone(run):
+    late = run.dataset.sel(time=slice(15.0, 20.0 - 1e-6))
+    spectrum = np.abs(np.fft.rfft(late["sg1.p"].values - late["sg1.p"].values.mean()))
+    assert int(spectrum.argmax()) == 4  # of five seconds
+
+
+def test_currents_voltages_and_their_places_are_recorded(run):
+    assert {"sg1.i_re", "grid.bus_2.v_im", "grid.L.q"} <= set(run.dataset.data_vars)
+    assert '"sg1": "grid.bus_2"' in run.dataset.attrs["places"]
+
+
+def test_the_response_is_not_called_unstable(run):
+    (finding,) = run.findings
+    assert finding.kind == "not_judged"
+    assert "forcing on sg1.governor.delta_P_ref" in finding.message
+
+
+def test_a_linear_response_refuses_a_forcing():
+    with pytest.raises(InputError, match="cannot follow"):
+        gfor.load("two_area_rms").scenario("gfor", force="sg1 0.8 Hz 2 %").run(stop=2.0, linear=True)
+
+
+def test_the_run_tells_who_was_forced(run):
+    found = run.source(start=0.5)
+    (one,) = found
+    assert one.source == "sg1"
+    assert found.table()["kind"][0] == "forced"
+    assert "grid.L" in found.places

@@ -1,0 +1,164 @@
+"""`gfor new`: from RAW and DYR to a case that runs, and what cannot become one."""
+
+import io
+import sys
+from functools import partial
+
+import pytest
+
+from orchestrator.cases.case import load_case
+from orchestrator.cases.new_case import WantedCase, read_converter, write_case
+from orchestrator.errors import InputError
+from orchestrator.study.modes import compute_modes
+from tests.screening.five_machines import POWERS, RATINGS, five_machines
+
+CONVERTER = "bus 13, 100 MVA, 60 MW, less sg3"
+
+
+@pytest.fixture
+def gfor(gfor):
+    return partial(gfor, "new")
+
+
+@pytest.fixture
+def files(tmp_path):
+    five_machines(tmp_path)
+    return tmp_path / "five.raw", tmp_path / "five.dyr"
+
+
+def made(files, converter=CONVERTER, **more):
+    out = files[0].parent / "case.toml"
+    new = write_case(WantedCase(files, out, converter and read_converter(converter), **more))
+    out.write_text(new.text, encoding="utf-8")
+    return load_case(out), new
+
+
+def test_a_case_is_written_and_said_in_few_lines(gfor, files):
+    out = files[0].parent / "case.toml"
+    code, text, err = gfor(*files, "--converter", CONVERTER, "--out", out)
+    assert (code, err) == (0, "")
+    assert len(text.splitlines()) <= 8
+    assert "base, converter, pod_p, pod_q, fault" in text
+    assert "sg3 feeds 60 MW less (160 before)" in text
+    again = gfor(*files, "--converter", CONVERTER, "--out", out)
+    assert again[0] == 2
+    assert "--force" in again[2]
+    assert gfor(*files, "--converter", CONVERTER, "--out", out, "--force")[0] == 0
+
+
+def test_the_converter_takes_over_what_the_machine_feeds_less(files):
+    case, _ = made(files)
+    base, converter = case.prepare(["base", "converter"])
+    assert "gfor" not in base.system.components
+    fed = {name: power.real for name, power in converter.power_flow.powers.items()}
+    assert fed["gfor"] * 100 == pytest.approx(60, abs=1e-3)
+    assert fed["sg3"] * RATINGS[3] == pytest.approx(POWERS[3] - 60, abs=1e-3)
+    assert fed["sg1"] * RATINGS[1] == pytest.approx(POWERS[1])
+    held = [abs(x.power_flow.voltages["bus_13"]) for x in (base, converter)]
+    assert held[0] == pytest.approx(held[1], abs=1e-5)
+    assert compute_modes(converter).stability.stable
+
+
+def test_emt_models_come_from_the_same_file(files):
+    case, _ = made(files)
+    emt = case._of_kind({"models": "emt"}, ()).table
+    models = [c.model for c in emt.components.values()] + [emt.units.generator, emt.units.converter]
+    assert models == ["grid", "gfor", "synchronous_generator", "gfor"]
+    assert emt.solver.step_size == 1e-4
+    largest = 0.25 * 100 / max(RATINGS.values())  # X''_d [pu, 100 MVA]
+    assert emt.network.stray_B == pytest.approx((2 * 3.14159 * 60 * 1e-4) ** 2 / largest, rel=0.1)
+    assert (case.table.solver.step_size, case.table.network.stray_B) == (2e-3, 0)
+    names = [{p.signal for plot in t.plots for p in plot.panels} for t in (case.table, emt)]
+    assert names[0] ^ names[1] == {"gfor.current_limit", "gfor.current_demand"}
+
+
+def test_models_of_no_kind_are_refused(files):
+    case, _ = made(files)
+    with pytest.raises(InputError, match="must be emt or phasor"):
+        case.prepare(["base"], {"models": "both"})
+
+
+def test_questions_stand_at_the_lines_that_they_are_about(files):
+    lines = made(files)[1].text.splitlines()
+    at = lines.index('raw = "five.raw"')
+    above = "\n".join(lines[at - 4 : at])
+    assert "# question: " in above
+    assert "VM = 1 and VA = 0" in above
+    assert max(map(len, lines)) < 260
+
+
+def test_without_a_converter(files):
+    case, new = made(files, None)
+    assert new.scenarios == ("base", "fault")
+    (fault,) = case.prepare(["fault"])
+    assert [event.time for event in fault.events] == [1.0, 1.1]
+
+
+def test_the_slack_needs_no_new_power(files):
+    case, new = made(files, "bus 13, 100 MVA, 60 MW, less sg5")
+    assert "the slack (sg5) feeds 60 MW less" in "".join(new.assumed)
+    assert case.scenarios["converter"].set == {}
+
+
+def test_without_dynamics_data_the_machines_are_typical_and_said(files):
+    _, new = made(files[:1])
+    assert "machines: no dynamics data" in "".join(new.assumed)
+
+
+@pytest.mark.parametrize(
+    ("converter", "said"),
+    [
+        ("bus 31, 100 MVA, 60 MW", "the network has no bus '31'"),
+        ("bus 13, 100 MVA, 60 MW, less sg33", "no unit 'sg33' to feed less; did you mean sg3"),
+        ("bus 13, 300 MVA, 200 MW, less sg3", "sg3 feeds 160 MW and cannot feed 200 MW less"),
+        ("100 MVA, 60 MW", "the bus is missing"),
+        ("bus 13", "the rating in MVA and the power in MW is missing"),
+        ("bus 13, 100 MVA, 60 MW, cheap", "'cheap' is not understood"),
+        ("bus 13, 100 MVA, 50 MVA, 60 MW", "MVA is given twice"),
+        ("bus 13, 100 MVA, 160 MW", "160 MW with a rating of 100 MVA"),
+    ],
+)
+def test_a_converter_that_cannot_be_is_refused(files, converter, said):
+    with pytest.raises(InputError) as refused:
+        made(files, converter)
+    assert said in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["five.dyr"], "no network is given"),
+        (["five.rew"], "no network that is read"),
+        (["fife.raw"], "no such file; did you mean five.raw"),
+        (["five.raw", "other.raw"], "a case has one of them"),
+        (["five.raw", "--binding", "b.toml"], "say where by --converter"),
+        (["five.raw", "--out", "case.txt"], "ends in .toml"),
+        ([], "no terminal to ask at"),
+    ],
+)
+def test_files_that_make_no_case_are_refused(gfor, files, monkeypatch, words, said):
+    monkeypatch.chdir(files[0].parent)
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    (files[0].parent / "other.raw").touch()
+    code, _, err = gfor(*words)
+    assert code == 2
+    assert said in " ".join(err.split())
+
+
+def test_it_asks_at_a_terminal(gfor, files, monkeypatch):
+    monkeypatch.chdir(files[0].parent)
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    answers = iter(["five.raw five.dyr", "13", "100", "60 MW", "sg3", "", ""])
+    monkeypatch.setattr("builtins.input", lambda _: next(answers))
+    (files[0].parent / "five.toml").unlink()
+    code, text, _ = gfor()
+    assert code == 0
+    assert text.startswith("five.toml: scenarios base, converter")
+    assert next(answers, None) is None
+
+
+def test_every_further_signal_of_a_panel_is_looked_for(files):
+    case, new = made(files)
+    case.path.write_text(new.text.replace('"sg2.omega"', '"sg2.omgea"'), encoding="utf-8")
+    with pytest.raises(InputError, match=r"no scenario has an output 'sg2.omgea'; did you mean sg2.omega"):
+        load_case(case.path).prepare(["base"])

@@ -1,0 +1,93 @@
+"""``gfor nyquist`` as it is typed, on files that the project makes."""
+
+import json
+
+import numpy as np
+import pytest
+
+import orchestrator as gfor
+from orchestrator.cli import main
+from orchestrator.errors import InputError
+from orchestrator.immittance.scan import PortPoint, Scan
+from orchestrator.immittance.ztool import write_ztool
+from tests.immittance.plants import OMEGA, Line, constant_power, is_stable
+
+F = np.unique(np.concatenate([np.geomspace(0.5, 1000, 250), np.linspace(40, 60, 60)]))
+PLANT = constant_power(g=1.2, h=0.6, T=0.003, G=0.2)
+STRONG, WEAK = Line(0.05, 0.8 / OMEGA), Line(0.05, 1.2 / OMEGA)
+
+
+def files(folder, line=STRONG, device=None, **points):
+    """A device and a network in siemens on 100 MVA and 100 kV, whose base is 0.01 S."""
+    network = 0.01 * np.linalg.inv(line.impedance(F, capacitor=False))
+    Y = 0.01 * PLANT.admittance(F) if device is None else device
+    for name, values in (("plant", Y), ("network", network)):
+        point = {"PCC-1": points[name]} if name in points else {}
+        write_ztool(Scan(name, F, values, ("PCC-1",), points=point), folder / f"{name}.txt")
+    return [str(folder / "plant.txt"), str(folder / "network.txt")]
+
+
+def test_the_form_that_must_work(tmp_path, capsys):
+    given = files(tmp_path)
+    command = ["nyquist", *given, "--frequency", "50 Hz", "--compensation", "32 %", "--json"]
+    assert main([*command, "--out", str(tmp_path / "out")]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    line = Line(STRONG.R, STRONG.L, 0.32)
+    assert answer["verdict"] == ("stable" if is_stable(PLANT, line) else "unstable")
+    assert all(set(c) == {"real", "frequency_hz"} for c in answer["crossings"])
+    assert {"gain", "phase_deg", "delay_s", "disk"} <= set(answer["margins"])
+    written = {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"nyquist.json", "eigenloci.png", "matrices.png", "gfor#Y_AC#device-1#.txt"} <= written
+
+
+def test_an_unstable_plant_is_said_on_the_first_line_and_by_the_exit_code(tmp_path, capsys):
+    given = files(tmp_path, WEAK)
+    assert main(["nyquist", *given, "--fail-unstable", "--out", str(tmp_path / "out")]) == 3
+    assert capsys.readouterr().out.startswith("unstable: −1 is encircled")
+
+
+def test_python_gives_what_the_command_prints(tmp_path):
+    given = files(tmp_path)
+    found = gfor.nyquist(*given, compensation=10)
+    assert found.verdict in {"unstable", "stable"}
+    assert found.as_json()["compensation_percent"] == 10
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--compensation", "0.32"], "no share in percent"),
+        (["--frequency", "50 kV"], "is in kV, but Hz is needed"),
+        (["--per-unit", "network"], "give the rated voltage at the cut"),
+    ],
+)
+def test_options_that_cannot_be_meant(tmp_path, capsys, more, said):
+    try:
+        code = main(["nyquist", *files(tmp_path), *more, "--out", str(tmp_path / "out")])
+    except SystemExit as end:
+        code = end.code
+    assert code == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_device_alone_asks_for_its_network(tmp_path, capsys):
+    assert main(["nyquist", files(tmp_path)[0]]) == 2
+    assert "give its network as well" in capsys.readouterr().err
+
+
+def test_per_unit_where_siemens_are_due(tmp_path):
+    given = files(tmp_path, device=PLANT.admittance(F) * 5)
+    with pytest.raises(InputError, match="is one of them in per unit"):
+        gfor.nyquist(*given)
+
+
+def test_generator_sign(tmp_path):
+    given = files(tmp_path, device=-0.01 * PLANT.admittance(F))
+    with pytest.raises(InputError, match="Then give --generator device"):
+        gfor.nyquist(*given)
+
+
+def test_scans_at_two_operating_points(tmp_path):
+    given = files(tmp_path, plant=PortPoint(100.0, 50.0, 5.0, 0.1), network=PortPoint(100.0, 80.0, 5.0, 0.1))
+    with pytest.raises(InputError, match=r"another operating point than network.txt: active power \[MW\] 50 and 80"):
+        gfor.nyquist(*given)

@@ -1,0 +1,67 @@
+"""Cuts through cases: the verdict of the loop is that of the modes, and a measured device gives the same limit."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import orchestrator as gfor
+from orchestrator.black_box.frequency_response import Excitation
+from orchestrator.errors import InputError
+from orchestrator.immittance.cut import cut_of
+from orchestrator.immittance.judgement import judge_loop
+from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
+from orchestrator.immittance.measured import scan_fmu
+from orchestrator.immittance.sides import Sampled
+
+
+@pytest.mark.parametrize(
+    ("scenario", "names", "stable"), [("gfor", ("gfor",), True), ("gfor", (), True), ("base", ("sg1",), False)]
+)
+def test_the_verdict_at_a_cut_is_that_of_the_modes(scenario, names, stable):
+    cut = cut_of(gfor.load("two_area").scenario(scenario).prepared, None, names)
+    found = judge_loop(CutLoop(cut.device, cut.network))
+    assert cut.modes_stable == stable
+    assert (found.verdict == "stable") == stable
+    assert found.growing == (0 if stable else 2)
+
+
+def test_a_disagreement_with_the_modes_is_no_verdict(monkeypatch):
+    monkeypatch.setattr("orchestrator.immittance.judgement._by_determinant", lambda path, loop: 2)
+    monkeypatch.setattr("orchestrator.immittance.judgement._by_crossings", lambda path, loop: 2)
+    found = gfor.nyquist("two_area", scenario="gfor", components=["gfor"])
+    assert found.verdict == "not known"
+    assert "eigenvalues of the closed system say stable" in found.reasons[0]
+
+
+def growth(cut, x):
+    """Of the closed system with capacitors of a reactance in series at the port, from its states [1/s]."""
+    d, n, omega = cut.device, cut.network, 2 * np.pi * 50
+    J = np.array([[0.0, -1.0], [1.0, 0.0]])
+    nothing = np.zeros((len(n.A), 2))
+    A = np.block([[d.A, d.B @ n.C, -d.B], [-n.B @ d.C, n.A, nothing], [x * omega * d.C, nothing.T, -omega * J]])
+    modes = np.linalg.eigvals(A)
+    return modes[np.abs(modes) > 1e-3].real.max()
+
+
+def test_a_scan_by_fmi_alone_gives_the_stability_limit_of_the_modes_to_a_thousandth(tmp_path):
+    """The converter behind capacitors that are too large swings; its FMU is scanned once, without its states."""
+    values = {"S_n": 1500.0, "P_0": 0.6, "Q_0": 0.05, "v_0": 1.0}
+    fmu = gfor.build("gfor", tmp_path, native=True)
+    scan = scan_fmu(fmu, None, values, 1e-4, Excitation(lowest_hz=1.0, highest_hz=1000.0, lines=80))
+    cut = cut_of(gfor.load("infinite_bus").scenario("dip", {"grid.X": 0.01}).prepared, None, ())
+    exact = cut.device.at(2j * np.pi * scan.frequencies)
+    error = np.linalg.norm(scan.values - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
+    assert error[scan.frequencies < 300].max() < 1e-4
+    limit = brentq(lambda x: growth(cut, x), 0.01, 0.02)
+    for device in (cut.device, Sampled("scan", scan.frequencies, scan.values, scan.bounds)):
+        for x, verdict in ((0.999 * limit, "stable"), (1.001 * limit, "unstable")):
+            found = judge_loop(CutLoop(device, cut.network, SeriesCapacitors(x, 2 * np.pi * 50)))
+            assert (found.verdict, found.reasons) == (verdict, ())
+
+
+def test_what_is_no_device_and_no_bus_is_refused():
+    prepared = gfor.load("two_area").scenario("gfor").prepared
+    with pytest.raises(InputError, match="--component grid: it is no device"):
+        cut_of(prepared, None, ("grid",))
+    with pytest.raises(InputError, match="--bus nowhere: no device stands there"):
+        cut_of(prepared, "nowhere", ())

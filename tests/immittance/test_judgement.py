@@ -1,0 +1,200 @@
+"""The count of encirclements against eigenvalues, and every planted reason for which a verdict is not known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.immittance import judgement as judging
+from orchestrator.immittance import loop as looping
+from orchestrator.immittance.judgement import judge_loop
+from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
+from orchestrator.immittance.poles import unstable_poles
+from orchestrator.immittance.sides import Sampled
+from tests.immittance import plants
+from tests.immittance.plants import OMEGA, Line, Noise, constant_power, eigenvalues, is_stable
+
+F = np.geomspace(0.1, 1000, 300)
+STRONG, WEAK = Line(0.05, 0.8 / OMEGA), Line(0.05, 1.2 / OMEGA)
+
+
+def a_side(values, f=F):
+    return Sampled("scan", f, values, np.zeros(len(f)))
+
+
+def judged(plant, line, f=F, **options):
+    capacitors = SeriesCapacitors(line.share * OMEGA * line.L, OMEGA) if line.share else None
+    device, network = a_side(plant.admittance(f), f), a_side(line.impedance(f, capacitor=False), f)
+    return judge_loop(CutLoop(device, network, capacitors), **options)
+
+
+def test_a_constant_power_is_stable_at_a_strong_line_and_not_at_a_weak_one():
+    plant = constant_power(g=1.2, h=0.6, T=0.003, G=0.2)
+    for line, verdict in ((STRONG, "stable"), (WEAK, "unstable")):
+        assert is_stable(plant, line) == (verdict == "stable")
+        found = judged(plant, line)
+        assert (found.verdict, found.reasons) == (verdict, ())
+        growing = (eigenvalues(plant, line).real > 0).sum()
+        assert found.growing == found.encirclements == found.by_loci == growing
+
+
+def test_the_gain_and_delay_margins_are_those_at_which_an_eigenvalue_reaches_the_axis():
+    """The gain is scaled in the device, all of it, until the eigenvalues of the closed system say unstable."""
+    plant = constant_power(g=1.2, h=0.6, T=0.003, G=0.2)
+    margin = judged(plant, STRONG).margins.gain_up
+
+    def scaled(k):
+        return replace(plant, C=k * plant.C, G=k * plant.G)
+
+    for k, stable in ((margin.value * 0.999, True), (margin.value * 1.001, False)):
+        assert is_stable(scaled(k), STRONG) == stable
+    critical = eigenvalues(scaled(margin.value), STRONG)
+    w = abs(critical[np.argmax(critical.real)].imag)
+    assert w / (2 * np.pi) == pytest.approx(margin.frequency_hz, rel=2e-3)
+
+
+def test_compensation_destabilises_where_the_eigenvalues_say():
+    plant = constant_power(g=1.2, h=0.6, T=0.01, G=0.05)
+    verdicts = {}
+    for percent in range(0, 80, 10):
+        line = Line(0.0222, 0.5 / OMEGA, percent / 100)
+        verdicts[percent] = (
+            judged(plant, line, np.unique(np.concatenate([F, np.linspace(40, 60, 81)]))).verdict,
+            is_stable(plant, line),
+        )
+    known = {k: v for k, v in verdicts.items() if v[0] != "not known"}
+    assert all((found == "stable") == stable for found, stable in known.values())
+    assert {stable for _, stable in known.values()} == {True, False}
+    assert len(known) > 5
+
+
+def test_no_random_plant_gets_the_wrong_verdict():
+    """Scans of 25 to 400 frequencies, with noise, narrow modes, and devices that are unstable by themselves."""
+    rng = np.random.default_rng(11)
+    counts = {"right": 0, "not known": 0}
+    for k in range(24):
+        plant, line = plants.random_plant(rng, unstable=k % 8 == 7), plants.random_line(rng)
+        f = np.geomspace(rng.choice([0.1, 1.0]), rng.choice([300.0, 2000.0]), rng.choice([25, 60, 150, 400]))
+        f = f[np.abs(f - 50) > 1e-6]
+        Y = Noise(rng).on(plant.admittance(f), rng.choice([0, 1e-5, 1e-4, 1e-3]))
+        capacitors = SeriesCapacitors(line.share * OMEGA * line.L, OMEGA) if line.share else None
+        found = judge_loop(CutLoop(a_side(Y, f), a_side(line.impedance(f, capacitor=False), f), capacitors))
+        if found.verdict == "not known":
+            counts["not known"] += 1
+        else:
+            assert (found.verdict == "stable") == is_stable(plant, line), k
+            counts["right"] += 1
+    assert counts["right"] > 8
+
+
+def narrow(zeta, f_0=20.0, size=1.0):
+    """A plant with one narrow mode."""
+    w = 2 * np.pi * f_0
+    A = w * (np.sqrt(1 - zeta**2) * plants.J - zeta * np.eye(2))
+    return plants.Plant(A, np.eye(2) * w * zeta * size, -np.diag([1.0, 0.3]), 0.08)
+
+
+def test_a_narrow_mode_between_sparse_frequencies_is_not_passed_over():
+    plant, line = narrow(0.01, size=1.5), Line(0.05, 0.8 / OMEGA)
+    dense = np.unique(np.concatenate([F, np.linspace(17, 23, 400)]))
+    truth = is_stable(plant, line)
+    assert (judged(plant, line, dense).verdict == "stable") == truth
+    sparse = judged(plant, line, np.geomspace(0.1, 1000, 90))
+    assert sparse.verdict == "not known"
+    assert "do not tell on which side" in sparse.reasons[0]
+
+
+def test_an_encirclement_beyond_the_last_frequency_is_not_ruled_out():
+    plant, line = narrow(0.2, f_0=180.0, size=6.0), Line(0.02, 0.8 / OMEGA)
+    assert not is_stable(plant, line)
+    assert judged(plant, line).verdict == "unstable"
+    cut_short = judged(plant, line, np.geomspace(0.1, 120, 300))
+    assert cut_short.verdict == "not known"
+    assert any("scan higher frequencies" in reason for reason in cut_short.reasons)
+
+
+def test_a_device_that_is_unstable_by_itself_is_seen():
+    rng = np.random.default_rng(3)
+    for _ in range(3):
+        plant = plants.random_plant(rng, unstable=True)
+        found = judged(plant, STRONG)
+        assert found.verdict == "not known"
+        assert unstable_poles(F, plant.admittance(F))
+        assert not unstable_poles(F, plants.random_plant(rng).admittance(F))
+
+
+def test_without_the_test_of_poles_a_negative_count_is_no_verdict(monkeypatch):
+    """A stable system with an unstable device: the loci go round against the clock."""
+    monkeypatch.setattr("orchestrator.immittance.sides.unstable_poles", lambda f, values: ())
+    w = 2 * np.pi * 5
+    plant = plants.Plant(w * (plants.J + 0.05 * np.eye(2)), np.eye(2) * w, np.eye(2) * 0.6, 0.5)
+    line = Line(0.3, 0.6 / OMEGA)
+    assert is_stable(plant, line)
+    found = judged(plant, line)
+    assert found.verdict == "not known"
+    assert any("against the clock" in reason for reason in found.reasons)
+
+
+def test_a_capacitor_inside_the_scan_whose_rated_frequency_is_left_out():
+    """The pole lies in the gap from 49.5 to 50.5 Hz; as an option it is known exactly."""
+    plant, line = constant_power(g=0.9, h=0.2, T=0.02, G=0.03), Line(0.01, 0.5 / OMEGA, 0.4)
+    f = np.concatenate([np.arange(0.5, 50, 0.5), np.arange(50.5, 500, 0.5)])
+    assert judged(plant, line, f).verdict != "not known"
+    inside = judge_loop(CutLoop(a_side(plant.admittance(f), f), a_side(line.impedance(f), f)))
+    assert inside.verdict == "not known"
+
+
+def test_loci_that_were_swapped_disagree_with_the_determinant(monkeypatch):
+    """Here the loci keep the order in which LAPACK gives them, or change it at one point."""
+    plant = constant_power(g=1.2, h=0.6, T=0.003, G=0.2)
+    right = judged(plant, WEAK)
+    assert right.verdict == "unstable"
+
+    def swapped(eigenvalues):
+        found = looping_followed(eigenvalues)
+        # at the first point where one locus is beyond −1 below the axis, it becomes the other
+        k = int(np.argmax((found.real < -1).any(axis=1))) + 1
+        found[k:] = found[k:, ::-1]
+        return found
+
+    looping_followed = looping.followed
+    monkeypatch.setattr(looping, "followed", swapped)
+    found = judged(plant, WEAK)
+    assert found.by_loci != found.encirclements or found.verdict == right.verdict
+    monkeypatch.setattr(judging, "_by_crossings", lambda path, loop: right.by_loci + 2)
+    found = judged(plant, WEAK)
+    assert found.verdict == "not known"
+    assert "some loci were not followed rightly" in found.reasons[-1]
+
+
+def salient(f, angle=0.0):
+    """A network that is not the same in every frame: stiff in one direction, weak across."""
+    c, s = np.cos(angle), np.sin(angle)
+    T = np.array([[c, -s], [s, c]])
+    Z = (
+        Line(0.05, 0.4 / OMEGA).impedance(f)
+        + np.diag([1.6, 0.0])[None] * (1 / (1 + 2j * np.pi * f * 0.05))[:, None, None]
+    )
+    return T @ Z @ T.T
+
+
+def test_frames_that_are_not_known_leave_the_verdict_open_where_it_depends_on_them():
+    plant = constant_power(g=1.2, h=0.2)
+    Y, found = plant.admittance(F), set()
+    for angle in (0.0, np.pi / 2):
+        loop = CutLoop(a_side(Y), a_side(salient(F, angle)))
+        found.add(judge_loop(loop).verdict)
+        open_ = judge_loop(loop, frames_known=False)
+        assert open_.verdict == "not known"
+        assert "angle between the frames" in open_.reasons[0]
+    assert found == {"stable", "unstable"}
+    assert judged(plant, STRONG, frames_known=False).verdict == "stable"  # a line is the same in every frame
+
+
+def test_bounds_of_a_measurement_that_reach_the_critical_point_leave_it_open():
+    plant = constant_power(g=1.2, h=0.6, T=0.003, G=0.2)
+    Y, Z = plant.admittance(F), STRONG.impedance(F)
+    sure = Sampled("scan", F, Y, 1e-3 * np.linalg.norm(Y, axis=(1, 2)))
+    assert judge_loop(CutLoop(sure, a_side(Z))).verdict == "stable"
+    unsure = replace(sure, bounds=0.9 * np.linalg.norm(Y, axis=(1, 2)))
+    assert judge_loop(CutLoop(unsure, a_side(Z))).verdict == "not known"

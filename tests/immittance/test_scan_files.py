@@ -1,0 +1,109 @@
+"""Scans in the forms of Z-tool and IMTB: read, written, and refused with what is wrong."""
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.immittance.imtb import write_imtb
+from orchestrator.immittance.scan import PortPoint, Scan, check_sign, other_q_axis
+from orchestrator.immittance.scan_files import read_scan
+from orchestrator.immittance.ztool import write_ztool
+from tests.immittance.plants import Line, constant_power
+
+F = np.geomspace(1, 500, 120)
+
+
+def a_scan(ports=("PCC-1",), **more):
+    Y = constant_power().admittance(F)
+    values = np.kron(np.ones((len(ports), len(ports))), Y) if len(ports) > 1 else Y
+    return Scan("made", F, values, ports, **more)
+
+
+def test_a_scan_comes_back_from_a_file_of_z_tool_with_its_operating_point(tmp_path):
+    point = PortPoint(206.9, 99.3, 6.6, 0.549)
+    write_ztool(a_scan(points={"PCC-1": point}), tmp_path / "case#Y_AC#PCC-1#.txt")
+    back = read_scan(tmp_path / "case#Y_AC#PCC-1#.txt", 50.0)
+    assert back.values == pytest.approx(a_scan().values, rel=1e-15)
+    assert back.frequencies == pytest.approx(F, rel=1e-15)
+    assert back.points["PCC-1"] == point
+    assert not back.questions
+
+
+def test_several_ports_keep_their_order(tmp_path):
+    write_ztool(a_scan(("A-1", "B-2")), tmp_path / "x#Y_AC#A-1#B-2#.txt")
+    assert (tmp_path / "x#Y_AC#A-1#B-2#.txt").read_text().startswith("f\tA-1_d\tA-1_q\tB-2_d\tB-2_q\n")
+    back = read_scan(tmp_path / "x#Y_AC#A-1#B-2#.txt", 50.0)
+    assert back.ports == ("A-1", "B-2")
+    assert back.values == pytest.approx(a_scan(("A-1", "B-2")).values, rel=1e-15)
+
+
+def test_the_q_axis_of_z_tool_lags_and_that_of_imtb_leads(tmp_path):
+    line = Scan("line", F, np.linalg.inv(Line(0.05, 0.002).impedance(F)), ("P",))
+    write_ztool(line, tmp_path / "a.txt")
+    cells = (tmp_path / "a.txt").read_text().splitlines()[1].split("\t")
+    Z = np.linalg.inv(np.array([complex(c.strip().strip("()")) for c in cells[1:]]).reshape(2, 2))
+    assert Z[0, 1].real > 0 > Z[1, 0].real
+    write_imtb(line, tmp_path / "b.csv")
+    for name in ("a.txt", "b.csv"):
+        assert read_scan(tmp_path / name, 50.0).values == pytest.approx(line.values, rel=1e-12)
+
+
+def test_a_file_with_the_other_q_axis_is_refused(tmp_path):
+    line = Scan("line", F, other_q_axis(np.linalg.inv(Line(0.05, 0.002).impedance(F))), ("P",))
+    write_ztool(line, tmp_path / "a.txt")
+    with pytest.raises(InputError, match="q axis leads the d axis, where this form has it lagging"):
+        read_scan(tmp_path / "a.txt", 50.0)
+
+
+def test_alpha_beta_impedances_are_those_of_the_sequences(tmp_path):
+    """Z₊₊ at f + 50 Hz and Z₋₋ at f − 50 Hz, from the definitions of both sequences."""
+    f = np.linspace(1, 300, 90)
+    Z = np.linalg.inv(constant_power().admittance(f)) + Line(0.05, 0.002).impedance(f)
+    plus = (Z[:, 0, 0] + Z[:, 1, 1] + 1j * (Z[:, 1, 0] - Z[:, 0, 1])) / 2
+    minus = (Z[:, 0, 0] + Z[:, 1, 1] - 1j * (Z[:, 1, 0] - Z[:, 0, 1])) / 2
+    to_minus = (Z[:, 0, 0] - Z[:, 1, 1] + 1j * (Z[:, 0, 1] + Z[:, 1, 0])) / 2
+    to_plus = (Z[:, 0, 0] - Z[:, 1, 1] - 1j * (Z[:, 0, 1] + Z[:, 1, 0])) / 2
+    head = ",".join(["f", *(f"Zdut_ab_{e}_{p}" for e in ("11", "12", "21", "22") for p in ("re", "im"))])
+    rows = [
+        ",".join(map(repr, [x + 50, *np.array([[a.real, a.imag] for a in m]).ravel().tolist()]))
+        for x, m in zip(f.tolist(), np.stack([plus, to_minus, to_plus, minus], 1).tolist(), strict=True)
+    ]
+    (tmp_path / "IM_Zab_MIMO_x.csv").write_text("\n".join([head, *rows]) + "\n")
+    assert np.linalg.inv(read_scan(tmp_path / "IM_Zab_MIMO_x.csv", 50.0).values) == pytest.approx(Z, rel=1e-9)
+
+
+def spoiled(tmp_path, change):
+    write_ztool(a_scan(), tmp_path / "good.txt")
+    lines = (tmp_path / "good.txt").read_text().splitlines()
+    (tmp_path / "bad.txt").write_text("\n".join(change(lines)) + "\n")
+    return tmp_path / "bad.txt"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda s: [*s[:50], s[50][:80]], "line 51: there are 2 numbers"),
+        (lambda s: [*s[:50], s[48], *s[50:]], "do not rise"),
+        (lambda s: [*s[:50], s[49], *s[50:]], "do not rise"),
+        (lambda s: [*s[:9], s[9].replace("e-0", "x-0"), *s[10:]], "line 10: complex"),
+        (lambda s: [*s[:9], s[9].replace(s[9].split("\t")[1], " (nan+0j)"), *s[10:]], "not a finite number"),
+        (lambda s: [s[0].replace("PCC-1_q", "PCC-1_dc"), *s[1:]], "PCC-1_dc are DC"),
+        (lambda s: [s[0].replace("PCC-1_q", "PCC-2_q"), *s[1:]], "d and q of one port"),
+        (lambda s: ["frequency;a;b", *s[1:]], "of no known form of scans"),
+        (lambda s: s[:5], "there are 4 frequencies"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_one_error(tmp_path, change, said):
+    with pytest.raises(InputError, match=said):
+        read_scan(spoiled(tmp_path, change), 50.0)
+
+
+def test_rows_that_may_be_missing_are_asked_about(tmp_path):
+    scan = read_scan(spoiled(tmp_path, lambda s: [*s[:60], *s[66:]]), 50.0)
+    assert "are rows missing from" in scan.questions[0]
+
+
+def test_a_generators_sign_is_told_by_the_resistance():
+    check_sign(a_scan(), "--generator device")
+    with pytest.raises(InputError, match="generator sign"):
+        check_sign(a_scan().turned_sign(), "--generator device")

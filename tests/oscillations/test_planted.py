@@ -1,0 +1,282 @@
+"""What would make a source wrong in silence: each ends in the right place or in none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.oscillations.location import DEF, QV_PHASE
+from orchestrator.oscillations.measurements import Site, made_ready
+from orchestrator.oscillations.verdict import locate
+from tests.support.forced_records import load_noise, model, record, sine, times_of
+
+TIMES = times_of(50.0)
+
+
+def at(found, frequency):
+    """The oscillation of a frequency, which must be there."""
+    (one,) = [x for x in found if abs(x.found.frequency - frequency) < 0.01]
+    return one
+
+
+def forced(name, reference, frequency, **further):
+    return at(locate(record(name, {reference: sine(TIMES, frequency, 0.02)}, times=TIMES, **further)), frequency)
+
+
+@pytest.mark.parametrize("unit", ["gfor.droop", "sg1.governor", "sg2.governor"])
+def test_at_resonance_with_the_mode_of_the_two_areas(unit):
+    found = forced("two_area", f"{unit}.delta_P_ref", 0.5817, loads=0.0005, measuring=5e-5)
+    assert found.source == unit.split(".")[0]
+
+
+@pytest.mark.parametrize("unit", ["gfor31", "gfor35"])
+def test_where_energy_flow_names_the_machine_beside_the_converter_that_drives_it(unit):
+    """As in the Danish event: a converter whose Q-V phase gives it away."""
+    found = forced("ieee39", f"{unit}.droop.delta_U_ref", 0.722)
+    flow = next(o for o in found.opinions if o.method == DEF)
+    assert flow.ranking[0][0] == unit.replace("gfor", "sg")
+    assert not flow.applies
+    assert found.source == unit
+
+
+def test_two_sources_of_one_frequency_are_not_one():
+    t = TIMES
+    drives = {"sg33.governor.delta_P_ref": sine(t, 0.9, 0.02), "sg37.governor.delta_P_ref": sine(t, 0.9, 0.02)}
+    found = at(locate(record("ieee39", drives, times=t)), 0.9)
+    assert found.source is None
+    assert "sg33" in found.reason
+    assert "sg37" in found.reason
+
+
+def test_two_sources_of_two_frequencies_are_told_apart():
+    t = TIMES
+    drives = {"sg33.governor.delta_P_ref": sine(t, 0.5, 0.02), "gfor37.droop.delta_P_ref": sine(t, 0.9, 0.02)}
+    found = locate(record("ieee39", drives, times=t))
+    assert at(found, 0.5).source == "sg33"
+    assert at(found, 0.9).source == "gfor37"
+
+
+@pytest.mark.parametrize(
+    "reference", ["sg35.governor.delta_P_ref", "gfor35.droop.delta_U_ref", "sg35.exciter.delta_V_ref"]
+)
+@pytest.mark.parametrize("frequency", [0.4, 0.722])
+def test_a_source_at_a_bus_that_is_not_observed(reference, frequency):
+    found = forced("ieee39", reference, frequency, without=("bus_35",))
+    assert found.source is None
+
+
+def turned(unit, p=True, q=True):
+    def change(places):
+        return [
+            replace(x, p=-x.p if p else x.p, q=-x.q if q else x.q) if unit in (x.name, "all") else x for x in places
+        ]
+
+    return change
+
+
+@pytest.mark.parametrize(
+    "reference", ["gfor.droop.delta_P_ref", "sg1.governor.delta_P_ref", "sg2.governor.delta_P_ref"]
+)
+@pytest.mark.parametrize("unit", ["gfor", "sg1", "sg2", "all"])
+@pytest.mark.parametrize("q", [True, False])
+def test_wrong_signs_of_power_or_current(reference, unit, q):
+    found = forced("two_area", reference, 0.8, change=turned(unit, q=q))
+    assert found.source in (None, reference.split(".")[0])
+
+
+@pytest.mark.parametrize("unit", ["sg36", "gfor36"])
+@pytest.mark.parametrize("reference", ["sg35.governor.delta_P_ref", "gfor35.droop.delta_U_ref"])
+def test_wrong_signs_in_a_larger_grid(unit, reference):
+    for p, q in ((True, True), (True, False), (False, True)):
+        found = forced("ieee39", reference, 0.722, change=turned(unit, p, q))
+        assert found.source in (None, reference.split(".")[0])
+
+
+def late(unit, seconds, signals=("v", "angle", "p", "q")):
+    def change(places):
+        def moved(x):
+            return np.interp(TIMES - seconds, TIMES, x)
+
+        return [replace(x, **{s: moved(getattr(x, s)) for s in signals}) if x.name == unit else x for x in places]
+
+    return change
+
+
+@pytest.mark.parametrize("unit", ["gfor", "sg1", "sg2"])
+@pytest.mark.parametrize("signals", [("v", "angle", "p", "q"), ("p", "q")])
+def test_a_clock_that_is_a_millisecond_off(unit, signals):
+    found = forced("two_area", "sg1.governor.delta_P_ref", 0.5817, change=late(unit, 1e-3, signals))
+    assert found.source == "sg1"
+
+
+def test_a_clock_that_is_off_between_voltages_and_currents():
+    """A millisecond between both turns P and Q by 18 degrees at 50 Hz."""
+
+    def change(places):
+        turn = np.exp(1j * 2 * np.pi * 50 * 1e-3)
+        power = [(x.p + 1j * x.q) * (turn if x.name == "sg2" else 1) for x in places]
+        return [replace(x, p=s.real, q=s.imag) for x, s in zip(places, power, strict=True)]
+
+    for reference in ("sg1.governor.delta_P_ref", "sg2.governor.delta_P_ref"):
+        assert forced("two_area", reference, 0.8, change=change).source in (None, reference.split(".")[0])
+
+
+def test_leakage_of_the_line_frequency():
+    def change(places):
+        hum = 0.02 * np.sin(2 * np.pi * 49.97 * TIMES)  # aliased: samples are 30 a second
+        return [replace(x, p=x.p + hum, v=x.v + 0.1 * hum) for x in places]
+
+    found = locate(record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES, change=change))
+    assert at(found, 0.8).source == "sg1"
+    assert {x.source for x in found} <= {None, "sg1"}
+
+
+def test_angles_that_wrap_and_run_away():
+    def change(places):
+        drift = 2 * np.pi * 0.05 * TIMES
+        return [replace(x, angle=np.angle(np.exp(1j * (x.angle + drift)))) for x in places]
+
+    found = forced("two_area", "sg1.governor.delta_P_ref", 0.8, change=change)
+    assert found.source == "sg1"
+
+
+def missing(rows, unit=None):
+    def change(places):
+        for x in places:
+            if unit in (None, x.name):
+                for values in (x.v, x.angle, x.p, x.q):
+                    values[rows] = np.nan
+        return places
+
+    return change
+
+
+def test_missing_samples_are_bridged_or_the_place_is_left_out():
+    few = np.random.default_rng(3).choice(len(TIMES), 40, replace=False)
+    measured = record(
+        "two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, change=missing(few), times=TIMES
+    )
+    assert at(locate(measured), 0.8).source == "sg1"
+    assert any("interpolated" in text for text in measured.remarks)
+    gone = record(
+        "two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, change=missing(slice(600, 700), "sg1"),
+        times=TIMES,
+    )  # fmt: skip
+    assert any("sg1 is left out" in text for text in gone.remarks)
+    assert at(locate(gone), 0.8).source is None
+
+
+def test_missing_rows_cut_the_record_and_doubled_times_count_once():
+    whole = record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES)
+    keep = np.r_[0:200, 260:1500]
+    places = [replace(x, **{s: getattr(x, s)[keep] for s in ("v", "angle", "p", "q")}) for x in whole.places]
+    cut = made_ready("cut", TIMES[keep], places)
+    assert any("rows are missing" in text for text in cut.remarks)
+    assert at(locate(cut), 0.8).source == "sg1"
+    twice = np.sort(np.r_[0:1500, 300])
+    places = [replace(x, **{s: getattr(x, s)[twice] for s in ("v", "angle", "p", "q")}) for x in whole.places]
+    assert len(made_ready("twice", TIMES[twice], places).times) == 1500
+    with pytest.raises(InputError, match="do not rise"):
+        made_ready("back", TIMES[::-1], whole.places)
+
+
+def test_a_load_of_constant_power_is_no_source():
+    """A place that takes power, whatever its voltage does, neither feeds nor takes energy."""
+
+    def change(places):
+        x = places[0]
+        return [*places, Site("load", "unit", x.bus, x.v, x.angle, np.full(len(x.v), -5.0), np.full(len(x.v), -1.0))]
+
+    for reference in ("sg1.governor.delta_P_ref", "gfor.droop.delta_P_ref"):
+        assert forced("two_area", reference, 0.8, change=change).source == reference.split(".")[0]
+
+
+def driven_by_noise(damping, seed, frequency=0.58, length=120.0):
+    """A mode of a machine against a grid that loads shake, at one place."""
+    t = times_of(length)
+    w = 2 * np.pi * frequency
+    step = t[1] - t[0]
+    pole = np.exp((-damping + 1j * np.sqrt(1 - damping**2)) * w * step)
+    white = np.random.default_rng(seed).standard_normal((len(t), 2)) @ np.array([1, 1j])
+    z = np.zeros(len(t), complex)
+    for k in range(1, len(t)):
+        z[k] = pole * z[k - 1] + white[k]
+    shape = {"sg1": 1.0, "sg2": -0.4}
+    rng = np.random.default_rng(seed + 1)
+    scale = 0.02 / np.abs(z).std()
+    places = []
+    for name, part in shape.items():
+        own = 1e-3 * rng.standard_normal((4, len(t)))
+        p, angle = part * scale * z.real, part * 0.1 * scale * z.imag
+        places.append(
+            Site(
+                name,
+                "unit",
+                f"bus of {name}",
+                1 + 0.01 * p + 0.01 * own[0],
+                angle + 0.01 * own[1],
+                5 + p + own[2],
+                1 + own[3],
+            )
+        )
+    return made_ready("ambient", t, places)
+
+
+@pytest.mark.parametrize("damping", [0.003, 0.01, 0.03])
+def test_a_mode_that_noise_shakes_is_not_called_forced(damping):
+    kinds = [x.evidence.kind for seed in range(12) for x in locate(driven_by_noise(damping, seed))]
+    assert len(kinds) >= 6
+    assert kinds.count("forced") == 0
+
+
+def test_a_mode_without_damping_after_a_step_is_not_called_forced():
+    t = TIMES
+    ring = 0.05 * (t >= 10) * np.sin(2 * np.pi * 0.6 * (t - 10))
+    step = 0.08 * (t >= 10)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal((2, len(t)))
+    places = [
+        Site("sg1", "unit", "a", 1 + 0.01 * ring, 0.1 * ring, 5 + ring + step + noise[0], 1 + 0.1 * ring),
+        Site("sg2", "unit", "b", 1 - 0.01 * ring, -0.1 * ring, 5 - ring + noise[1], 1 - 0.1 * ring),
+    ]
+    assert at(locate(made_ready("ring", t, places)), 0.6).evidence.kind == "not known"
+
+
+@pytest.mark.parametrize("rate", [-0.08, 0.05])
+def test_what_decays_or_grows_is_a_mode(rate):
+    t = TIMES
+    ring = 0.02 * np.exp(rate * (t - 25)) * np.sin(2 * np.pi * 0.6 * t)
+    places = [Site("sg1", "unit", "a", 1 + 0.01 * ring, 0.1 * ring, 5 + ring, 1 + 0.1 * ring)]
+    found = at(locate(made_ready("ring", t, places)), 0.6)
+    assert found.evidence.kind == "mode"
+    assert found.source is None
+    assert found.evidence.damping_percent == pytest.approx(-100 * rate / (2 * np.pi * 0.6), rel=0.1)
+
+
+def test_noise_of_loads_alone_forces_nothing():
+    for name in ("two_area", "ieee39"):
+        found = locate(record(name, {}, loads=0.002, measuring=5e-5, times=times_of(60.0)))
+        assert all(x.source is None for x in found)
+
+
+def test_a_square_has_its_odd_multiples():
+    t = TIMES
+    measured = record("two_area", {"gfor.droop.delta_P_ref": sine(t, 0.4, 0.02, shape="square")}, times=t)
+    found = at(locate(measured), 0.4)
+    assert 3 in found.found.harmonics
+    assert found.evidence.kind == "forced"
+    assert found.source == "gfor"
+
+
+def test_the_begin_is_found():
+    found = forced("two_area", "sg1.governor.delta_P_ref", 1.2)
+    assert found.found.begin == pytest.approx(10.0, abs=1.0)
+
+
+def test_loads_wander_with_the_deviation_that_was_asked_for():
+    assert load_noise(20_000, 1, 30.0, 0.01, 1).std() == pytest.approx(0.01, rel=0.1)
+    assert len(model("ieee39").references) == 47 - 9  # of Q and U, which move the same, one
+
+
+def test_the_two_physical_methods_have_names():
+    assert {o.method for o in forced("two_area", "sg1.governor.delta_P_ref", 0.8).opinions} >= {DEF, QV_PHASE}

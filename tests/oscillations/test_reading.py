@@ -1,0 +1,122 @@
+"""Runs, tables of phasors and the contest's folders, with what is wrong in them."""
+
+import json
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.oscillations.reading import contest_cases, read_contest
+from tests.support.forced_records import record, sine, times_of
+
+TIMES = times_of(40.0)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES)
+
+
+def csv(path, measured, *, units=("pu", "deg", "MW", "Mvar"), scale=(1, 57.29577951308232, 100, 100)):
+    columns = {"time [s]": measured.times}
+    for place in measured.places:
+        signals = {"vm": "v", "va": "angle", "p": "p", "q": "q"}
+        for (what, signal), unit, factor in zip(signals.items(), units, scale, strict=True):
+            columns[f"{place.name}.{what} [{unit}]"] = factor * getattr(place, signal)
+    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
+def test_phasors_in_csv(gfor, tmp_path, measured):
+    code, out, _ = gfor("source", csv(tmp_path / "pmu.csv", measured), "--json")
+    found = json.loads(out)
+    assert code == 0
+    (one,) = found["oscillations"]
+    assert one["source"] == "sg1"
+    assert one["kind"] == "forced"
+    assert one["frequency_hz"] == pytest.approx(0.8, abs=2e-3)
+    assert {m["method"] for m in one["methods"]} == {
+        "dissipating energy flow", "dynamic-mode participation", "Q-V phase"
+    }  # fmt: skip
+
+
+def test_the_first_screen_is_the_answer(gfor, tmp_path, measured):
+    code, out, _ = gfor("source", csv(tmp_path / "pmu.csv", measured), "--details")
+    assert code == 0
+    assert "forced" in out
+    assert "sg1 feeds 100 % of it" in out
+    assert "hold the references of sg1" in out
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [
+        (("pu", "", "MW", "Mvar"), "deg"),
+        (("pu", "deg", "MW", "pu"), "some powers are in pu"),
+        (("pu", "deg", "m", "Mvar"), "MW or pu"),
+    ],
+)
+def test_units_that_do_not_fit_are_refused(gfor, tmp_path, measured, units, said):
+    code, _, error = gfor("source", csv(tmp_path / "pmu.csv", measured, units=units))
+    assert code == 2
+    assert said in error
+
+
+def test_a_record_without_phasors_is_told_what_it_needs(gfor, tmp_path):
+    file = tmp_path / "f.csv"
+    file.write_text("time,f\n" + "".join(f"{0.1 * k},50\n" for k in range(100)))
+    code, _, error = gfor("source", file)
+    assert code == 2
+    assert "NORTH.vm [pu]" in error
+
+
+def contest(folder, measured, *, double=True):
+    """A case as the contest has it: voltages, and the current of one line at each bus; a discontinuity twice."""
+    folder.mkdir(parents=True)
+    rows = np.sort(np.r_[0 : len(measured.times), 300]) if double else np.arange(len(measured.times))
+    kept = {}
+    for number, place in enumerate(p for p in measured.places if p.name != "gfor"):
+        bus = f"{100 + number}|{place.name.upper()}    20.0"
+        current = np.conj((place.p + 1j * place.q) / (place.v * np.exp(1j * place.angle)))
+        line = f"{bus}|200|HUB       400.|1"
+        wrapped = np.rad2deg(np.angle(np.exp(1j * place.angle)))
+        for name, column, values in (
+            ("BusVolMag", bus, place.v), ("BusVolAng", bus, wrapped),
+            ("LinCurMag", line, np.abs(current)), ("LinCurAng", line, np.rad2deg(np.angle(current))),
+        ):  # fmt: skip
+            kept.setdefault(name, {})[column] = values[rows]
+    for name, columns in kept.items():
+        header = " ".join(f"'{column}'" for column in ("Time", *columns))
+        table = np.column_stack([measured.times[rows], *columns.values()])
+        np.savetxt(folder / f"{name}.txt", table, header=header, comments="")
+    return folder
+
+
+def test_a_folder_of_the_contest(gfor, tmp_path, measured):
+    for case in ("Case1", "Case2", "Case10"):
+        contest(tmp_path / "cases" / case, measured)
+    code, out, _ = gfor("source", "--contest", tmp_path / "cases", "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert [one["record"] for one in found] == ["Case1", "Case2", "Case10"]
+    for one in found:
+        assert "written twice" in one["remarks"][0]
+        assert one["oscillations"][0]["source"] == "100|SG1 20.0"
+
+
+def test_what_is_no_case_of_the_contest(tmp_path, measured):
+    with pytest.raises(InputError, match="neither it nor a folder in it"):
+        contest_cases(tmp_path)
+    folder = contest(tmp_path / "Case1", measured)
+    lines = (folder / "LinCurAng.txt").read_text().splitlines()
+    (folder / "LinCurAng.txt").write_text("\n".join(lines[:-1]))
+    with pytest.raises(InputError, match="times are not those"):
+        read_contest(folder)
+    (folder / "BusVolMag.txt").write_text("'Time' '1|A'\n0 1 2\n")
+    with pytest.raises(InputError, match="2 names in quotes stand above 3 columns"):
+        read_contest(folder)
+
+
+def test_neither_or_both_are_refused(gfor, tmp_path):
+    assert gfor("source")[0] == 2
+    assert gfor("source", tmp_path, "--contest", tmp_path)[0] == 2

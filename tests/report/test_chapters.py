@@ -1,0 +1,125 @@
+"""A report of results of any study: its first page, its chapters, what cannot be used, and what changed since."""
+
+import json
+import shutil
+
+import pytest
+
+from orchestrator.errors import InputError
+from orchestrator.report.html.page import write_report
+
+SHEET = {
+    "controller": "pod_p", "target_mode": {"real": -0.39, "imag": 3.65}, "predicted_mode": {"real": -0.7, "imag": 3.65},
+    "achieved_mode": {"real": -0.8, "imag": 3.6}, "sensitivity": {"magnitude": 0.01, "phase_deg": 30.0}, "T_S1": 0.2,
+    "T_S2": 0.1, "N_S": 2, "K": 200.0, "K_unbounded": 150.0, "met": False, "verdict": "not met: <b>20 %</b> are wanted",
+    "target_damping_ratio": 0.106, "achieved_damping_ratio": 0.18, "requirement": {"damping_ratio": 0.2},
+    "mode": "electromechanical", "warnings": ["two modes are close"],
+}  # fmt: skip
+SCREENING = {
+    "points": 2, "outages": 3, "items": 8, "stable": None, "counted_at_all_frequencies": False,
+    "modes": [{"worst": {"point": "mon", "outage": "line_1", "frequency_hz": 0.93, "damping_percent": 3.8}}],
+    "failures": [{"point": "mon", "outage": "sg3", "status": "no power flow", "why": "sg5 would need 129 %"}],
+}  # fmt: skip
+CHECK = {
+    "fmu": "vendor.fmu", "trusted": False, "faults": ["wrong rated frequency"], "not_supported": [],
+    "checks": [{"question": "Is it at rest?", "verdict": "fail", "evidence": "omega is 0.8333", "remedy": "set f_n",
+                "figures": {"not_judged": "anything after it"}}],
+}  # fmt: skip
+CERTIFICATE = {"sentence": "It passes at all.", "verdict": "passes", "passed": True, "files": {}, "seal": "0",
+               "judged": "9 of 9", "missing": [], "departures": []}  # fmt: skip
+COMPARISON = [{"expression": "sg1.omega", "unit": "pu", "deviations": [1, 2], "largest": 0.5, "at": 1.2, "rms": 0.1}]
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """A folder of each study, with its JSON alone."""
+    for name, file, content in (
+        ("design", "pod_p.json", SHEET), ("screen", "screening.json", SCREENING), ("check", "check.json", CHECK),
+        ("certify", "certificate.json", CERTIFICATE), ("compare", "differences.json", COMPARISON),
+    ):  # fmt: skip
+        (tmp_path / name).mkdir()
+        (tmp_path / name / file).write_text(json.dumps(content), encoding="utf-8")
+    return [tmp_path / name for name in ("design", "screen", "check", "certify", "compare")]
+
+
+def written(folders, tmp_path, **more):
+    return write_report(folders[0], folders[1:], tmp_path / "page.html", **more).read_text(encoding="utf-8")
+
+
+def test_the_first_page_answers_every_study(folders, tmp_path):
+    text = written(folders, tmp_path)
+    first = text[: text.index("<section")]
+    for said in (
+        "not as required: with K = 200 the mode has 18.00 % of damping, 10.60 % before, 20.00 % wanted",
+        "not known whether stable everywhere: 2 operating points with 3 outages; least damped 0.930 Hz, 3.80 %",
+        "mon, sg3: no power flow: sg5 would need 129 %",
+        "growth outside of the range was counted at some points only",
+        "vendor.fmu: wrong rated frequency", "anything after it", "It passes at all.", "judged: 9 of 9",
+        "sg1.omega differs most, by 0.5 pu at 1.200 s", "two modes are close",
+    ):  # fmt: skip
+        assert said in first
+    assert 'class="bad">not as required' in first
+    assert 'class="good">It passes' in first
+    assert "<b>20 %</b>" not in text  # a verdict is text
+
+
+def test_a_chapter_takes_the_sections_of_the_results_own_page(folders, tmp_path):
+    page = '<nav></nav><section id="section-0"><h2>Outages</h2><a href="#figure-1">1</a><i id="figure-1"></i></section>'
+    (folders[1] / "screening.html").write_text(f"<main>{page}</main>", encoding="utf-8")
+    text = written(folders, tmp_path)
+    assert "<h3>Outages</h3>" in text
+    assert 'href="#chapter-2-figure-1"' in text
+    assert 'id="chapter-2-figure-1"' in text
+
+
+def test_provenance_names_command_code_and_date(gfor, tmp_path):
+    code, _, err = gfor("modes", "two_area_rms", "--scenario", "gfor", "--out", str(tmp_path / "modes"))
+    assert code == 0, err
+    code, _, err = gfor("report", str(tmp_path / "modes"))
+    assert code == 0, err
+    text = (tmp_path / "modes" / "report.html").read_text(encoding="utf-8")
+    manifest = json.loads((tmp_path / "modes" / "manifest.json").read_text())
+    assert manifest["command"].startswith("gfor modes two_area_rms --scenario gfor --out ")
+    assert manifest["code"][:12] in text
+    assert "gfor: stable, least damped 0.581 Hz, 10.63 %" in text
+    assert "nothing was run" in text
+
+
+def test_what_changed_since_an_older_page(folders, tmp_path):
+    written(folders, tmp_path)
+    old = shutil.copy(tmp_path / "page.html", tmp_path / "old.html")
+    assert "No answer differs from old.html" in written(folders, tmp_path, against=tmp_path / "old.html")
+    (folders[0] / "pod_p.json").write_text(json.dumps(SHEET | {"met": True, "K": 300.0}), encoding="utf-8")
+    text = written(folders[:4], tmp_path, against=old)
+    changed = text[text.index("Answers that differ") : text.index("</section>")]
+    assert "not as required: with K = 200" in changed
+    assert "yes: with K = 300" in changed
+    assert "not there any more" in changed
+    assert "It passes" not in changed
+
+
+def test_what_cannot_be_used_is_named(folders, tmp_path):
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "table.json").write_text('{"a": 1}')
+    (tmp_path / "other" / "notes.html").write_text("a page")
+    with pytest.raises(InputError, match=r"other: nothing in it can be used.*own: notes.html.*run, modes, screen"):
+        write_report(folders[0], [tmp_path / "other"], tmp_path / "page.html")
+    with pytest.raises(InputError, match="no such file or folder"):
+        write_report(folders[0], [tmp_path / "nowhere"])
+    (folders[2] / "check.json").write_text(json.dumps(CHECK | {"checks": None}))
+    with pytest.raises(InputError, match=r"check.json: it is not as its study writes it"):
+        write_report(folders[2], [], tmp_path / "page.html")
+    with pytest.raises(InputError, match="it is no page of `gfor report`"):
+        write_report(folders[0], [], tmp_path / "page.html", tmp_path / "other" / "notes.html")
+
+
+def test_a_file_that_was_changed_since_is_refused(gfor, tmp_path):
+    code, _, err = gfor("site", "two_area_rms", "--scenario", "gfor", "--confirm", "0", "--out", str(tmp_path))
+    assert code == 0, err
+    assert "where to put POD-P" in (tmp_path / "site.html").read_text(encoding="utf-8")
+    write_report(tmp_path)
+    assert "bus_2 is the best place for POD-P" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    content = (tmp_path / "site.json").read_text().replace("bus_2 is the best", "bus_3 is the best")
+    (tmp_path / "site.json").write_text(content)
+    with pytest.raises(InputError, match="SHA-256 differs"):
+        write_report(tmp_path)
