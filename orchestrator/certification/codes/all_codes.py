@@ -11,7 +11,7 @@ from orchestrator.certification.codes.miso import MISO
 from orchestrator.certification.codes.prc029 import PRC029
 from orchestrator.certification.codes.row import GridCode
 
-CODES: dict[str, GridCode] = {code.key: code for code in (MISO, AEMO, ERCOT, FINGRID, PRC029)}  # by what ``--code`` takes
+CODES = {code.key: code for code in (MISO, AEMO, ERCOT, FINGRID, PRC029)}  # by what ``--code`` takes
 
 BY_DECLARATION: dict[str, tuple[Sequence[Declaration], Callable[[Mapping[str, float]], GridCode]]] = {
     "rte": (rte.DECLARED, rte.rte_code)
