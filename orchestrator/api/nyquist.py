@@ -92,6 +92,12 @@ def nyquist(
     ------
     InputError
         If a file cannot be used, or both sides do not belong together.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> gfor.nyquist("two_area", components=["gfor"], scenario="gfor").verdict
+    'stable'
     """
     case = device if network is None else network
     given = plain(values)

@@ -20,9 +20,10 @@ MODULES = (
         "identification",
         "linear",
         "models",
+        "nyquist",
         "results",
     ),
-    *("scenario", "screening", "sensitivities", "sweep"),
+    *("scenario", "screening", "sensitivities", "siting", "source", "sweep"),
 )
 
 

@@ -230,8 +230,12 @@ def test_opening_the_only_way_to_a_bus_is_an_island(prepared):
     assert "no way leads to the slack bus 'b1' from: 'b3'; close l23, l31, connect them" in problem
 
 
-def test_the_slack_cannot_be_open(prepared):
-    assert "no unit is connected at the slack bus 'b1'" in the_problem(prepared, "", {"sg.connected": False})
+def test_what_the_slack_feeds_is_shared_when_it_is_open(prepared):
+    """Here it is too much for the other unit, unless the case leaves it to whoever is the slack then."""
+    off, text = {"sg.connected": False}, RING.replace("[power_flow]\n", '[power_flow]\nsharing = "slack"\n')
+    assert "vsc would need 127 % of its 555 MW" in the_problem(prepared, "", off)
+    alone = prepared("", off, text).power_flow.powers["vsc"] * 500
+    assert 700 < alone.real < 720  # the loads, and what the lines lose
 
 
 def test_a_power_flow_without_solution_names_the_branch(prepared):

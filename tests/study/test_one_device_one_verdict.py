@@ -131,7 +131,7 @@ def test_a_limit_that_is_exceeded_in_a_dip_alone_is_found_in_a_run(typed, i_max,
     assert bool(told) is found
     for finding in told:
         assert finding["time"] > 0.5
-        assert 1.2 < finding["current"] < 1.6
+        assert 1.2 < finding["mean"] < 1.6
         assert "above its current limit" in finding["message"]
         assert "; 1.05 pu is declared; " in finding["message"]
 

@@ -256,14 +256,17 @@ def test_the_weight_is_that_of_the_case_that_says_so(questions, tmp_path, gfor):
 def test_a_unit_that_is_out_is_not_asked_to_start(questions, tmp_path, gfor, switch):
     questions()
     lighter = ["--set", "grid.load_9.P=700"]
-    code, out, err = gfor("modes", tmp_path / "case.toml", *lighter, "--set", f"{switch}=false", "--json")
+    code, out, err = gfor(
+        "modes", tmp_path / "case.toml", *lighter, "--set", f"{switch}=false", "--sharing", "slack", "--json"
+    )
     assert code == 0, err
     assert json.loads(out)["scenarios"][0]["stable"] is True
     assert "3 machines" in json.loads(out)["facts"]
     back = '[[events]]\ntype = "unit_reconnection"\ntime = "1 s"\nunit = "sg4"\n'
     (tmp_path / "case.toml").write_text(CASE + back)
     values = {"grid.load_9.P": 700.0, switch: False}
-    for text, least in ((CASE, -0.1), (CASE + back, 0.0)):  # of a unit that comes back, the limit stays
+    alone = CASE.replace("[power_flow]\n", '[power_flow]\nsharing = "slack"\n')
+    for text, least in ((alone, -0.1), (alone + back, 0.0)):  # of a unit that comes back, the limit stays
         (tmp_path / "case.toml").write_text(text)
         (prepared,) = load_case(tmp_path / "case.toml").prepare((), values)
         assert prepared.system.components["sg4"].value("governor.V_MIN") == least
