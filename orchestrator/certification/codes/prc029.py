@@ -23,8 +23,8 @@ def _ridden_through(last: int) -> tuple[Judge, ...]:
 def _step(level: float, lasts: float) -> CodeRow:
     kind = "dip" if level < 1 else "swell"
     return CodeRow(
-        f"{kind}_{round(100 * level)}", f"The source goes to {level:g} pu for {lasts:g} s, full power", "R1, table 1",
-        lambda f: voltage(STRENGTH, 1.0, ((0.0, level), (lasts, 1.0)), 1.0 + lasts + 5.0), _ridden_through(-1),
+        f"{kind}_{round(100 * level)}", f"The source goes to {level:g} pu for {lasts:g} s, half power", "R1, table 1",
+        lambda f: voltage(STRENGTH, 0.5, ((0.0, level), (lasts, 1.0)), 1.0 + lasts + 5.0), _ridden_through(-1),
     )  # fmt: skip
 
 
@@ -37,8 +37,8 @@ PRC029 = GridCode(
     rows=(
         *(_step(level, lasts) for level, lasts in DIPS),
         _step(*SWELL),
-        CodeRow("dips_in_10_s", "0.2 pu for 0.16 s twice within 10 s: 0.32 s in all", "R1, cumulative times",
-                lambda f: voltage(STRENGTH, 1.0, ((0.0, 0.2), (0.16, 1.0), (3.0, 0.2), (3.16, 1.0)), 9.0),
+        CodeRow("dips_in_10_s", "0.2 pu for 0.16 s twice in 10 s, half power", "R1, cumulative times",
+                lambda f: voltage(STRENGTH, 0.5, ((0.0, 0.2), (0.16, 1.0), (3.0, 0.2), (3.16, 1.0)), 9.0),
                 _ridden_through(-1)),
         CodeRow("rocof", "60 → 58.9 → 60 → 61.1 → 60 Hz at 5 Hz/s, half power", "R3, rate of change of frequency",
                 partial(ramps, STRENGTH, 0.5, rate=5.0, steps=(-1.1, 1.1, 1.1, -1.1)),
@@ -58,6 +58,8 @@ PRC029 = GridCode(
         "current moves the voltage that it sees",
         "the voltage of a band is 0.05 pu within it, that of the lowest band 0.2 pu",
         "the power is back where it is within 5 % of the rating 1 s after the last step, for good",
+        "half power, as in other codes' rows; at full power a converter that keeps its power reference in a dip of "
+        "seconds is beyond its current limit, and slips",
         "a jump of 25° is the largest that is not excepted",
         "riding through is all that is asked: a grid-following converter can meet every row",
     ),

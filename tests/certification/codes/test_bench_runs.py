@@ -133,6 +133,19 @@ def test_a_converter_without_damping_does_not_settle(converter, tmp_path):
     assert "settles" in [finding.criterion for finding in row.failed]
 
 
+@pytest.mark.parametrize(
+    ("values", "rows", "accepted"),
+    [({"droop.R_f": 0.01}, ("dip_20", "dips_in_10_s", "rocof"), [True, True, False]),
+     ({}, ("dip_20", "dip_45", "rocof", "phase_jumps"), [False, True, True, False]),
+     ({"current_limit.kind": 2.0}, ("dip_65", "phase_jumps"), [False, True])],
+)  # fmt: skip
+def test_rows_of_ride_through_tell_settings_apart(converter, tmp_path, values, rows, accepted):
+    """A weak droop keeps its angle in a dip and slips on a ramp; which limit of the current holds, the row decides."""
+    request = CertificationRequest(converter, None, values)
+    found = certify_code(request, CODES["prc029"], Serial(), tmp_path, rows).verdicts
+    assert [(v.row.name, v.accepted) for v in found] == list(zip(rows, accepted, strict=True))
+
+
 @pytest.mark.parametrize(("code", "row"), [("aemo", "jump_10"), ("fingrid", "jumps")])
 def test_a_grid_following_converter_does_not_oppose_jumps(tmp_path, code, row):
     """It rides through them, settles and returns; nothing else tells it from a grid-forming one."""
