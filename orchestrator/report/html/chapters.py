@@ -223,14 +223,15 @@ def sections(chapter: Chapter, number: int) -> str:
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
-    """Question, answer, how sure, and what was not judged, of all chapters."""
+    """Question and where its results lie, answer, how sure, and what was not judged, of all chapters."""
     rows = []
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
         open_ = "<br>".join(escape(_short(text)) for text in one.not_judged[:_OPEN]) or "nothing that is known of"
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
-        rows.append([escape(one.question), answer, escape(_short(one.sure, 3 * _LONGEST)), open_ + more])
+        asked = f'{escape(one.question)}<br><span class="soft">{escape(str(one.source))}</span>'
+        rows.append([asked, answer, escape(_short(one.sure, 3 * _LONGEST)), open_ + more])
     return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
 
 
