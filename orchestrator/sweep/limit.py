@@ -14,10 +14,12 @@ import numpy as np
 
 from orchestrator.analysis.modes import Mode, damping_percent, make_mode
 from orchestrator.errors import ErrorKind
+from orchestrator.report.tables import short
 from orchestrator.sweep.point import PointRecord
 
 COARSE = 9  # values of the coarse grid where none are asked for
 HALVINGS = 8  # of the stretch between two values of the grid
+_LONGEST = 150  # characters of a failure that a sentence shows
 _PARTS = 3  # components that are named where nothing swings against something
 _SAME = 0.02  # the growing mode is one of those in the range where both differ by less than this part of its size
 _NO_POINT = {ErrorKind.POWER_FLOW, ErrorKind.START, ErrorKind.STEADY_STATE, ErrorKind.ISLANDING}
@@ -120,7 +122,7 @@ class ParameterLimit:
         start, stop = (self._value(self.tried[k]["value"]) for k in (0, -1))
         mode, why = (
             f": {self._mode(self.mode)}" if self.mode else "",
-            f": {self.why.split('. ')[0]}" if self.why else "",
+            f": {short(self.why, _LONGEST)}" if self.why else "",
         )
         at, holding = self._value(self.beyond), self.until.holding
         if self.kind is Ending.HOLDS:
