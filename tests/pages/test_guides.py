@@ -14,7 +14,7 @@ from tests.pages.markdown import ROOT, blocks
 DOCS = ROOT / ".docs"
 IN_A_CHECKOUT = ("how-to/add-an-exciter", "how-to/add-an-acceptance-check", "how-to/add-a-study")
 HEAVY = ("how-to/use-your-own-fmu", "how-to/black-box", "how-to/write-a-controller-dll", "how-to/several-vendors")
-"""Executed by night; their commands are also typed by `test_typed.py`."""
+"""Executed by night."""
 
 ANYWHERE = (
     "first-steps",

@@ -17,9 +17,9 @@ import pytest
 
 from orchestrator.cli import COMMANDS, EXAMPLES
 from tests.pages.markdown import blocks, commands, name_of, pages
-from tests.pages.test_guides import ANYWHERE, IN_A_CHECKOUT
+from tests.pages.test_guides import ANYWHERE, HEAVY, IN_A_CHECKOUT
 
-FOLLOWED = {f".docs/{guide}.md" for guide in (*ANYWHERE, *IN_A_CHECKOUT)}
+FOLLOWED = {f".docs/{guide}.md" for guide in (*ANYWHERE, *HEAVY, *IN_A_CHECKOUT)}
 TABLE = tomllib.loads(Path(__file__).with_name("typed.toml").read_text(encoding="utf-8"))
 NOT_TYPED: dict[str, str] = TABLE["not_typed"]
 SHORTER: dict[str, str] = TABLE["shorter"]
