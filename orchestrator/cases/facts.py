@@ -61,7 +61,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
     return Facts(
         (*sources, *dyr),
-        next((plan.number("f_n") for plan in plans.values() if "f_n" in plan.description.variables), None),
+        rated_frequency(prepared),
         len(network.buses),
         len(machines),
         len(feeding) - len(machines),
@@ -70,6 +70,12 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
         tuple((n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n")) for n in at_slack),
         (min(magnitudes), max(magnitudes)),
     )
+
+
+def rated_frequency(prepared: PreparedScenario) -> float | None:
+    """Of all components, which have one in common [Hz]; None where none has one."""
+    plans = prepared.system.components.values()
+    return next((plan.number("f_n") for plan in plans if "f_n" in plan.description.variables), None)
 
 
 def files_of(table: NetworkTable) -> tuple[str, ...]:

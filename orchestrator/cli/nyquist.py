@@ -2,7 +2,6 @@
 
 import argparse
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
@@ -11,17 +10,8 @@ from rich.markup import escape
 from orchestrator.api.nyquist import network_of
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cli.arguments import (
-    add_json_argument,
-    assignment,
-    option,
-    quantity,
-    repeatable,
-    seconds,
-    setting,
-    switch,
-)  # fmt: skip
-from orchestrator.cli.terminal import make_console, make_errors, said_stages
+from orchestrator.cli.arguments import add_json_argument, option, quantity, repeatable, seconds, setting, switch
+from orchestrator.cli.terminal import make_console, print_json, said_stages, say
 from orchestrator.cli.verdict import NOT_MET
 from orchestrator.errors import InputError
 from orchestrator.immittance.margins import Margin
@@ -32,7 +22,6 @@ from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder, write_text
 
 _SIDES = ("device", "network")
-_Named = tuple[str, bool | float | str]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,9 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--bus", "B", "cut a case between the devices of this bus and all else")
     repeatable(parser, "--component", "NAME", "cut a case at this component (repeatable)")
     option(parser, "--scenario", "NAME", "of a case (default: its first)")
-    repeatable(
-        parser, "--set", "NAME=VALUE", "a value of the FMU, or COMPONENT.PARAMETER=VALUE of the case (repeatable)"
-    )
+    repeatable(parser, "--set", "NAME=VALUE", "a value of the FMU, or COMPONENT.PARAMETER=VALUE of the case "
+               "(repeatable)", read=setting)  # fmt: skip
     option(parser, "--binding", "vendor.toml", "maps the FMU's variables to our port", read=Path)
     option(parser, "--step", "H", "communication step of a scan (100 us)", read=seconds, default=1e-4)
     option(parser, "--from-hz", "F", "lowest frequency of a scan (0.05)", read=quantity("Hz"), default=0.05)
@@ -68,12 +56,11 @@ def run(options: argparse.Namespace) -> int:
     folder = made_folder(options.out or Path("results") / f"nyquist_{Path(options.device).stem}", "--out")
     with said_stages() as report:
         result = study_cut(request, report)
-    for question in result.questions:
-        make_errors().print(f"[bold yellow]question:[/bold yellow] {escape(question)}")
+    say("question", result.questions)
     with staged(folder, new_run_id()) as staging:
         _save(result, staging)
     if options.json:
-        print(json.dumps(result.as_json(), indent=1))
+        print_json(result.as_json())
     else:
         _say(make_console(), result, folder)
     return NOT_MET if options.fail_unstable and result.verdict != "stable" else 0
@@ -84,33 +71,20 @@ def _request(options: argparse.Namespace) -> CutRequest:
     if network is None and Path(device).suffix.lower() in (*ENDINGS, ".fmu", ".so", ".dll"):
         raise InputError(f"{device}: give its network as well: a scan, or a case with --bus or --component")
     case = device if network is None else network
-    of_fmu: list[str] = []
-    of_case: list[str] = []
+    given = dict(options.set)
     other: Path | PreparedScenario
-    for text in options.set:
-        (of_case if network is None or "." in text.partition("=")[0] else of_fmu).append(text)
     if Path(case).suffix.lower() in ENDINGS:
-        (of_fmu, of_case), other = ([*of_fmu, *of_case], []), Path(case)
+        of_fmu, other = given, Path(case)
     else:
-        other = network_of(
-            case, options.scenario, dict(map(_typed(assignment), of_case)), trust_fmus=options.trust_fmus
-        )
+        of_case = {name: value for name, value in given.items() if network is None or "." in name}
+        of_fmu = {name: value for name, value in given.items() if name not in of_case}
+        other = network_of(case, options.scenario, of_case, trust_fmus=options.trust_fmus)
     return CutRequest(
         Path(device) if network is not None else None, other, options.frequency, options.compensation, options.angle,
         options.bus, tuple(options.component), options.voltage, frozenset(options.generator),
-        frozenset(options.per_unit), options.units_checked, dict(map(_typed(setting), of_fmu)), options.binding,
+        frozenset(options.per_unit), options.units_checked, of_fmu, options.binding,
         options.step, Excitation(lowest_hz=options.from_hz, highest_hz=options.to_hz, lines=160),
     )  # fmt: skip
-
-
-def _typed(kind: Callable[[str], _Named]) -> Callable[[str], _Named]:
-    def read(text: str) -> _Named:
-        try:
-            return kind(text)
-        except argparse.ArgumentTypeError as error:
-            raise InputError(f"--set {error}") from error
-
-    return read
 
 
 def _share(text: str) -> float:
@@ -119,7 +93,7 @@ def _share(text: str) -> float:
     except ValueError:
         value = -1.0
     if not 0 <= value < 100 or (0 < value < 1 and "%" not in text):
-        raise argparse.ArgumentTypeError(f"{text!r} is no share in percent from 0 to below 100, such as '32 %'")
+        raise ValueError(f"{text!r} is no share in percent from 0 to below 100, such as '32 %'")
     return value / 100
 
 

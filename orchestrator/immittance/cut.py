@@ -10,6 +10,7 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous
 from orchestrator.analysis.stability import judge
 from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.cases.facts import rated_frequency
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
@@ -31,7 +32,7 @@ class Cut:
     # voltages, currents: at the operating point, by device; currents out of it.
     voltages: dict[str, complex]
     currents: dict[str, complex]
-    rated_hz: float
+    rated_hz: float | None  # None where no component has one
     warnings: tuple[str, ...]
 
 
@@ -49,8 +50,7 @@ def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) 
         fed = {str(c.target): str(c.source) for c in master.system.connections}
         voltages = {d: complex(*(values[fed[f"{d}.{v}"]] for v in _PORT[0])) for d in devices}
         currents = {d: complex(*(values[f"{d}.{i}"] for i in _PORT[1])) for d in devices}
-        rated = float(prepared.case.table.network.frequency or 50.0) if prepared.case.table.network else 50.0
-    return Cut(devices, device, network, stability.stable, voltages, currents, rated, (*said,))
+    return Cut(devices, device, network, stability.stable, voltages, currents, rated_frequency(prepared), said)
 
 
 def buses_of(master: Master) -> dict[str, str]:
@@ -65,6 +65,11 @@ def buses_of(master: Master) -> dict[str, str]:
 
 def _devices(master: Master, bus: str | None, names: tuple[str, ...]) -> tuple[str, ...]:
     homes = buses_of(master)
+    if not homes:
+        raise InputError(
+            "the case has no device that takes a voltage (v_re, v_im) and gives a current (i_re, i_im); phasor models "
+            "have another port: cut its EMT models, such as by --set models=emt"
+        )
     if unknown := [name for name in names if name not in homes]:
         raise InputError(
             f"--component {unknown[0]}: it is no device with a voltage and a current; there are: {', '.join(homes)}"

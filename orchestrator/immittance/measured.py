@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Complex, Vector
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit, require_fitting
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
 from orchestrator.black_box.port import check_port, start_of, values_for
-from orchestrator.immittance.scan import PER_UNIT, SYSTEM_MVA, PortPoint, Scan
+from orchestrator.immittance.scan import PER_UNIT, PortPoint, Scan
 
 
 def scan_fmu(
@@ -45,7 +46,7 @@ def as_scan(name: str, response: FrequencyResponse, voltage: complex, kilovolt: 
     values = -_without_hold(model, 2j * np.pi * frequencies)
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
     bounds = np.linalg.norm(response.bounds, axis=(1, 2)) / np.linalg.norm(response.values, ord=2, axis=(1, 2))
-    power = voltage * complex(*response.operating_point).conjugate() * SYSTEM_MVA
+    power = voltage * complex(*response.operating_point).conjugate() * SYSTEM_BASE_MVA
     point = PortPoint(abs(voltage) * kilovolt, power.real, power.imag, angle=0.0)  # in the network's frame already
     share = np.interp(frequencies, measured, bounds) + model.error
     return Scan(name, frequencies, values, (name,), PER_UNIT, share * size, {name: point})

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Complex, Numbers, Vector
 from orchestrator.errors import InputError
 
 SIEMENS, PER_UNIT = "S", "pu"
-SYSTEM_MVA = 100.0
 _TOP = 5.0  # frequencies down to this part of the highest tell signs: there a device's filter answers, not its control
 _ACTIVE = 0.5
 """Part of those frequencies at which both resistances must be negative for the sign to be called the generator's."""
@@ -68,7 +68,7 @@ class Scan:
 
     def in_siemens(self, kilovolt: float) -> "Scan":
         """A scan in per unit of the system base at a rated voltage."""
-        return self.scaled(SYSTEM_MVA / kilovolt**2, SIEMENS)
+        return self.scaled(SYSTEM_BASE_MVA / kilovolt**2, SIEMENS)
 
     def turned_sign(self) -> "Scan":
         """The same with currents counted the other way."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
@@ -15,7 +16,7 @@ from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judg
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.margins import Margin
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.scan import PER_UNIT, SIEMENS, SYSTEM_MVA, PortPoint, Scan, check_sign
+from orchestrator.immittance.scan import PER_UNIT, SIEMENS, PortPoint, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
 
@@ -127,8 +128,7 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     cut = None
     if isinstance(request.network, PreparedScenario):
         cut = cut_of(request.network, request.bus, request.components)
-        if cut.rated_hz != request.frequency:
-            request = replace(request, frequency=cut.rated_hz)
+        request = replace(request, frequency=cut.rated_hz or request.frequency)
     scans: dict[str, Scan] = {}
     if request.device is not None:
         if cut is not None and len(cut.devices) > 1:
@@ -189,7 +189,7 @@ def _in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:
             f"{scan.source} is in {scan.unit} and the other side in {unit}: give the rated voltage at the cut, as in "
             "--voltage '230 kV' (the base is 100 MVA)"
         )
-    return scan.in_siemens(kilovolt) if unit == SIEMENS else scan.scaled(kilovolt**2 / SYSTEM_MVA, unit)
+    return scan.in_siemens(kilovolt) if unit == SIEMENS else scan.scaled(kilovolt**2 / SYSTEM_BASE_MVA, unit)
 
 
 def _in_one_frame(request: CutRequest, scans: dict[str, Scan], cut: Cut | None) -> bool:
@@ -252,7 +252,7 @@ def _check_point(what: str, a: PortPoint, other: str, b: PortPoint) -> None:
 def _check_place(scan: Scan, cut: Cut, kilovolt: float | None) -> None:
     """Refuse a scan at another operating point than the case's."""
     (name,) = cut.devices
-    power = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_MVA
+    power = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_BASE_MVA
     here = PortPoint(abs(cut.voltages[name]) * kilovolt if kilovolt else None, power.real, power.imag)
     for point in scan.points.values():
         _check_point(scan.source, point, f"{name} in the case", here)

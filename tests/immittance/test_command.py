@@ -46,6 +46,13 @@ def test_an_unstable_plant_is_said_on_the_first_line_and_by_the_exit_code(tmp_pa
     assert capsys.readouterr().out.startswith("unstable: −1 is encircled")
 
 
+def test_a_setting_of_another_form_is_told_at_its_option(tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["nyquist", "two_area", "--component", "gfor", "--set", "nonsense", "--out", str(tmp_path)])
+    assert ended.value.code == 2
+    assert "'nonsense' is not of the form variable=value" in " ".join(capsys.readouterr().err.split())
+
+
 def test_python_gives_what_the_command_prints(tmp_path):
     given = files(tmp_path)
     found = gfor.nyquist(*given, compensation=10)

@@ -65,3 +65,16 @@ def test_what_is_no_device_and_no_bus_is_refused():
         cut_of(prepared, None, ("grid",))
     with pytest.raises(InputError, match="--bus nowhere: no device stands there"):
         cut_of(prepared, "nowhere", ())
+
+
+def test_the_rated_frequency_is_that_of_the_components_and_not_50_hz():
+    case = gfor.load("infinite_bus")
+    values = {f"{name}.f_n": 60.0 for name, plan in case.scenario("load_step").prepared.system.components.items()
+              if "f_n" in plan.description.variables}  # fmt: skip
+    assert cut_of(case.scenario("load_step", values).prepared, None, ()).rated_hz == 60
+    assert cut_of(case.scenario("load_step").prepared, None, ()).rated_hz == 50
+
+
+def test_a_case_of_phasor_models_is_refused_with_the_way_out():
+    with pytest.raises(InputError, match="phasor models have another port: cut its EMT models"):
+        cut_of(gfor.load("two_area_rms").scenario("gfor").prepared, None, ())
