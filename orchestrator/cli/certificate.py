@@ -32,7 +32,7 @@ from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.executors import choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_console, make_errors, said_stages
+from orchestrator.cli.terminal import make_console, make_errors, print_json, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.points.executor import Executor
@@ -67,7 +67,7 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
         beside = {"sensitivities": find_needs(options, found, folder, console)}
     if options.json:
         content = json.loads((folder / JSON).read_text(encoding="utf-8"))
-        print(json.dumps(content | beside, indent=1, ensure_ascii=False))
+        print_json(content | beside)
     return exit_code(found.verdict, refused=found.refused)
 
 
@@ -142,7 +142,7 @@ def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     with held(folder):
         figures, files = measured_figures(device, folder)
     if options.json:
-        print(json.dumps(figures, indent=1, ensure_ascii=False))
+        print_json(figures)
         return 0
     for line in stiffness_in_words(figures):
         console.print(escape(line), highlight=False)

@@ -1,7 +1,6 @@
 """``gfor certify`` with several devices or all codes: a certificate for each pair, and one matrix of them."""
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +19,7 @@ from orchestrator.certification.matrix_record import READING, in_words, matrix_j
 from orchestrator.cli.certificate import ALL, GB, NTS631, certified, check_code_options, codes_of, measured_figures
 from orchestrator.cli.certificate_screen import show
 from orchestrator.cli.certify_sensitivities import find_needs
-from orchestrator.cli.terminal import make_console, make_errors
+from orchestrator.cli.terminal import make_console, make_errors, print_json
 from orchestrator.errors import InputError
 from orchestrator.points.failure import Failure, failure_kept
 from orchestrator.report.tables import PlainTable, make_table
@@ -62,7 +61,7 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     for lost in (cell for cell in cells.values() if cell.failure is not None):
         make_errors().print(f"[yellow]not tested:[/] {escape(f'{lost.device}, {lost.code}: {lost.failure}')}")
     if options.json:
-        print(json.dumps(matrix_json(matrix, devices), indent=1, ensure_ascii=False))
+        print_json(matrix_json(matrix, devices))
     else:
         console.print(matrix_table(matrix), "")
         console.print(READING, soft_wrap=True, highlight=False)

@@ -9,7 +9,7 @@ from orchestrator.asked import read_positive
 from orchestrator.cases.short_circuit import CONVENTION, weakest_first
 from orchestrator.cli.arguments import add_json_argument, option
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.cli.terminal import make_console
+from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.report.tables import make_table
 
 
@@ -28,8 +28,7 @@ def run(options: argparse.Namespace) -> int:
     found = {s: weakest_first(s.strengths(options.converter_current, options.rating)) for s in chosen(options)}
     if options.json:
         told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]
-        print(json.dumps({"case": next(iter(found)).prepared.case.name, "convention": convention, "scenarios": told},
-                         indent=1, ensure_ascii=False))  # fmt: skip
+        print_json({"case": next(iter(found)).prepared.case.name, "convention": convention, "scenarios": told})
         return 0
     alike: dict[str, list[str]] = {}
     for scenario, buses in found.items():

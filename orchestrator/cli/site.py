@@ -1,7 +1,6 @@
 """``gfor site``: where a converter helps, from options to files and words."""
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.markup import escape
@@ -13,7 +12,7 @@ from orchestrator.asked import read_range
 from orchestrator.cases.case import load_case
 from orchestrator.cli.arguments import Joined
 from orchestrator.cli.case_arguments import add_case_arguments, parameters, values_set
-from orchestrator.cli.terminal import make_console, print_questions, warn
+from orchestrator.cli.terminal import make_console, print_json, print_questions, warn
 from orchestrator.cli.verdict import NOT_MET
 from orchestrator.errors import InputError
 from orchestrator.safe_files import made_folder
@@ -56,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     print_questions([prepared], as_json=options.json)
     written = found.save(folder) if folder else []
     if options.json:
-        print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
+        print_json(found.as_json())
         return 0 if found.agrees else NOT_MET
     console = make_console()
     for text in (found.answer, *found.remarks):

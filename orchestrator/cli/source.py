@@ -1,7 +1,6 @@
 """``gfor source``: where the oscillations of a run or a recording come from."""
 
 import argparse
-import json
 from pathlib import Path
 
 from rich.markup import escape
@@ -9,7 +8,7 @@ from rich.markup import escape
 from orchestrator.api.source import source
 from orchestrator.api.sources import Sources, contest_sources
 from orchestrator.cli.arguments import seconds, seconds_or_none
-from orchestrator.cli.terminal import make_console, saying_warnings
+from orchestrator.cli.terminal import make_console, print_json, saying_warnings
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
 from orchestrator.oscillations.verdict import Located
@@ -42,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
             found = [source(options.run, options.start, options.stop)]
     if options.json:
         records = [one.as_json() for one in found]
-        print(json.dumps(records if options.contest else records[0], indent=1, ensure_ascii=False))
+        print_json(records if options.contest else records[0])
         return 0
     _print(found, details=options.details)
     return 0

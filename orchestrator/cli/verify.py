@@ -1,7 +1,6 @@
 """``gfor verify``: whether a certificate still holds."""
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verification, read_certificate, verify_files
 from orchestrator.cli.arguments import reactances
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
-from orchestrator.cli.terminal import make_console
+from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import INTERRUPTED, InputError
 from orchestrator.report.progress import progress_bar
 
@@ -59,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
         said = {"holds": found.holds, "verdict": content["verdict"], **({"points": content["judged"]} if norm else {}),
                 "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
                 "agreed": found.agreed, "computed": chosen if computed else []}  # fmt: skip
-        print(json.dumps(said, indent=1, ensure_ascii=False))
+        print_json(said)
     else:
         _show(found, content, chosen, console, computed=computed, norm=norm)
     return exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
