@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -64,11 +65,15 @@ def finished(tmp, *words):
 
 
 def values_of(folder):
-    """Every file of a run without the figures of its speed and the run's id."""
+    """Every file of a run without the figures of its speed and the run's id.
+
+    A kill after the last file leaves the lock and checkpoints that were being removed, under hidden names: the next
+    start removes them (`test_a_kill_while_the_checkpoints_go_leaves_whole_results`).
+    """
     found = {}
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
-        if path.is_dir() or path.name == "manifest.json":
+        if path.is_dir() or path.name == "manifest.json" or name == ".lock" or DONE_WITH.match(name):
             continue
         if path.suffix == ".nc":
             with xr.open_dataset(path) as data:
@@ -84,6 +89,7 @@ def values_of(folder):
     return found
 
 
+DONE_WITH = re.compile(r"\.part-[^/]+\.done-with/")
 WORDS = ("--scenario", "gfor", "--scenario", "pod_pq")
 
 
@@ -241,6 +247,24 @@ def test_what_a_kill_left_before_the_first_rows_goes_with_the_next_start(gfor, t
     _, _, error = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", "0.1", "--out", tmp_path)
     assert "that did not end, or still go on: dip.part-20260101T000002-0;" in error
     assert [path.name for path in tmp_path.glob("*.part-*")] == ["dip.part-20260101T000002-0"]
+
+
+@pytest.mark.slow
+def test_a_kill_while_the_checkpoints_go_leaves_whole_results(tmp_path):
+    words = ("infinite_bus", "--scenario", "dip", "--stop", "0.1")
+    finished(tmp_path / "tmp", *words, "--out", tmp_path / "whole")
+    out = tmp_path / "out"
+    process = started(tmp_path / "tmp", *words, "--out", out)
+    kept = out / ".checkpoints"
+    while not kept.exists() and process.poll() is None:
+        time.sleep(0.001)
+    while kept.exists() and process.poll() is None:
+        pass
+    process.kill()
+    process.communicate(timeout=120)
+    assert values_of(out) == values_of(tmp_path / "whole")
+    finished(tmp_path / "tmp", *words, "--out", out)
+    assert [path.name for path in out.iterdir() if path.name.startswith(".")] == []
 
 
 def test_results_that_a_kill_left_half_written_give_way(tmp_path):
