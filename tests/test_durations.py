@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.durations import LIST, LONGEST, Measure, mark, read_list
+from tests.support.durations import LIST, LONGEST, NIGHTLY, Measure, mark, read_list
 
 
 class Item:
@@ -41,3 +41,11 @@ def test_a_test_is_measured(tmp_path):
     ((test, seconds),) = read_list(tmp_path / "seconds").items()
     assert test == "tests/a.py::test[a b]"
     assert 0.01 <= seconds < 10
+
+
+def test_what_runs_by_night_is_there_and_is_none_of_the_papers_tables():
+    root = NIGHTLY.parents[1]
+    for line in NIGHTLY.read_text(encoding="utf-8").splitlines():
+        file, _, name = line.partition("::")
+        assert f"def {name.partition('[')[0]}(" in (root / file).read_text(encoding="utf-8") or not name, line
+        assert "papers" not in name

@@ -13,6 +13,11 @@ import pytest
 LIST = Path(__file__).parents[1] / "slow_tests.txt"
 """A line is ``SECONDS TEST``: seconds of processor, and what pytest calls the test."""
 
+NIGHTLY = Path(__file__).parents[1] / "nightly_tests.txt"
+"""How the names begin of tests that `.ci/nightly` runs: other published systems, long searches, and the second and
+third of rows that differ in a setting. The paper's tables are not among them.
+"""
+
 LONGEST = 0.6
 """Seconds of processor from which on a test stands on the list."""
 
@@ -28,8 +33,11 @@ def read_list(path: Path = LIST) -> dict[str, float]:
 
 def mark(items: list[pytest.Item]) -> None:
     """Mark as slow what is on the list; the paper's tables are among the quick ones whatever they take."""
-    listed = read_list()
+    listed, nightly = read_list(), tuple(NIGHTLY.read_text(encoding="utf-8").split("\n")[:-1])
     for item in items:
+        if item.nodeid.startswith(nightly):
+            item.add_marker("nightly")
+            item.add_marker("slow")
         if item.nodeid in listed and not item.get_closest_marker("quick"):
             item.add_marker("slow")
 
