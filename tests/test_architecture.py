@@ -177,7 +177,7 @@ def test_plain_data_are_read_without_casadi(name):
 
 FOR_TYPES = {"api.results", "cli.terminal", "coupling.observers", "report.plot_style", "results.recording",
              "results.room", "results.storage"}  # fmt: skip
-"""Imported by `gfor compare` and `gfor verify`, which start without what computes; `imports` counts these arrows."""
+"""Imported by `signal compare` and `gfor verify`, which start without what computes; `imports` counts these arrows."""
 
 
 def test_only_libraries_that_come_late_are_imported_for_type_checkers_alone():

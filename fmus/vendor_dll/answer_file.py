@@ -3,7 +3,7 @@
 The DLL's code runs in that process and can write the file as well. So it is taken for what the DLL says of itself: read
 as a plain file of bounded size, of the form that was asked for, with no character that XML or a terminal takes for more
 than text. An answer of the DLL's own making that has this form says no more than its Model_GetInfo could have said; and
-how it keeps its state is tried again by `gfor check`.
+how it keeps its state is tried again by `gfor fmu check`.
 """
 
 import json

@@ -147,7 +147,7 @@ def check_fmu(
         known = ", ".join([*FILE_CHECKS, *CHECKS])
         raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
     if "binding" in only and binding is None:
-        raise InputError("the check 'binding' needs a binding; give one with --binding (`gfor bind` drafts one)")
+        raise InputError("the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)")
     if fmu.is_dir():
         raise InputError(f"{fmu}: it is a folder; give the path of an .fmu")
     if not fmu.is_file():

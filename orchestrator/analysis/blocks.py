@@ -252,7 +252,7 @@ def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
         if component not in found or variable not in master.components[component].description.variables:
             known = [f"{name}.{own}" for name, one in master.components.items() for own in one.description.variables]
             near = difflib.get_close_matches(full, known, 3)
-            hint = f"did you mean {' or '.join(near)}?" if near else "`gfor info` lists the variables of an FMU"
+            hint = f"did you mean {' or '.join(near)}?" if near else "`gfor fmu info` lists the variables of an FMU"
             raise InputError(f"linear model: there is no variable {full!r}; {hint}")
         found[component].append(variable)
     return found

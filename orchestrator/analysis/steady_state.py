@@ -101,7 +101,7 @@ def what_to_check(master: Master) -> str:
         late = "; ".join(late.text for late in master.late_starts.values())
         return (
             f"{late}. Its partners started from the first value: have the FMU compute its outputs in initialisation "
-            "mode (`gfor check --only initial_outputs` shows it alone)"
+            "mode (`gfor fmu check --only initial_outputs` shows it alone)"
         )
     if misfits := sentences(misfits_of(master)):
         return "; ".join(misfits)

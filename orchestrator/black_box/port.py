@@ -16,7 +16,7 @@ def values_for(description: FmuDescription, given: Mapping[str, Any]) -> dict[st
     for name, value in given.items():
         info = description.variables.get(name)
         if info is None:
-            raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor info` lists them")
+            raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor fmu info` lists them")
         try:
             values[name] = convert(info, value)
             check_system_base(description, name, values[name])

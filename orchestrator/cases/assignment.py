@@ -94,7 +94,7 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
     if info is None:
         if draft.is_repeated(name, variable):
             return
-        hint = close_names(variable, _settable(draft, name), f"`gfor info {plan.description.path}` lists them")
+        hint = close_names(variable, _settable(draft, name), f"`gfor fmu info {plan.description.path}` lists them")
         draft.note(where, f"component {name!r} has no variable {variable!r}; {hint}")
         return
     if info.causality not in ("parameter", "input"):

@@ -52,7 +52,8 @@ def _check_meant(draft: Draft) -> None:
         here = (v for p in plans for v in p.description.variables)
         if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
             draft.note(
-                draft.place("meant"), f"{pattern!r}: {component} has no variable {variable!r}; `gfor info` lists them"
+                draft.place("meant"),
+                f"{pattern!r}: {component} has no variable {variable!r}; `gfor fmu info` lists them",
             )
 
 

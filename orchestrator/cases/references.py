@@ -40,7 +40,7 @@ def _holds(draft: Draft, key: str, wanted: Value, imperfections: Mapping[str, fl
     info = plan.description.variables.get(variable)
     if info is None:
         if draft.tables[name].file is None:
-            hint = close_names(variable, plan.description.parameters, "`gfor info` lists the variables")
+            hint = close_names(variable, plan.description.parameters, "`gfor fmu info` lists the variables")
             draft.note(place, f"component {name!r} has no variable {variable!r}; {hint}")
         return False  # the FMU of somebody else may lack what the catalogue's model has
     try:

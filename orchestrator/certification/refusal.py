@@ -46,7 +46,7 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
         problems.append(Problem(place, text))
     if request.binding is None and any(p.place.startswith(f"components.{CONVERTER}") for p in problems):
         problems.append(
-            Problem("", f"if its port has other names, give --binding; `gfor bind {request.fmu}` drafts one")
+            Problem("", f"if its port has other names, give --binding; `gfor fmu bind {request.fmu}` drafts one")
         )
     return CaseError(f"{request.fmu}, {where}", tuple(dict.fromkeys(problems)))
 

@@ -94,8 +94,8 @@ def _where(bad: list[PointVerdict]) -> str:
 
 def _acceptance_line(c: Certification) -> str:
     if c.acceptance is None:
-        return "Acceptance tests of the FMU (gfor check): not run"
-    return f"Acceptance tests of the FMU (gfor check): {'no check failed' if c.acceptance.trusted else 'FAILED'}"
+        return "Acceptance tests of the FMU (gfor fmu check): not run"
+    return f"Acceptance tests of the FMU (gfor fmu check): {'no check failed' if c.acceptance.trusted else 'FAILED'}"
 
 
 def _least_and_growth(c: Certification) -> Iterator[str]:

@@ -102,7 +102,7 @@ def binding(c: Certification, hashes: Hashes) -> str:
 
 
 def acceptance(c: Certification) -> str:
-    """The results of `gfor check`."""
+    """The results of `gfor fmu check`."""
     if c.acceptance is None:
         return "<p>They were not run (--no-check).</p>"
     marks = {"fail": "bad", "pass": "good"}
@@ -112,7 +112,7 @@ def acceptance(c: Certification) -> str:
     ]  # fmt: skip
     said = "No check failed." if c.acceptance.trusted else f"FAILED: {', '.join(c.acceptance.faults)}."
     style = "good" if c.acceptance.trusted else "bad"
-    listed = table("gfor check", ["Check", "Verdict", "What was seen"], rows, left=3)
+    listed = table("gfor fmu check", ["Check", "Verdict", "What was seen"], rows, left=3)
     return f'<p class="{style}">{escape(said)}</p>{listed}'
 
 

@@ -1,4 +1,4 @@
-"""``gfor admittance``: a device known only through FMI, measured at its port."""
+"""``gfor fmu admittance``: a device known only through FMI, measured at its port."""
 
 import argparse
 import cmath
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                "(repeatable)", read=setting)  # fmt: skip
     option(parser, "--step", "H", "communication step [s] (100 us)", read=seconds, default=1e-4)
     option(parser, "--out", "DIR", "folder (default: results/admittance_<file>)", read=Path)
-    option(parser, "--scan", "FILE.txt", "write Z-tool's form too, for `gfor nyquist`", read=Path)
+    option(parser, "--scan", "FILE.txt", "write Z-tool's form too, for `gfor fmu nyquist`", read=Path)
     option(parser, "--voltage", "V", "rated voltage for --scan", read=quantity("kV"))
     add_excitation_arguments(parser)
     switch(parser, "--json", "print JSON")

@@ -1,4 +1,4 @@
-"""``gfor bind``: a draft of what a foreign FMU's variables mean at our port."""
+"""``gfor fmu bind``: a draft of what a foreign FMU's variables mean at our port."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""``gfor build``: FMUs of the catalogue's models."""
+"""``gfor fmu build``: FMUs of the catalogue's models."""
 
 import argparse
 from pathlib import Path

@@ -68,7 +68,7 @@ def _add_document_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--details-template", action="store_true", help="print such a file to be filled in, and end")
     checks = parser.add_mutually_exclusive_group()
     checks.add_argument("--check", type=Path, metavar="report.json",
-                        help="the FMU's acceptance tests by `gfor check --json` (default: they are run)")  # fmt: skip
+                        help="the FMU's acceptance tests by `gfor fmu check --json` (default: run now)")  # fmt: skip
     checks.add_argument("--no-check", action="store_true", help="leave out the acceptance tests; the report says so")
     parser.add_argument(
         "--pdf", action="store_true", help="print the report to certificate.pdf with an installed browser"

@@ -41,8 +41,8 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
         check_code_options(options, devices)
     if several and options.check:
         raise InputError(
-            f"--check {options.check}: a report of `gfor check` is of one FMU, and there are {len(devices)}; leave it "
-            "out to have the tests run, or give --no-check"
+            f"--check {options.check}: a report of `gfor fmu check` is of one FMU, and there are {len(devices)}; leave "
+            "it out to have the tests run, or give --no-check"
         )
     folder = options.out or Path("results") / f"certify_{'matrix' if several else devices[0].name}"
     made_folder(folder, "--out")

@@ -1,4 +1,4 @@
-"""``gfor check``: acceptance tests of an FMU."""
+"""``gfor fmu check``: acceptance tests of an FMU."""
 
 import argparse
 import json
@@ -29,7 +29,7 @@ NOT_SUPPORTED = 2  # exit code where nothing failed, but the FMU could not be ru
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    option(parser, "--binding", "FILE.toml", "what its variables mean (`gfor bind`)", read=Path)
+    option(parser, "--binding", "FILE.toml", "what its variables mean (`gfor fmu bind`)", read=Path)
     option(parser, "--step", "H", "communication step of use [s]", read=read_positive)
     option(parser, "--case", "CASE", "with a case's step, operating point, values and binding")
     option(parser, "--component", "NAME", "which of the case's components it is")

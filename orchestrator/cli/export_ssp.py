@@ -1,4 +1,4 @@
-"""``gfor export-ssp``: scenarios of a case as SSP archives."""
+"""``gfor export ssp``: scenarios of a case as SSP archives."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""``gfor build --with-linear-model``: which component of which case the model inside the FMU is of."""
+"""``gfor fmu build --with-linear-model``: which component of which case the model inside the FMU is of."""
 
 import argparse
 
@@ -13,7 +13,7 @@ OPTION = "--with-linear-model"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of ``gfor build``."""
+    """Options of ``gfor fmu build``."""
     parser.add_argument(
         OPTION,
         dest="linear_case",

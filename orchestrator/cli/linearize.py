@@ -1,4 +1,4 @@
-"""``gfor linearize``: a scenario's A, B, C, D for other tools."""
+"""``gfor export linear``: a scenario's A, B, C, D for other tools."""
 
 import argparse
 from pathlib import Path

@@ -151,8 +151,8 @@ def _say_unfinished(folder: Path) -> None:
     begun = [path.name for path in unfinished(folder)]
     if begun:
         text = (
-            f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; `gfor identify` "
-            "and `gfor compare` read them, and you may delete those that you do not need"
+            f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; "
+            "`gfor signal identify` and `compare` read them, and you may delete those that you do not need"
         )
         say("warning", [text])
 

@@ -169,7 +169,7 @@ class AdaptiveLoop:
         raise _NotTakenBackError(
             f"tolerance = {self._tolerance:g}: at {time:.6g} s the same step was done twice from the same saved state, "
             f"and {turn.component.name}.{variable} differs by {apart.max():.3g}; some FMU does not restore all of its "
-            "state (`gfor check`): leave the tolerance out"
+            "state (`gfor fmu check`): leave the tolerance out"
         )
 
     def _too_coarse(self, worst: int, error: float, time: float, step: float) -> CouplingError:

@@ -79,7 +79,7 @@ class Recorder:
         for column, name in enumerate(self.names):
             component, _, variable = name.partition(".")
             if component not in run.components or variable not in run.components[component].description.variables:
-                raise InputError(f"cannot record {name!r}: there is no such variable; `gfor info` lists them")
+                raise InputError(f"cannot record {name!r}: there is no such variable; `gfor fmu info` lists them")
             by_component.setdefault(component, []).append((column, variable))
         self._batches = [
             (RealBatch(run.components[component], [v for _, v in entries]), np.array([c for c, _ in entries]))

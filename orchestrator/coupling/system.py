@@ -132,7 +132,9 @@ class System:
             raise InputError(f"{label}: there is no component {component!r}; components: {known}")
         info = self.components[component].description.variables.get(variable)
         if info is None:
-            raise InputError(f"{label}: component {component!r} has no variable {variable!r}; `gfor info` lists them")
+            raise InputError(
+                f"{label}: component {component!r} has no variable {variable!r}; `gfor fmu info` lists them"
+            )
         return Endpoint(component, variable), info
 
     def unconnected_inputs(self) -> Iterator[Endpoint]:

@@ -174,7 +174,7 @@ class BoundComponent(Derived):
                 scaled = signal is not None and self.description.variables[name].type == "Real"
                 self.inner.set({target: (value - signal.offset) / signal.factor if signal and scaled else value})
             else:
-                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor info` lists them")
+                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor fmu info` lists them")
         self._scale()
 
     def read(self, batch: RealBatch) -> None:

@@ -139,7 +139,8 @@ class RealBatch:
         unknown = [name for name in self.names if name not in variables]
         if unknown:
             raise InputError(
-                f"component {component.name!r} has no variable {', '.join(map(repr, unknown))}; `gfor info` lists them"
+                f"component {component.name!r} has no variable {', '.join(map(repr, unknown))}; `gfor fmu info` lists "
+                "them"
             )
         self.values = np.zeros(len(self.names)) if values is None else values
         self._references = (ctypes.c_uint * len(self.names))(*[variables[n].reference for n in self.names])

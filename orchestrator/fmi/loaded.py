@@ -215,7 +215,7 @@ class LoadedComponent(Derived):
         for name, value in values.items():
             variable = self.description.variables.get(name)
             if variable is None:
-                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor info` lists them")
+                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor fmu info` lists them")
             setters = {
                 "Real": (self._fmu.setReal, float),
                 "Integer": (self._fmu.setInteger, int),

@@ -93,7 +93,7 @@ def _values(description: FmuDescription, request: CertificationRequest, f_n: flo
     values = {}
     for name, value in wanted.items():
         if name not in description.variables:
-            raise InputError(f"--set {name}: {request.fmu} has no such variable; `gfor info` lists them")
+            raise InputError(f"--set {name}: {request.fmu} has no such variable; `gfor fmu info` lists them")
         try:
             values[name] = convert(description.variables[name], value)
         except ValueError as error:
