@@ -34,14 +34,7 @@ class Following:
 def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Following:
     """Declare the whole converter.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    port
-        Its port.
-    v
-        Voltage at the bus, network frame [pu].
+    ``v``: voltage at the bus, network frame [pu].
     """
     t = declare_transformer(m, port)
     theta = m.algebraic("theta")

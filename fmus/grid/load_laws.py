@@ -49,20 +49,9 @@ FREQUENCY_TIME = 0.02
 class FollowingLoad:
     """A declared load with its correction c at scale 1.
 
-    Attributes
-    ----------
-    data
-        The load's laws.
-    load
-        Its admittance at scale 1.
-    correction
-        The state c.
-    tau
-        Its lag [s].
-    v_min
-        Voltage below which it is an impedance [pu]; None for never.
-    delayed
-        The bus voltage behind a lag, and that lag [s], for the frequency; None for a load that does not depend on it.
+    ``data``: the load's laws; ``load``: its admittance at scale 1; ``correction``: the state c; ``tau``: its lag [s];
+    ``v_min``: voltage below which it is an impedance [pu]; None for never; ``delayed``: the bus voltage behind a lag,
+    and that lag [s], for the frequency; None for a load that does not depend on it.
     """
 
     data: Load
@@ -86,20 +75,10 @@ def declare_following_load(
 ) -> FollowingLoad:
     """Make a declared load follow its laws.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    load
-        The load's bus, name and laws.
-    declared
-        The same load as a constant impedance, as `declare_load` returns it.
-    buses
-        By name; the correction is added to what is injected at the load's bus.
-    omega_b
-        Base angular frequency [rad/s]; None where no load depends on the frequency.
-    phasors
-        Whether the network is one of phasors, with longer steps.
+    ``load``: the load's bus, name and laws; ``declared``: the same load as a constant impedance, as `declare_load`
+    returns it; ``buses``: by name; the correction is added to what is injected at the load's bus; ``omega_b``: base
+    angular frequency [rad/s]; None where no load depends on the frequency; ``phasors``: whether the network is one of
+    phasors, with longer steps.
     """
     bus = buses[load.bus]
     only_current = load.active.i == 1 and not (load.reactive_follows or load.k_pf)

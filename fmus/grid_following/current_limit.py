@@ -30,14 +30,8 @@ class Limited:
 def limited_current(m: ModelBuilder, start: SteadyState, demanded: Phasor) -> Limited:
     """Declare the limit and apply it; a dispatch beyond it is refused.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    start
-        Operating point of the filter.
-    demanded
-        Reference of the converter's current, its own frame: real part active, imaginary part reactive [pu, S_n].
+    ``start``: operating point of the filter; ``demanded``: reference of the converter's current, its own frame: real
+    part active, imaginary part reactive [pu, S_n].
     """
     with m.scope("current_limit"):
         most = m.parameter("I_max", 1.1, "pu", "Largest current", base="S_n", minimum=0.1, source=SOURCE)

@@ -34,18 +34,9 @@ def ac4a(
 ) -> tuple[ca.SX, ca.SX]:
     """(1+sT_C)/(1+sT_B) → K_A/(1+sT_A).
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    start
-        The machine's operating point.
-    terminal_voltage
-        Gives |v_t| [pu, S_n] for an E_fd [pu].
-    I_fd
-        Field current; 1 pu gives 1 pu of voltage on open circuit. Of the three exciters ST4B alone needs it.
-    v_s
-        A stabiliser's signal, added to the voltage reference [pu, S_n].
+    ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
+    field current; 1 pu gives 1 pu of voltage on open circuit. Of the three exciters ST4B alone needs it; ``v_s``: a
+    stabiliser's signal, added to the voltage reference [pu, S_n].
     """
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=PAPER)
@@ -59,13 +50,7 @@ def ac4a(
 def st1(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """(1+sT_C)/(1+sT_B) → K_A: as AC4A, with an amplifier that has no lag.
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `ac4a`.
-    """
+    """(1+sT_C)/(1+sT_B) → K_A: as AC4A, with an amplifier that has no lag."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=NTS631)
         v_m, error = _measured_error(m, start.v_t, start.v_t + start.E_fd / K_A, v_s, T_R=0.01, source=NTS631)
@@ -76,13 +61,7 @@ def st1(
 def st4b(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """PI → 1/(1+sT_A) → × K_P·|v_t|·f_ex, fed from the machine's own terminal through a rectifier.
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `ac4a`.
-    """
+    """PI → 1/(1+sT_A) → × K_P·|v_t|·f_ex, fed from the machine's own terminal through a rectifier."""
     with m.scope("exciter"):
         K_PR = m.parameter("K_PR", 3.15, "pu", "Proportional gain", base="E_fd", minimum=0, source=NTS631)
         K_IR = m.parameter("K_IR", 3.15, "1/s", "Integral gain", minimum=1e-6, source=NTS631)

@@ -76,13 +76,7 @@ class Parts:
 
 
 def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> Parts:
-    """The parts of these names.
-
-    Parameters
-    ----------
-    machine, exciter, governor, stabilizer
-        Names of `MACHINES`, `EXCITERS`, `GOVERNORS` and `STABILIZERS`.
-    """
+    """The parts of these names."""
     found = Parts(
         _part("machine", MACHINES, machine),
         _part("exciter", EXCITERS, exciter),

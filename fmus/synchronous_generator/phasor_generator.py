@@ -58,16 +58,7 @@ def _generator(variant: Variant) -> Model:
 def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
     """Declare emf and admittance, and the lag for what saliency the admittance cannot show.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    g
-        The machine.
-    port
-        Of the generator.
-    emf
-        Behind the subtransient reactance, rotor frame [pu].
+    ``emf``: behind the subtransient reactance, rotor frame [pu].
     """
     impedance = Phasor(g.R, g.d.X_between)
     start = g.start.v + impedance * g.start.i
@@ -78,16 +69,8 @@ def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phas
 def close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
     """Stator currents from emf and bus voltage, two real equations; then the fluxes ψ̃ = e'' − X·i.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    g
-        The machine, its stator's fluxes as open signals.
-    port
-        Gives the bus voltage.
-    emf
-        Behind the subtransient reactance, rotor frame [pu].
+    ``g``: the machine, its stator's fluxes as open signals; ``port``: gives the bus voltage; ``emf``: behind the
+    subtransient reactance, rotor frame [pu].
     """
     over = (emf - port.v.rotated(-g.delta)) * port.connected
     R, X_d, X_q = g.R, g.d.X_between, g.q.X_between

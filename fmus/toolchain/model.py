@@ -23,18 +23,9 @@ Function = Any
 class NodalEquations:
     """Y·v = i of a large network: a matrix whose pattern never changes, and currents.
 
-    Attributes
-    ----------
-    plan
-        Order and fill of the factorisation of Y.
-    values
-        (u, p, c) → real parts of the elements of Y in the plan's order, then their imaginary parts.
-    currents
-        (x, u, p, c) → real parts of i by bus, then imaginary parts.
-    given
-        Numbers of the inputs that Y depends on.
-    written_out
-        Makes the same model without such equations.
+    ``plan``: order and fill of the factorisation of Y; ``values``: (u, p, c) → real parts of the elements of Y in the
+    plan's order, then their imaginary parts; ``currents``: (x, u, p, c) → real parts of i by bus, then imaginary parts;
+    ``given``: numbers of the inputs that Y depends on; ``written_out``: makes the same model without such equations.
     """
 
     plan: Plan

@@ -16,13 +16,7 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 def ac4a(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """Declare it and return (E_fd, |v_t|) [pu].
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`, which has no ceilings.
-    """
+    """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.015, "Amplifier; 0 leaves the lag out")
         I_high, I_low = gain(m, "V_IMAX", 10.0, "Upper limit of the error"), gain(m, "V_IMIN", -10.0, "Lower one")

@@ -17,15 +17,7 @@ E_FD = "E_fd"
 
 
 def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
-    """Declare a gain or limit per unit of the field voltage.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text, minimum
-        Of the parameter, as `ModelBuilder.parameter` has them.
-    """
+    """Declare a gain or limit per unit of the field voltage."""
     return m.parameter(name, value, "pu", text, base=E_FD, minimum=minimum, source=SOURCE)
 
 
@@ -43,16 +35,8 @@ def time(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0
 class Measurement:
     """The measured terminal voltage, 1/(1 + s·T_R), and the reference that it is compared with.
 
-    Parameters
-    ----------
-    m
-        The generator's model, in the exciter's scope.
-    start
-        The machine's operating point.
-    terminal_voltage
-        Gives |v_t| [pu, S_n] for an E_fd [pu].
-    I_fd
-        Field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly.
+    ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
+    field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly.
     """
 
     def __init__(self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> None:
@@ -83,16 +67,8 @@ class Measurement:
 def lead_lag_stage(m: ModelBuilder, u: ca.SX, initial: Scalar, mark: str = "", lead: float = 0.0) -> ca.SX:
     """(1 + s·T_C)/(1 + s·T_B), passed through where T_B = 0, which needs T_C = 0.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    u, initial
-        What goes in, and its value in steady state.
-    mark
-        Follows C and B in the parameters' names.
-    lead
-        Default of T_C [s]; T_B is ten seconds then, otherwise 0.
+    ``u``, ``initial``: what goes in, and its value in steady state; ``mark``: follows C and B in the parameters' names;
+    ``lead``: default of T_C [s]; T_B is ten seconds then, otherwise 0.
     """
     T_C = time(m, f"T_C{mark}", lead, f"Lead T_C{mark}")
     T_B = time(m, f"T_B{mark}", 10.0 if lead else 0.0, f"Lag T_B{mark}; 0 leaves the stage out")
@@ -116,16 +92,7 @@ def rate_feedback(
 def require_within(m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, names: tuple[str, str]) -> None:
     """Refuse an operating point at or beyond a limit.
 
-    Parameters
-    ----------
-    m
-        The model.
-    value
-        Of the limited signal in steady state.
-    low, high
-        Its limits.
-    names
-        Of the two limits, such as ``exciter.V_RMIN``.
+    ``value``: of the limited signal in steady state.
     """
     for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
         m.require(

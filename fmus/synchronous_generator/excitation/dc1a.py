@@ -37,12 +37,7 @@ def dc1a(
 ) -> tuple[ca.SX, ca.SX]:
     """Declare it and return (E_fd, |v_t|) [pu].
 
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    compensated
-        Whether it has the stage (1+sT_C)/(1+sT_B).
+    ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B).
     """
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 20.0, "Gain", 1e-3), time(m, "T_A", 0.2, "Amplifier; 0 leaves the lag out")

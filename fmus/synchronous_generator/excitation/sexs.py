@@ -18,13 +18,7 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 def sexs(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """Declare it and return (E_fd, |v_t|) [pu].
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    """
+    """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K = gain(m, "K", 100.0, "Gain", 1e-3)
         T_A = time(m, "T_A", 1.0, "Lead")

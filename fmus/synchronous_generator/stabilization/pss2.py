@@ -22,12 +22,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX, *, newer: bool = False) -> ca.SX:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
-    Parameters
-    ----------
-    m, delta_omega, P_e, P_e_0
-        As `stabilizers.pss2a`.
-    newer
-        Whether it has what PSS2B has beyond PSS2A.
+    ``newer``: whether it has what PSS2B has beyond PSS2A.
     """
     with m.scope("pss"):
         speed, power = delta_omega, P_e - P_e_0

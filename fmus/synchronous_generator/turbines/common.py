@@ -8,15 +8,7 @@ SOURCE = "typical data, IEEE PES-TR1"
 
 
 def power(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
-    """Declare a gain or limit per unit of the rating.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text, minimum
-        Of the parameter, as `ModelBuilder.parameter` has them.
-    """
+    """Declare a gain or limit per unit of the rating."""
     return m.parameter(name, value, "pu", text, base="S_n", minimum=minimum, source=SOURCE)
 
 
@@ -40,16 +32,7 @@ def power_reference(m: ModelBuilder, P_ref_0: Scalar) -> ca.SX:
 def require_within(m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, names: tuple[str, str]) -> None:
     """Refuse an operating point at or beyond a limit.
 
-    Parameters
-    ----------
-    m
-        The model.
-    value
-        Of the limited signal in steady state.
-    low, high
-        Its limits.
-    names
-        Of the two limits, such as ``governor.V_MIN``.
+    ``value``: of the limited signal in steady state.
     """
     for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
         m.require(
