@@ -13,6 +13,7 @@ from fmus.synchronous_generator.machine import (
 )
 from fmus.synchronous_generator.parts import NONE, Parts, chosen_parts
 from fmus.synchronous_generator.phasor_generator import close_stator, declare_phasor_port, phasor_terminal_voltage
+from fmus.synchronous_generator.usual import MACHINE
 from fmus.synchronous_generator.variants import declare_generator_outputs
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
@@ -40,7 +41,7 @@ def synchronous_generator(
         If there is no such part, the parts do not fit each other, or the machine is one for phasors alone.
     """
     parts = chosen_parts(machine, exciter, governor, stabilizer)
-    m = ModelBuilder(parts.model_name(), parts.title("EMT-type"))
+    m = ModelBuilder(parts.model_name(), parts.title("EMT-type"), kind="machine", usual=MACHINE)
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0)
     g = parts.machine(m, port, S_n, flux_state)
@@ -74,7 +75,7 @@ def synchronous_generator_phasor(
         If there is no such part, or the parts do not fit each other.
     """
     parts = chosen_parts(machine, exciter, governor, stabilizer)
-    m = phasor_builder(parts.model_name("phasor"), parts.title("phasor type"))
+    m = phasor_builder(parts.model_name("phasor"), parts.title("phasor type"), kind="machine", usual=MACHINE)
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0)
     g = parts.machine(m, port, S_n, lambda m, name, start, text: m.algebraic(name))

@@ -3,6 +3,7 @@
 from fmus.synchronous_generator.governors import ieeeg1
 from fmus.synchronous_generator.machine import declare_machine, machine_equations, terminal_power, terminal_voltage
 from fmus.synchronous_generator.stabilizers import pss2a
+from fmus.synchronous_generator.usual import MACHINE
 from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Variant, declare_generator_outputs
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -30,7 +31,9 @@ def synchronous_generator_st4b_pss2a() -> Model:
 
 
 def _generator(variant: Variant, stabilizer: str = "") -> Model:
-    m = ModelBuilder(variant.model_name(stabilizer), variant.title("EMT-type", stabilizer))
+    m = ModelBuilder(
+        variant.model_name(stabilizer), variant.title("EMT-type", stabilizer), kind="machine", usual=MACHINE
+    )
     port = device_port(m, variant.data.S_n, variant.data.P_0)
     machine = declare_machine(m, port, variant.data)
     v_s = pss2a(m, machine.w - 1, *terminal_power(machine, port)) if stabilizer else 0.0

@@ -16,6 +16,7 @@ import casadi as ca
 
 from fmus.synchronous_generator.governors import ieeeg1
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations
+from fmus.synchronous_generator.usual import MACHINE
 from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Variant, declare_generator_outputs
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
@@ -40,7 +41,7 @@ def synchronous_generator_st4b_phasor() -> Model:
 
 
 def _generator(variant: Variant) -> Model:
-    m = phasor_builder(variant.model_name("phasor"), variant.title("phasor type"))
+    m = phasor_builder(variant.model_name("phasor"), variant.title("phasor type"), kind="machine", usual=MACHINE)
     port = device_port(m, variant.data.S_n, variant.data.P_0)
     g = declare_machine(m, port, variant.data, stator_flux=lambda m, name, start, text: m.algebraic(name))
     emf = Phasor(g.d.emf, g.q.emf) * g.w

@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from fmus.toolchain.description_common import (
     TOOL,
+    component_element,
     described_variables,
     root_element,
     text_of,
@@ -56,6 +57,7 @@ def model_description(
     write_definitions(root, model, "fmi2")
     annotation = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
     SubElement(annotation, "ContinuousStates", settable="true")
+    annotation.append(component_element(model))
     _variables(root, model)
     _structure(root, model, listed=listed)
     return text_of(root)

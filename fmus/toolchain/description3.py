@@ -4,6 +4,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from fmus.toolchain.description_common import (
     TOOL,
+    component_element,
     described_variables,
     root_element,
     text_of,
@@ -37,6 +38,7 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     _structure(root, model)
     annotations = SubElement(root, "Annotations")
     SubElement(annotations, "Annotation", type=f"{TOOL}.ContinuousStates").text = "settable"
+    SubElement(annotations, "Annotation", type=f"{TOOL}.Component").append(component_element(model))
     return text_of(root)
 
 

@@ -74,6 +74,16 @@ def unknowns(model: Model, *, listed: bool = True) -> dict[str, tuple[Unknown, .
     return {"Output": known.outputs, "ContinuousStateDerivative": known.derivatives, "InitialUnknown": known.initial}
 
 
+def component_element(model: Model) -> Element:
+    """What the component is, and the usual ranges of its parameters: ours, beside what FMI has a place for."""
+    element = Element("Component", {"kind": model.kind} if model.kind else {})
+    for parameter in model.parameters:
+        if (usual := parameter.usual) is not None:
+            bounds = {"name": parameter.name, "low": repr(float(usual.low)), "high": repr(float(usual.high))}
+            SubElement(element, "Usual", bounds | ({"orZero": "true"} if usual.or_zero else {}) | {"why": usual.why})
+    return element
+
+
 def text_of(root: Element) -> bytes:
     """The file's text."""
     indent(root)

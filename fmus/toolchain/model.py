@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from fmus.toolchain.plan import Plan
-from fmus.toolchain.variables import CalculatedParameter, Input, Output, Parameter, State, Variable
+from fmus.toolchain.variables import CalculatedParameter, Input, Kind, Output, Parameter, State, Variable
 
 Integrator = Literal["runge_kutta", "sdirk"]
 
@@ -61,6 +61,8 @@ class Model:
     nodal
         Equations of a large network, which a kernel solves as data. Their voltages are a fifth argument of
         ``derivatives`` and ``outputs_function`` then.
+    kind
+        What the component is in a power system.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Model:
     integrator: Integrator = "runge_kutta"
     implicit: Function | None = None
     nodal: NodalEquations | None = None
+    kind: Kind = ""
 
     @property
     def written_out(self) -> Model:

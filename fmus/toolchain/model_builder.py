@@ -11,7 +11,18 @@ import casadi as ca
 
 from fmus.toolchain.model import Integrator, Model
 from fmus.toolchain.nodes import Complex, Nodes
-from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable, VariableType
+from fmus.toolchain.variables import (
+    UNITS,
+    CalculatedParameter,
+    Input,
+    Kind,
+    Output,
+    Parameter,
+    State,
+    Usual,
+    Variable,
+    VariableType,
+)
 
 Scalar = ca.SX | float
 """What equations are made of."""
@@ -22,12 +33,20 @@ class ModelBuilder:
 
     ``name``: identifier of the FMU (letters, digits, underscore); ``title``: one line that says what the model is;
     ``internal_step``, ``longest_step``: default and maximum of the parameter ``internal_step`` [s]. The defaults are
-    for electromagnetic transients.
+    for electromagnetic transients. ``usual``: ranges of parameters by their full name.
     """
 
-    def __init__(self, name: str, title: str, internal_step: float = 1e-4, longest_step: float = 2e-4) -> None:
-        self.name = name
-        self.title = title
+    def __init__(
+        self,
+        name: str,
+        title: str,
+        internal_step: float = 1e-4,
+        longest_step: float = 2e-4,
+        *,
+        kind: Kind = "",
+        usual: Mapping[str, Usual] | None = None,
+    ) -> None:
+        self.name, self.title, self.kind, self._usual = name, title, kind, usual or {}
         self._prefix: list[str] = []
         self._declared: dict[str, tuple[Variable, ca.SX]] = {}
         self._expressions: dict[str, ca.SX] = {}
@@ -63,6 +82,8 @@ class ModelBuilder:
     def _declare(self, variable: Variable) -> ca.SX:
         if variable.name in self._declared:
             raise ValueError(f"model {self.name}: {variable.name!r} is declared twice")
+        if isinstance(variable, Parameter) and variable.name in self._usual:
+            variable = replace(variable, usual=self._usual[variable.name])
         symbol = ca.SX.sym(variable.name)
         self._declared[variable.name] = (variable, symbol)
         return symbol
@@ -252,6 +273,7 @@ class ModelBuilder:
             integrator=integrator,
             implicit=implicit,
             nodal=nodal,
+            kind=self.kind,
         )
 
     def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:

@@ -55,7 +55,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     wanted = table.power_flow.slack or prepared.source_slack or ""
     feeding = [name for name in units if flow.powers.get(name)]
     at_slack = [name for name in feeding if units[name] == units.get(wanted, wanted)]
-    machines = [n for n in feeding if any(v.startswith("machine.") for v in plans[n].description.variables)]
+    machines = [n for n in feeding if plans[n].kind == "machine"]
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
     loads = [(load, _power(load, grid)) for load in network.loads]
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []

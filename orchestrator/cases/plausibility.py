@@ -13,7 +13,7 @@ from orchestrator.cases.data_rules import RESISTANCES, RULES, Rule
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.plausible_networks import network_doubts
-from orchestrator.cases.plausible_ranges import RANGES, SMALLEST_SHARE
+from orchestrator.cases.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of, unit_of, value_of
 from orchestrator.coupling.system import ComponentPlan
@@ -21,6 +21,9 @@ from orchestrator.errors import Problem
 from orchestrator.fmi.port import BoundDescription
 
 _FULL = 1.05  # apparent power [pu of the rating] above which a converter's operating point is questioned
+_OF_PARTS = ("machine", "exciter", "governor", "pss")
+"""Begins of a generator's variables; another scenario may choose a part that has one which this one's has not."""
+
 _SHOWN = 3  # largest number of components that a question names; the others are counted
 
 
@@ -47,8 +50,7 @@ def _check_meant(draft: Draft) -> None:
             hint = close_names(component, sorted(draft.known), "name it as [components] does")
             draft.note(draft.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
         plans = [p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)]
-        others = (*RANGES, *PARTS, SOLVED)  # of a part that another scenario has, or of no variable
-        elsewhere = any(fnmatch.fnmatchcase(known, variable) for known in others)
+        elsewhere = variable in (*PARTS, SOLVED) or variable.partition(".")[0] in _OF_PARTS
         here = (v for p in plans for v in p.description.variables)
         if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
             draft.note(
@@ -60,8 +62,8 @@ def _check_meant(draft: Draft) -> None:
 def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         for variable in plan.description.parameters:
-            wanted, value = RANGES.get(variable), value_of(plan, variable)
-            if wanted is not None and value is not None and unit_of(plan, variable) == wanted.unit:
+            wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
+            if wanted is not None and value is not None:
                 yield from outside(draft, name, variable, value, wanted, scale=_to_rating(plan, variable))
         for resistance, reactance in RESISTANCES:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
@@ -96,8 +98,13 @@ def question_loading(draft: Draft) -> None:
 def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
-        machine = any(variable.startswith("machine.") for variable in plan.description.variables)
-        if machine or P is None or Q is None or S_n is None or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0")):
+        if (
+            plan.kind == "machine"
+            or P is None
+            or Q is None
+            or S_n is None
+            or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0"))
+        ):
             continue
         apparent = math.hypot(P, Q)
         if apparent > _FULL:

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fmus.toolchain.variables import Usual
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.plausible_ranges import Plausible
 from orchestrator.coupling.system import ComponentPlan
 
 _FAR = 3
@@ -42,7 +42,7 @@ def outside(
     component: str,
     variable: str,
     value: float,
-    wanted: Plausible,
+    wanted: Usual,
     where: str | None = None,
     scale: float = 1.0,
 ) -> Iterator[UnusualValue]:
@@ -50,9 +50,10 @@ def outside(
     given, value = value, value * scale
     if wanted.fits(value):
         return
-    unit = f" {wanted.unit}" if wanted.unit != "1" else ""
+    declared = unit_of(draft.system.components[component], variable)
+    unit = f" {declared}" if declared != "1" else ""
     slip = f"; is it {wanted.slip}?" if wanted.slip else ""
-    ratio = wanted.unit in ("pu", "1")
+    ratio = declared in ("pu", "1")
     for meant, text, far, cause in (
         (value / 100, f"{value / wanted.high:.3g} times too large", ratio and value > wanted.high, "in percent"),
         (1 / value if value else 0, "", ratio and 0 < value < wanted.low / _FAR, "the inverse"),

@@ -38,6 +38,16 @@ class ComponentPlan:
     inputs: dict[str, float] = field(default_factory=dict)
     isolated: bool | None = None
 
+    @property
+    def has_port(self) -> bool:
+        """Whether it takes the voltage of its bus and gives its current."""
+        return {"v_re", "v_im"} <= {*self.description.inputs} and {"i_re", "i_im"} <= {*self.description.outputs}
+
+    @property
+    def kind(self) -> str:
+        """As the model declares it; what has a device's port and does not say is a converter."""
+        return self.description.kind or ("converter" if self.has_port else "")
+
     def value(self, name: str) -> Scalar | None:
         """What a parameter or an input is set to, else its start value; None where there is neither."""
         info = self.description.variables[name]

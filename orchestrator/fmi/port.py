@@ -14,7 +14,7 @@ from math import pi
 from typing import Any, Self
 
 from fmus.toolchain.port_variables import INPUTS, OUTPUTS, S_N, START_VALUES
-from fmus.toolchain.variables import Variable
+from fmus.toolchain.variables import Parameter, Variable
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.units import to_unit
 
@@ -201,7 +201,7 @@ def _passed(inner: FmuDescription, port: PortMap, name: str, own: str, reference
     if signal is None or info.type == "Boolean":
         return replace(info, name=name, reference=reference if info.type == "Real" else info.reference)
     return replace(info, name=name, reference=reference, causality="output", unit=signal.unit, start=None,
-                   minimum=None, maximum=None)  # fmt: skip
+                   minimum=None, maximum=None, usual=None)  # fmt: skip
 
 
 def _port_variables(port: PortMap) -> dict[str, VariableInfo]:
@@ -229,6 +229,7 @@ def _info(
         minimum=minimum,
         maximum=maximum,
         description=variable.text,
+        usual=variable.usual if isinstance(variable, Parameter) else None,
     )
 
 
