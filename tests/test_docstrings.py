@@ -111,7 +111,7 @@ def test_inside_a_docstring_says_what_the_name_does_not():
 
 
 @pytest.mark.parametrize(
-    ("signal", "source", "empty"),
+    ("source", "empty"),
     [
         ('def run(x):\n    "Of the command."\n    return x', True),
         ('def pointer(self):\n    "As `Component` has it."\n    return 1', True),

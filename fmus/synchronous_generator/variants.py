@@ -1,13 +1,21 @@
 """What tells the catalogue's generators apart, and what all of them show: with stator transients and without alike."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 
 from fmus.synchronous_generator.data import IEEE118, IEEEG1_NTS631, IEEEG1_STAMP, SG1, SG2, GovernorData, MachineData
-from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
+from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.excitation.without_ceilings import ac4a, st1, st4b
 from fmus.synchronous_generator.machine import Machine
 from fmus.toolchain.model_builder import ModelBuilder
+
+Governor = Callable[[ModelBuilder, ca.SX, ca.SX], ca.SX]
+"""Mechanical power [pu, S_n] from speed and the power of the operating point."""
+
+Stabilizer = Callable[[ModelBuilder, ca.SX, ca.SX, ca.SX], ca.SX]
+"""Signal [pu] from w − 1, electrical power and the power of the operating point."""
 
 
 @dataclass(frozen=True)

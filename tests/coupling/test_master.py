@@ -357,7 +357,7 @@ def test_constants_feed_inputs_from_the_first_step():
 
 
 @pytest.mark.parametrize(
-    ("signal", "source", "target", "reason"),
+    ("source", "target", "reason"),
     [
         ("a.y", "b.u", "b.u is already fed by k.y"),
         ("p.p", "a.u", "p.p is in MW and a.u in 1; units must be equal"),

@@ -295,7 +295,7 @@ def test_other_tools_run_it_as_our_jacobi_schedule(small, tool):
         for _ in range(50):
             read = next(steps)
             master.advance(1)
-            for component, variable in (("a", "y"), ("b", "y"), ("spare", "y"), ("signal", "source", "p")):
+            for component, variable in (("a", "y"), ("b", "y"), ("spare", "y"), ("source", "p")):
                 info = components[component].description.variables[variable]
                 ours = master.components[component].get([variable])[variable]
                 assert read(component, info) == pytest.approx(ours, abs=1e-15), f"{component}.{variable}"

@@ -9,6 +9,7 @@ import casadi as ca
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
+    TerminalVoltage,
     exciter_saturation,
     gain,
     lead_lag_stage,
@@ -18,7 +19,6 @@ from fmus.synchronous_generator.excitation.common import (
     time,
     voltage_before_rectifier,
 )
-from fmus.synchronous_generator.exciters import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, held_at_limits, limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar

@@ -6,8 +6,14 @@ held within V_RMIN and V_RMAX − K_C·I_FD
 
 import casadi as ca
 
-from fmus.synchronous_generator.excitation.common import Measurement, gain, lead_lag_stage, require_within, time
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import (
+    Measurement,
+    TerminalVoltage,
+    gain,
+    lead_lag_stage,
+    require_within,
+    time,
+)
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar

@@ -3,17 +3,33 @@
 Signals of a regulator are per unit of the terminal voltage (base S_n) before the gain and of E_fd after it.
 """
 
+from collections.abc import Callable
+from functools import partial
+from typing import Protocol
+
 import casadi as ca
 
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.declarations import require_between, time_constant
 from fmus.synchronous_generator.machine import Start
 from fmus.synchronous_generator.saturation import require_rising, saturated_part
 from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
+TerminalVoltage = Callable[[ca.SX], ca.SX]
+"""|v_t| [pu, S_n] for an E_fd [pu]; it depends, weakly, on E_fd because of the transformer in series."""
+
 SOURCE = "typical data, IEEE 421.5"
 
 E_FD = "E_fd"
+
+
+class Exciter(Protocol):
+    """Declares an excitation system and returns (E_fd, |v_t|) [pu]; ``v_s`` is a stabiliser's signal [pu]."""
+
+    def __call__(
+        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
+    ) -> tuple[ca.SX, ca.SX]:
+        """Declare the exciter; returns (E_fd, |v_t|) [pu]."""
 
 
 def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
@@ -21,15 +37,7 @@ def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | N
     return m.parameter(name, value, "pu", text, base=E_FD, minimum=minimum, source=SOURCE)
 
 
-def time(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0) -> ca.SX:
-    """Declare a time constant [s]; where it may be 0, 0 leaves its block out."""
-    T = m.parameter(name, value, "s", text, minimum=minimum, source=SOURCE)
-    if minimum == 0:
-        m.require(
-            ca.if_else(T <= 0, 1, T - m.internal_step / 2),
-            f"exciter.{name} must be 0 or longer than half of internal_step",
-        )
-    return T
+time = partial(time_constant, source=SOURCE)
 
 
 class Measurement:
@@ -89,17 +97,11 @@ def rate_feedback(
     return gain_F / lag * (u - x), gain_F
 
 
-def require_within(m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, names: tuple[str, str]) -> None:
-    """Refuse an operating point at or beyond a limit.
-
-    ``value``: of the limited signal in steady state.
-    """
-    for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
-        m.require(
-            margin,
-            f"{name}: the operating point of the power flow lies at or {side} this limit, so the generator cannot "
-            "hold its voltage; change the limit, the gain, or the generator's voltage and reactive power",
-        )
+require_within = partial(
+    require_between,
+    rule="so the generator cannot hold its voltage; change the limit, the gain, or the generator's voltage and "
+    "reactive power",
+)
 
 
 def exciter_saturation(m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E2: float) -> "ExciterSaturation":

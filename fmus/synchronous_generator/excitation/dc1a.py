@@ -13,6 +13,7 @@ import casadi as ca
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
+    TerminalVoltage,
     exciter_saturation,
     gain,
     lead_lag_stage,
@@ -20,7 +21,6 @@ from fmus.synchronous_generator.excitation.common import (
     require_within,
     time,
 )
-from fmus.synchronous_generator.exciters import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar

@@ -5,7 +5,7 @@ v_t, I_fd, v_s ──► exciter of another component ──► exciter.E_fd
 
 import casadi as ca
 
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 

@@ -5,7 +5,7 @@ E_fd = E_fd,0 + delta_E_fd
 
 import casadi as ca
 
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 

@@ -8,8 +8,7 @@ V_ref + V_S ─►(+)►│ 1 + s·T_A │─►│    K    │──► E_fd
 
 import casadi as ca
 
-from fmus.synchronous_generator.excitation.common import Measurement, gain, require_within, time
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import Measurement, TerminalVoltage, gain, require_within, time
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import lead_lag, limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar

@@ -11,13 +11,13 @@ import casadi as ca
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
+    TerminalVoltage,
     gain,
     lead_lag_stage,
     rate_feedback,
     require_within,
     time,
 )
-from fmus.synchronous_generator.exciters import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, close_limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar

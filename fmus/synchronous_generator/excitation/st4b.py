@@ -13,8 +13,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.synchronous_generator.excitation.common import Measurement, gain, rectifier, require_within, time
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import (
+    Measurement,
+    TerminalVoltage,
+    gain,
+    rectifier,
+    require_within,
+    time,
+)
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, limited_proportional_integral, low_pass_or_nothing
 from fmus.toolchain.model_builder import ModelBuilder, Scalar

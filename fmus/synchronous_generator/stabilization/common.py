@@ -1,7 +1,10 @@
 """What stabilisers have in common: parameters, lead/lag stages and the limits of the signal."""
 
+from functools import partial
+
 import casadi as ca
 
+from fmus.synchronous_generator.declarations import time_constant
 from fmus.toolchain.blocks import clamp, lead_lag
 from fmus.toolchain.model_builder import ModelBuilder
 
@@ -13,13 +16,7 @@ def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | N
     return m.parameter(name, value, "pu", text, base="S_n", minimum=minimum, source=SOURCE)
 
 
-def time(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
-    """Declare a time constant [s]; 0 leaves its block out."""
-    T = m.parameter(name, value, "s", text, minimum=0, source=SOURCE)
-    m.require(
-        ca.if_else(T <= 0, 1, T - m.internal_step / 2), f"pss.{name} must be 0 or longer than half of internal_step"
-    )
-    return T
+time = partial(time_constant, source=SOURCE)
 
 
 def stage(m: ModelBuilder, u: ca.SX, number: int, names: tuple[str, str], values: tuple[float, float]) -> ca.SX:

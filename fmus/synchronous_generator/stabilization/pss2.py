@@ -14,7 +14,7 @@ from functools import partial
 import casadi as ca
 
 from fmus.synchronous_generator.stabilization.common import gain, limited_output, stage, time
-from fmus.synchronous_generator.stabilizers import RAMP_LAGS
+from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
 from fmus.toolchain.blocks import clamp, lead_lag, low_pass_or_nothing, washout_or_nothing
 from fmus.toolchain.model_builder import ModelBuilder
 

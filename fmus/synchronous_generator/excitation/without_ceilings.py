@@ -1,32 +1,19 @@
-"""Excitation systems AC4A, ST1 and ST4B (IEEE 421.5 structures, without ceiling limits).
+"""Excitation systems AC4A, ST1 and ST4B without ceilings (IEEE 421.5 structures), those of the case studies.
 
 Each takes the machine's terminal voltage as a function of its own E_fd, because the transformer in
 series makes |v_t| depend, weakly, on E_fd itself; returned are E_fd and the |v_t| that belongs to it.
 """
 
-from collections.abc import Callable
-from typing import Protocol
-
 import casadi as ca
 
 from fmus.synchronous_generator.data import NTS631, PAPER, STAMP
+from fmus.synchronous_generator.excitation.common import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import lead_lag, low_pass, proportional_integral
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
-TerminalVoltage = Callable[[ca.SX], ca.SX]
-
 LOOP_PASSES = 4
 """Fixed-point passes for the algebraic loop of ST4B; each shrinks its error more than fiftyfold."""
-
-
-class Exciter(Protocol):
-    """Declares an excitation system and returns (E_fd, |v_t|) [pu]; ``v_s`` is a stabiliser's signal [pu]."""
-
-    def __call__(
-        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-    ) -> tuple[ca.SX, ca.SX]:
-        """Declare the exciter; returns (E_fd, |v_t|) [pu]."""
 
 
 def ac4a(
