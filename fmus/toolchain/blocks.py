@@ -83,7 +83,6 @@ def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar,
 
 
 def limit(u: ca.SX, magnitude: Scalar) -> ca.SX:
-    """Clamp to ±magnitude."""
     return ca.fmin(ca.fmax(u, -magnitude), magnitude)
 
 

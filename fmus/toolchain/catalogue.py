@@ -41,7 +41,6 @@ def entry_of(name: str) -> EntryPoint:
 
 
 def build_model(name: str, **arguments: Any) -> Model:
-    """Build one model of the catalogue."""
     return _made(name, _factory(name), arguments)
 
 

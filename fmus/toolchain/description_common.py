@@ -85,7 +85,6 @@ def component_element(model: Model) -> Element:
 
 
 def text_of(root: Element) -> bytes:
-    """The file's text."""
     indent(root)
     text: str = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

@@ -50,7 +50,6 @@ class NativeFmu:
         return with_guid(self._text, guid_of(self.digest), "guid" if self._version == "2.0" else "instantiationToken")
 
     def default_platforms(self) -> tuple[str, ...]:
-        """All of them."""
         return tuple(TARGETS)
 
     def host_platforms(self) -> tuple[str, ...]:

@@ -85,7 +85,6 @@ def _code_now() -> str:
 
 @cache
 def _code_loaded() -> str:
-    """The code when this module was imported, and with it what is loaded."""
     return _code_now()
 
 

@@ -49,7 +49,6 @@ class PythonFmu:
         self.digest = digest_of(self._c, self._python, self._slave, description, data, exporter, *recipe())
 
     def default_platforms(self) -> tuple[str, ...]:
-        """The platform of this machine."""
         return this_machine()
 
     def host_platforms(self) -> tuple[str, ...]:

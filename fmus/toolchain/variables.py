@@ -76,7 +76,6 @@ class Variable:
 
     @property
     def text(self) -> str:
-        """The description with its base."""
         return f"{self.description} [pu, base {self.base}]" if self.base else self.description
 
 

@@ -45,7 +45,6 @@ def no_kernel_source() -> str:
 
 
 def circuit_source(model: Model, device: Device) -> str:
-    """What stands after the host."""
     places = model.value_references
     at = ", ".join(f"{name} = {places[variable]}" for name, variable in _PLACES.items())
     flags = {"DELAY": int(device.delay), "MEASUREMENTS": len(device.measured)}

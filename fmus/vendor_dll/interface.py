@@ -13,8 +13,6 @@ Number = int | float
 
 @dataclass(frozen=True)
 class DataType:
-    """One of the interface's ten data types."""
-
     name: str  # as the interface has it, such as ``real64``
     c: str
     size: int  # of one value, which is also its alignment [bytes]
@@ -94,7 +92,6 @@ class DllInterface:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "DllInterface":
-        """What `as_json` gave."""
         signals = {name: tuple(Signal(**row) for row in data[name]) for name in ("inputs", "outputs")}
         rows = {"parameters": tuple(DllParameter(**row) for row in data["parameters"])}
         plain = {name: tuple(data[name]) for name in ("interface_version", "states", "calls")}

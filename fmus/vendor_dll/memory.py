@@ -19,8 +19,6 @@ def unheard(_doing: str) -> None:
 
 
 class LibraryEndedError(ValueError):
-    """The process that a DLL is in has ended."""
-
     def __init__(self, words: str, *, passing: bool = False) -> None:
         super().__init__(words)
         self.passing = passing
@@ -52,8 +50,6 @@ class Library(Protocol):
 
 
 class LocalLibrary:
-    """A DLL in this process."""
-
     def __init__(self, path: Path, note: Note = unheard) -> None:
         note("it is loaded")
         self._path, self._library, self._note = path, c.CDLL(str(path)), note
@@ -79,7 +75,6 @@ class LocalLibrary:
         return c.string_at(address) if address else b""
 
     def write(self, address: int, content: bytes) -> None:
-        """Change a stretch of memory."""
         c.memmove(address, content, len(content))
 
     def allocate(self, size: int) -> int:

@@ -154,12 +154,10 @@ class FmuProcess:
         return found
 
     def names(self, answer: Any) -> list[str]:
-        """The list of texts that an answer must be."""
         found: list[str] = self._typed(answers.names, answer)
         return found
 
     def hexadecimal(self, answer: Any) -> bytes:
-        """The bytes that an answer must be."""
         found: bytes = self._typed(answers.hexadecimal, answer)
         return found
 

@@ -28,8 +28,6 @@ At = TypeVar("At", bound=Hashable)
 
 @dataclass(frozen=True)
 class ModeSet:
-    """The modes of one operating point."""
-
     eigenvalues: Complex  # λ [rad/s], shape (m,)
     # left, right: eigenvectors as rows, shape (m, n), in any scaling
     left: Complex

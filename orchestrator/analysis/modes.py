@@ -102,7 +102,6 @@ class Mode:
         return together, [s for s in moving if s not in together]
 
     def participation_of(self, states: Iterable[str]) -> float:
-        """Sum of the factors of some states."""
         wanted = set(states)
         return sum(factor for name, factor in self.participation if name in wanted)
 

@@ -48,8 +48,6 @@ _SWINGS_SHOWN = 3
 
 
 class Cause(StrEnum):
-    """The cause of growth in a system."""
-
     SYSTEM = "system"
     COUPLING = "coupling"
     UNKNOWN = "not known"

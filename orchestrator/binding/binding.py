@@ -85,7 +85,6 @@ class _Reader:
 
     @contextmanager
     def _at(self, place: str) -> Iterator[None]:
-        """Inside, mistakes are noted with this place."""
         try:
             yield
         except ValueError as error:

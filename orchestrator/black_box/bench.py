@@ -127,7 +127,6 @@ class Runs:
         return found / (2 * size)
 
     def close(self) -> None:
-        """Release the instance."""
         component, self._component = self._component, None
         if component is not None:
             if self._state is not None:

@@ -82,7 +82,6 @@ def _place(recipe: Any) -> list[str]:
 
 @cache
 def build_fmu(planned: PlannedFmu) -> FmuDescription:
-    """Build the FMU if it is not there."""
     if planned.is_there:
         return planned.description
     from fmus.toolchain.exporter import cached  # noqa: PLC0415 - needs the extra `build`

@@ -77,7 +77,6 @@ def _units(case: CaseTable, place: Locate) -> Iterator[Problem]:
 
 
 def _again(names: Iterable[str]) -> Iterator[tuple[str, int]]:
-    """The names that stood before, each with its number."""
     seen: set[str] = set()
     for k, name in enumerate(names):
         if name in seen:

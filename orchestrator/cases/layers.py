@@ -16,7 +16,6 @@ class OptionValues(ParameterFile):
 
     @classmethod
     def of(cls, values: Mapping[str, Value]) -> "OptionValues":
-        """The layer of values by ``component.variable``."""
         return cls(Path(COMMAND_LINE), "", dict(values))
 
     def place(self, key: str) -> str:

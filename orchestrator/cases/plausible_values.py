@@ -33,7 +33,6 @@ def value_of(plan: ComponentPlan, variable: str) -> float | None:
 
 
 def unit_of(plan: ComponentPlan, variable: str) -> str:
-    """The unit that the FMU declares."""
     return plan.description.variables[variable].unit
 
 

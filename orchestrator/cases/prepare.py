@@ -42,8 +42,6 @@ from orchestrator.fmi.instance import is_ours
 
 @dataclass(frozen=True)
 class PreparedScenario:
-    """A scenario that is ready to run."""
-
     case: CaseDefinition
     name: str
     title: str

@@ -15,8 +15,6 @@ KEPT = "check.json"  # name of the report's file in a certificate's folder
 
 @dataclass(frozen=True)
 class Acceptance:
-    """The result of the acceptance tests."""
-
     trusted: bool
     faults: tuple[str, ...]
     report: Mapping[str, Any] = field(repr=False)

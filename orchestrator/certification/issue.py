@@ -21,8 +21,6 @@ WITH_VERDICT = (NTS631, *CODES, *BY_DECLARATION)  # codes that a converter passe
 
 @dataclass(frozen=True)
 class Issue:
-    """A certificate that can be computed."""
-
     request: CertificationRequest
     worker: str  # module that a process imports
     rows: str  # what its rows are called

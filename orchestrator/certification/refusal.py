@@ -52,5 +52,4 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
 
 
 def _shown(value: Value) -> str:
-    """A value as the user wrote it."""
     return f"{value:.15g}" if isinstance(value, float) else shown(value)

@@ -17,8 +17,6 @@ GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
 
 @dataclass(frozen=True)
 class CertificationRequest:
-    """The request for a certificate."""
-
     fmu: Path
     binding: Path | None = None
     values: Mapping[str, Value] = field(default_factory=dict)
@@ -62,5 +60,4 @@ def missing_reactances(done: Iterable[float]) -> tuple[float, ...]:
 
 
 def shown(value: Value) -> str:
-    """A value as the command line takes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

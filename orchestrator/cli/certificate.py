@@ -41,7 +41,6 @@ CODE_NAMES = (*WITH_VERDICT, GB, ALL)  # what ``--code`` takes
 
 
 def codes_of(asked: str) -> tuple[str, ...]:
-    """The codes with a verdict that an option ``--code`` asks for."""
     return WITH_VERDICT if asked == ALL else (asked,)
 
 

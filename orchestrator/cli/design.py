@@ -165,5 +165,4 @@ def _writable(path: Path) -> Path:
 
 
 def _in_percent(ratio: float | None) -> str | None:
-    """A damping ratio as the options take it."""
     return None if ratio is None else f"{100 * ratio:g}%"

@@ -52,7 +52,6 @@ def _component(wanted: str | None, model: str, prepared: PreparedScenario) -> st
 
 
 def _one(option: str, what: str, wanted: str | None, known: list[str], where: str) -> str:
-    """The one that is wanted, or the only one there is."""
     if wanted is None and len(known) == 1:
         return known[0]
     if wanted not in known:

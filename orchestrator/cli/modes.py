@@ -87,7 +87,6 @@ def _with_a_black_box(options: argparse.Namespace) -> int:
 
 
 def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
-    """See `run`."""
     if options.black_box:
         with said_stages() as report:
             results = [

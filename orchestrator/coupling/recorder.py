@@ -74,7 +74,6 @@ class Recorder:
         return self._first + self._filled
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
-        """See `Observer.begin`."""
         by_component: dict[str, list[tuple[int, str]]] = {}
         for column, name in enumerate(self.names):
             component, _, variable = name.partition(".")
@@ -103,7 +102,6 @@ class Recorder:
         self._times, self._block = np.empty(rows), np.empty((rows, len(self.names)))
 
     def observe(self, run: ObservedRun) -> None:
-        """See `Observer.observe`."""
         if run.index == self._last_index:
             return  # taken up again where this row was recorded already
         if self.after_exchange:

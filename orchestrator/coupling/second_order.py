@@ -43,7 +43,6 @@ class _LineLoop:
         self.completed = 0
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        """See `orchestrator.coupling.loop.Loop.advance`."""
         self.completed = 0
         for k in range(index, index + count):
             with calls:
@@ -114,7 +113,6 @@ class _LineLoop:
         )
 
     def seconds(self) -> list[float]:
-        """See `orchestrator.coupling.loop.Loop.seconds`."""
         return list(self._spent.values())
 
     @property
@@ -186,7 +184,6 @@ class CompiledMidpointLoop(CompiledLoop):
         super()._judge(status, step_size)
 
     def settle(self) -> None:
-        """See `MidpointLoop.settle`."""
         self._lines.settle()
 
 
@@ -282,7 +279,6 @@ class NewtonLoop(_LineLoop):
 def line_loop(
     groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule
 ) -> MidpointLoop | CompiledMidpointLoop | NewtonLoop:
-    """The loop of a schedule of second order."""
     if schedule.coupling == "newton":
         return NewtonLoop(groups, y, tracks, schedule)
     library = compiled_loop.loop_library()

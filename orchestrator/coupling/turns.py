@@ -105,8 +105,6 @@ class Turn(Protocol):
 
 
 class Loop(Protocol):
-    """Steps a system."""
-
     def advance(self, index: int, count: int, step_size: float) -> None:
         """Do communication steps.
 

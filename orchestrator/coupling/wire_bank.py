@@ -126,7 +126,6 @@ class WireBank:
         """Nothing in a bank can fail."""
 
     def step(self, time: float, step_size: float) -> None:
-        """One communication step, in Python."""
         self._do_step(self.pointer, time, step_size, 1)
 
     # -- settings --------------------------------------------------------------------------------

@@ -79,8 +79,6 @@ class SignalMap:
 
 @dataclass(frozen=True)
 class PortMap:
-    """All of a binding, in numbers."""
-
     rating: float  # S_n of the FMU as delivered [MVA]
     f_n: float
     voltage: PhasorMap

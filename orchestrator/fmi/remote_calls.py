@@ -17,11 +17,9 @@ class RemoteCalls(ABC):
         self._remote("fmi2SetupExperiment", "setup", start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
-        """Begin the initialisation."""
         self._remote("fmi2EnterInitializationMode", "enter_initialization_mode")
 
     def exit_initialization_mode(self) -> None:
-        """End the initialisation."""
         self._remote("fmi2ExitInitializationMode", "exit_initialization_mode")
 
     def reset(self) -> None:

@@ -58,7 +58,6 @@ class Wine:
 
 @cache
 def find_wine() -> Wine:
-    """The installation of this machine."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         raise NoWineError(
             f"Windows libraries run on Windows, or on Linux for x86_64 under Wine; this is {sys.platform}"

@@ -55,7 +55,6 @@ def proxy_path() -> Path:
 
 @cache
 def host_path() -> Path:
-    """The compiled program for Windows."""
     source = "#define UNDER_WINE\n" + joined_source(*_BOTH, _HERE / "wine_host.c")
     return compile_for(source, TARGETS[wine.PLATFORM][0], ".exe")
 
@@ -235,7 +234,6 @@ class WineLibrary:
         return found
 
     def read(self, address: int, size: int) -> bytes:
-        """A stretch of memory."""
         return self._ask(READ, address, size, answer=size)[1]
 
     def text(self, address: int | None) -> bytes:

@@ -33,7 +33,6 @@ class Candidate:
 
 
 def probe_system() -> System:
-    """The probe pair in its loop."""
     system = System()
     system.add("a", catalogue_fmu("probe_a"))
     system.add("b", catalogue_fmu("probe_b"))

@@ -65,7 +65,6 @@ class RecordingFolder:
         self._rows = first + len(times)
 
     def resume(self, names: Sequence[str], rows: int) -> Iterator[Block]:
-        """See `RowSink.resume`."""
         self._names = tuple(names)
         for part in parts_of(self.folder):
             first = int(part.stem)

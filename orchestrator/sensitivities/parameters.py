@@ -25,7 +25,6 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """``component.variable``."""
         return f"{self.component}.{self.variable}"
 
     @property

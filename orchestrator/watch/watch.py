@@ -114,8 +114,6 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
 
 
 class _Responses:
-    """Findings stretch by stretch."""
-
     def __init__(self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest]) -> None:
         self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
         self.masked: dict[Stretch, Sequence[Unrest]] = {}

@@ -96,7 +96,7 @@ def said(capsys):
 
 @pytest.mark.parametrize("command", [["fmu", "admittance"], ["certify"], ["certify", "--code", "aemo"]], ids=" ".join)
 def test_a_controller_alone_is_refused_with_the_remedy(folder, capsys, command):
-    assert main([command[0], str(folder / "droop.so"), *command[1:]]) == 2
+    assert main([*command, str(folder / "droop.so")]) == 2
     printed = said(capsys)
     assert "it has no v_re, v_im, i_re, i_im: a controller alone stands at no bus" in printed
     assert "device's file" in printed

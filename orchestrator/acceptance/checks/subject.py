@@ -193,7 +193,6 @@ class Subject:
         return lambda time: self.amplitudes
 
     def motion(self, step_size: float) -> Stimulus:
-        """All inputs move with every step."""
         return lambda time: self.amplitudes * np.sin(1.0 + 0.86 * time / step_size)
 
     def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Numbers:
@@ -238,7 +237,6 @@ class Running:
         self._in.write()
 
     def read(self) -> Numbers:
-        """The outputs at this time."""
         return self._out.read().copy()
 
     def step(self, step_size: float) -> None:

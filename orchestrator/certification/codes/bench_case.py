@@ -37,7 +37,6 @@ def rated_frequency(request: CertificationRequest, wanted: float) -> float:
 
 
 def case_name(row: str) -> str:
-    """Name of a row's case file."""
     return f"row_{row}.toml"
 
 

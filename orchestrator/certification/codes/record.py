@@ -50,7 +50,6 @@ def _row(v: RowVerdict, c: CodeCertificate) -> dict[str, Any]:
 
 
 def finding_json(finding: RowFinding) -> dict[str, Any]:
-    """A finding as JSON's types."""
     return {name: getattr(finding, name) for name in RowFinding.__dataclass_fields__}
 
 

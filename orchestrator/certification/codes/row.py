@@ -57,7 +57,6 @@ class Bounded:
     bands: Callable[[MeasuredRow], Sequence[Band]]
 
     def __call__(self, row: MeasuredRow) -> RowFinding:
-        """Whether it is met."""
         return self.judge(row)
 
 

@@ -46,8 +46,6 @@ Distances = Callable[[Numbers], Bounds]
 
 @dataclass(frozen=True)
 class Envelope:
-    """Bounds of one response."""
-
     distances: Distances  # what is asked and allowed over the time after the event [s]
     sign: int  # +1 where the value has to rise
     opens_at_once: bool = False  # whether all of what is allowed is allowed from the event on
