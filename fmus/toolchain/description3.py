@@ -3,6 +3,7 @@
 from xml.etree.ElementTree import Element, SubElement
 
 from fmus.toolchain.description_common import (
+    COMPONENT,
     TOOL,
     component_element,
     described_variables,
@@ -38,7 +39,7 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     _structure(root, model)
     annotations = SubElement(root, "Annotations")
     SubElement(annotations, "Annotation", type=f"{TOOL}.ContinuousStates").text = "settable"
-    SubElement(annotations, "Annotation", type=f"{TOOL}.Component").append(component_element(model))
+    SubElement(annotations, "Annotation", type=COMPONENT).append(component_element(model))
     return text_of(root)
 
 

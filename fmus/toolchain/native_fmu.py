@@ -26,8 +26,6 @@ _FOLDERS_3 = {
 
 
 class NativeFmu:
-    """All parts of a native FMU, with one hash over them."""
-
     cache_prefix = "native_"
 
     def __init__(self, model: Model, version: FmiVersion = "2.0", *, sources: bool = False) -> None:

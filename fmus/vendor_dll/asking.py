@@ -30,7 +30,6 @@ class Answer:
 
 
 def note_beside(answer: Path) -> Path:
-    """File in which the process notes what the DLL is doing."""
     return answer.with_name(answer.name + ".doing")
 
 

@@ -75,8 +75,6 @@ class DllParameter:
 
 @dataclass(frozen=True)
 class DllInterface:
-    """Everything that a DLL declares of itself."""
-
     texts: dict[str, str]  # ``ModelName``, ``ModelVersion`` and the eight others, by the interface's names
     interface_version: tuple[int, ...]  # four numbers
     sample_time: float  # ``FixedStepBaseSampleTime`` [s]; not positive means: that of the host

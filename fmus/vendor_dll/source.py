@@ -54,7 +54,6 @@ class HostVariable:
 
     @property
     def fixed(self) -> bool:
-        """Whether a parameter can be set before the start only."""
         p = self.parameter
         return not p.tunable if isinstance(p, Parameter) else p is None or p.fixed
 
@@ -171,7 +170,6 @@ def _tables(
     vendor_file: str,
     variables: Sequence[HostVariable],
 ) -> list[str]:
-    """Declarations of the DLL's data."""
     regions = trial.regions
     sizes = {
         name: layout(rows).size

@@ -144,7 +144,6 @@ class FmuProcess:
         return found
 
     def table(self, answer: Any) -> dict[str, float | bool]:
-        """The names and numbers that an answer must be."""
         found: dict[str, float | bool] = self._typed(answers.table, answer)
         return found
 

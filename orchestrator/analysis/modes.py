@@ -193,7 +193,6 @@ def oscillations(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
 
 
 def least_damped_first(modes: Iterable[Mode]) -> list[Mode]:
-    """Sorted by damping ratio, then frequency."""
     return sorted(modes, key=lambda mode: (mode.damping_ratio, mode.frequency_hz))
 
 

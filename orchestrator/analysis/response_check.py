@@ -249,7 +249,6 @@ class _Comparison:
         return np.hstack([x @ m.A.T + u @ m.B.T, x @ m.C.T + u @ m.D.T])
 
     def _by_itself(self) -> Matrix:
-        """All signals, from the inputs alone."""
         m = self.model
         over = {k: over_held_inputs(m.A, m.B, k * self.step_size) for k in set(self.plan.holds)}
         x = np.zeros(len(m.A))

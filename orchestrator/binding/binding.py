@@ -40,7 +40,6 @@ def bind(fmu: FmuDescription, binding: Path | str) -> BoundDescription:
 
 
 def read_table(path: Path) -> BindingTable:
-    """Read a binding file and check its form."""
     _, raw = read_toml(path, "the binding", "`gfor fmu bind FILE.fmu` drafts one")
     try:
         return BindingTable.model_validate(raw)

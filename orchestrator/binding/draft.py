@@ -237,7 +237,6 @@ def _units(table: str, guess: Guess | None) -> list[str]:
 
 
 def _unit(info: VariableInfo, such_as: str) -> list[str]:
-    """The unit of a variable that declares no unit: from its description, or to be filled in."""
     if not undeclared(info):
         return []
     unit = likely_unit(info)

@@ -55,7 +55,6 @@ class Bench:
 
     @property
     def saves_state(self) -> bool:
-        """Whether the bench saves and restores the device's state."""
         return self.description.can_save_state if self.restore is None else self.restore
 
     @contextmanager

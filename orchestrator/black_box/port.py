@@ -11,7 +11,6 @@ from orchestrator.fmi.devices import NO_BUS, is_controller_alone
 
 
 def values_for(description: FmuDescription, given: Mapping[str, Any]) -> dict[str, float | bool]:
-    """Values of ``--set`` in the variables' own units."""
     values = {}
     for name, value in given.items():
         info = description.variables.get(name)

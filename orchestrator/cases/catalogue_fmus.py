@@ -17,8 +17,6 @@ _TO_COME = "not-built"  # identity of an FMU that is not there
 
 @dataclass(frozen=True, eq=False)
 class PlannedFmu:
-    """An FMU of the catalogue that may have to be built."""
-
     model: str
     network: Network | None
     native: bool

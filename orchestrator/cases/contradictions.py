@@ -85,7 +85,6 @@ def _again(names: Iterable[str]) -> Iterator[tuple[str, int]]:
 
 
 def doubts(case: CaseTable, place: Locate) -> list[Problem]:
-    """What is used in part or not at all, as questions."""
     ring = case.analysis.ring_down
     found = []
     if ring is not None and not case.analysis.modes:

@@ -71,7 +71,6 @@ class Draft:
     _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
-        """Add a problem, once."""
         problem = Problem(place, text, kind)
         if problem not in self.problems:
             self.problems.append(problem)
@@ -94,7 +93,6 @@ class Draft:
         return repeated
 
     def place_of_component(self, name: str) -> str:
-        """Place of a component: its table, or the row of its unit."""
         origin = self.origins.get(name)
         return self.place("components", name) if origin is None else origin.row
 

@@ -163,7 +163,6 @@ def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event
 
 
 def forcing_events(draft: Draft, table: ForcingTable, clock: Clock, stop: float, where: str) -> list[Event]:
-    """A forcing of the table's reference, checked."""
     plan = draft.system.components.get(table.component)
     if plan is None:
         if table.component not in draft.scenario.remove:

@@ -27,7 +27,6 @@ class Facts:
     voltages_pu: tuple[float, float]  # least and largest magnitude
 
     def sentence(self) -> str:
-        """The line that answers begin with."""
         units = [_counted(n, what) for n, what in ((self.machines, "machine"), (self.converters, "converter")) if n]
         slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
         parts = [

@@ -189,7 +189,6 @@ def connections_meant(draft: Draft, text: str, where: str) -> list[Connection]:
 
 
 def matching(connections: Sequence[Connection], ends: Sequence[str]) -> Iterator[Connection]:
-    """Connections whose ends fit two patterns."""
     source, target = ends
     for connection in connections:
         if _fits(str(connection.source), source) and _fits(str(connection.target), target):

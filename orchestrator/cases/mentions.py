@@ -26,7 +26,6 @@ class Named:
     homes: set[str] = field(default_factory=set)  # names that an area may contain: components and buses
 
     def add(self, draft: Draft) -> None:
-        """Add the names of one assembled scenario."""
         for name, plan in draft.system.components.items():
             fmu = plan.description
             self.components.add(name)
@@ -40,7 +39,6 @@ class Named:
 
 
 def unmatched(case: CaseTable, named: Named, place: Locate) -> list[Problem]:
-    """Every entry without a match, with its place."""
     return [
         *_states(case, named, place),
         *_areas(case, named, place),

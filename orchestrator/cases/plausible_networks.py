@@ -99,7 +99,6 @@ def _swapped(component: str, resistance: str, reactance: str, R: float, X: float
 
 
 def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> str:
-    """Place where a value of an element was set, or otherwise the place of the element."""
     table = draft.case.network
     for variable in variables:
         if set_at := draft.places.get(f"{draft.grid}.{variable}"):

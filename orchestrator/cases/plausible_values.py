@@ -45,7 +45,6 @@ def outside(
     where: str | None = None,
     scale: float = 1.0,
 ) -> Iterator[UnusualValue]:
-    """Ask about a value that is not in its usual range."""
     given, value = value, value * scale
     if wanted.fits(value):
         return

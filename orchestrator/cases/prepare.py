@@ -116,7 +116,6 @@ class Preparer:
 
     @property
     def problems(self) -> list[Problem]:
-        """The mistakes found so far."""
         return self.draft.problems
 
     def assemble(self) -> System:

@@ -40,7 +40,6 @@ def check_length(draft: Draft, clock: Clock | None, stop: float) -> None:
 
 
 def checked_schedule(draft: Draft) -> Schedule:
-    """The case's schedule, checked against its components."""
     schedule, solver = _chosen(draft), draft.case.solver
     if solver.tolerance is not None and not schedule.is_second_order:
         draft.note(

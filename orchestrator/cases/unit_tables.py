@@ -134,7 +134,6 @@ def _name_in(entry: Row) -> str:
 
 
 def _require_names(rows: Sequence[UnitRow], path: Path) -> None:
-    """Several units at a bus have names of their own."""
     at_bus = Counter(row.bus for row in rows)
     labels = Counter(row.label for row in rows)
     for row in rows:

@@ -57,7 +57,6 @@ def issue_of(
 
 
 def bench_request(fmu: Path, binding: Path | None, values: Mapping[str, Value]) -> CertificationRequest:
-    """A checked request for a device on the test bench."""
     request = CertificationRequest(as_device(fmu, binding), binding, values)
     request.check()
     return request

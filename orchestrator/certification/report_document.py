@@ -78,7 +78,6 @@ def _voltage(c: Certification) -> str:
 
 
 def parameters(c: Certification) -> str:
-    """All parameters of the FMU, with the changed ones marked."""
     rows = [
         [escape(r.name), _text(r.start), f"<b>{_text(r.used)}</b>" if r.changed_by else _text(r.used),
          escape(r.unit), escape(r.changed_by or "–"), escape(r.description)] for r in parameter_rows(c)

@@ -54,7 +54,6 @@ def same_reactance(one: float, other: float) -> bool:
 
 
 def missing_reactances(done: Iterable[float]) -> tuple[float, ...]:
-    """Reactances of the norm that are missing among the given ones."""
     values = list(done)
     return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in values))
 

@@ -60,7 +60,6 @@ def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies
 
 
 def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
-    """In which order components step."""
     parser.add_argument(
         "--schedule",
         choices=SCHEDULES,

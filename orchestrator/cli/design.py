@@ -130,7 +130,6 @@ def _request(options: argparse.Namespace) -> DesignRequest:
 
 
 def _command_line(options: argparse.Namespace, request: DesignRequest) -> str:
-    """The command that was given, with all that is not left to its default."""
     words = ["gfor", "design", str(options.case), "--controller", *options.controller]
     single = {"--component": request.component, "--mode": request.mode, "--damping": _in_percent(request.damping),
               "--damping-increment": _in_percent(options.damping_increment), "--stages": request.stages,

@@ -182,7 +182,6 @@ def _run_into(
 def _early_end(
     name: str, error: BaseException, scenarios: Sequence[Scenario], results: Sequence[RunResult]
 ) -> EarlyEnd:
-    """Where a study ended, and what never began."""
     titles = {scenario.name: scenario.title for scenario in scenarios}
     names = list(titles)
     never = {later: titles[later] for later in names[names.index(name) + 1 :]}

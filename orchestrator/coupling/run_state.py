@@ -145,7 +145,6 @@ def state_as_bytes(component: Component) -> bytes:
 
 
 def set_state(component: Component, content: bytes) -> None:
-    """Bring a component to where another instance of it was."""
     state = component.deserialize_state(content)
     try:
         component.restore_state(state)

@@ -117,7 +117,6 @@ class _LineLoop:
 
     @property
     def threads(self) -> int:
-        """See `orchestrator.coupling.turns.Loop.threads`."""
         return 1
 
     def close(self) -> None:
@@ -157,7 +156,6 @@ class CompiledMidpointLoop(CompiledLoop):
         self._end = np.empty_like(y)
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        """See `orchestrator.coupling.turns.Loop.advance`."""
         self.before = np.array(self._y if self.before is None else self.before, dtype=float)
         with calls:
             status: int = self._library.advance_lines(

@@ -20,8 +20,6 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """An output that feeds an input."""
-
     source: Endpoint
     target: Endpoint
 
@@ -125,7 +123,6 @@ class System:
         self._wire(connection).disturb(imperfection)
 
     def foresee(self, connection: Connection, imperfection: Imperfection) -> None:
-        """Let an event give a connection an imperfection later."""
         later = self._wire(connection).later
         if imperfection not in later:
             later.append(imperfection)

@@ -167,7 +167,6 @@ class WireBank:
 
     @property
     def quiet(self) -> bool:
-        """Whether noise and quantisation are left out."""
         return bool(self._bank.quiet)
 
     @quiet.setter

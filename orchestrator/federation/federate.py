@@ -159,7 +159,6 @@ class OwnFederate:
         self._setting = setting
 
     def do_begin(self) -> None:
-        """Ask for the first time."""
         self._configured.set()
 
     def do_end(self) -> None:

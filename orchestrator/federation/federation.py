@@ -149,7 +149,6 @@ class Federation:
     # -- conversation ----------------------------------------------------------------------------
 
     def _receive(self, kind: bytes, seconds: float) -> bytes:
-        """The hub's answer."""
         assert self._hub is not None
         deadline, asked = time.monotonic() + seconds, None
         interrupted = c_int.from_address(calls.asked_address)

@@ -153,14 +153,12 @@ class RealBatch:
         self.component = component
 
     def read(self) -> NDArray[np.float64]:
-        """Fetch the values from the FMU."""
         if self.names:
             with calls:
                 self.component.check(self.component.get_real(*self.arguments), "fmi2GetReal")
         return self.values
 
     def write(self) -> None:
-        """Send the values to the FMU."""
         if self.names:
             with calls:
                 self.component.check(self.component.set_real(*self.arguments), "fmi2SetReal")

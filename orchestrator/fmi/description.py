@@ -407,8 +407,8 @@ def _units(root: ElementTree.Element) -> dict[str, dict[str, str]]:
 
 def _component(root: ElementTree.Element, version: str) -> tuple[str, dict[str, Usual]]:
     """Our annotation: what the component is, and usual ranges of parameters by name. What is no number is left out."""
-    where = f"Annotations/Annotation[@type='{TOOL}.Component']" if version == "3.0" else _OURS
-    found = root.find(f"{where}/Component")
+    where = "Annotations/Annotation[@type" if version == "3.0" else "VendorAnnotations/Tool[@name"
+    found = root.find(f"{where}='{TOOL}.Component']/Component")
     if found is None:
         return "", {}
     usual = {}

@@ -155,7 +155,6 @@ class LoadedComponent(Derived):
         return ended, number.value if reached and isfinite(number.value) else None
 
     def _asked(self, function: str, kind: int, answer: Any) -> bool:
-        """Whether an FMU answers a question after its status."""
         try:
             with calls:
                 getattr(self._fmu, function)(self._fmu.component, kind, ctypes.byref(answer))

@@ -23,7 +23,6 @@ class RemoteCalls(ABC):
         self._remote("fmi2ExitInitializationMode", "exit_initialization_mode")
 
     def reset(self) -> None:
-        """Make the instance like new."""
         self._remote("fmi2Reset", "reset")
 
     def set(self, values: Mapping[str, float | bool]) -> None:

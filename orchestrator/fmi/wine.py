@@ -199,7 +199,6 @@ class Server:
         return self.shared.pop()
 
     def start(self, program: Path, *words: str) -> "subprocess.Popen[bytes]":
-        """Start a program, once for each `next_shared`."""
         with self._connections.pop() as connection:
             return subprocess.Popen(
                 [find_wine().loader, str(program), *words],

@@ -71,7 +71,6 @@ def compile_programs() -> list[Path]:
 
 @cache
 def proxy() -> Any:
-    """The loaded functions, to ask for what is no function of FMI."""
     library = ctypes.CDLL(str(proxy_path()))
     library.wine_attach.argtypes = [ctypes.c_void_p, ctypes.c_int64]
     library.wine_attach.restype = None
@@ -104,7 +103,6 @@ class WineProgram:
             raise
 
     def _begin(self, patience: float) -> None:
-        """Take a program that has nothing to do, or start one."""
         if _idle:
             self._path, self._process = _idle.pop()
         else:
@@ -245,7 +243,6 @@ class WineLibrary:
         return found.split(b"\0")[0]
 
     def write(self, address: int, content: bytes) -> None:
-        """Change a stretch of memory."""
         self._ask(WRITE, address, len(content), data=content)
 
     def allocate(self, size: int) -> int:

@@ -102,7 +102,6 @@ def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
 
 
 def not_applicable(name: str, because: str) -> CheckResult:
-    """A check that has nothing to test on this FMU."""
     return CheckResult(name, Verdict.NOT_APPLICABLE, because)
 
 

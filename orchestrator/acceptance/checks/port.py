@@ -59,7 +59,6 @@ def current_limit(subject: Subject) -> float | None:
 
 
 def voltage_rows(running: Running, factors: Complex) -> Numbers:
-    """Deviations of the inputs, one row for each factor on the voltage from which it started."""
     names = running.subject.inputs
     at = [names.index("v_re"), names.index("v_im")]
     moved = complex(*running.rest[at]) * (factors - 1)

@@ -89,7 +89,6 @@ class Subject:
     # -- instances -------------------------------------------------------------------------------
 
     def open(self, name: str = "fmu") -> HostedComponent:
-        """A new instance, before initialisation."""
         return HostedComponent(name, self.process())
 
     @contextmanager
@@ -189,7 +188,6 @@ class Subject:
         return lambda time: heights[int(time / hold + 1e-6) % len(heights)]
 
     def one_step(self) -> Stimulus:
-        """All inputs step at the beginning and stay."""
         return lambda time: self.amplitudes
 
     def motion(self, step_size: float) -> Stimulus:
@@ -265,14 +263,12 @@ class Running:
         return values
 
     def save(self) -> Any:
-        """Save the FMU's state."""
         return self.component.save_state()
 
     def restore(self, state: Any) -> None:
         self.component.restore_state(state)
 
     def reset(self) -> None:
-        """Reset the instance and initialise it again."""
         self.component.reset()
         self.begin()
 
@@ -287,7 +283,6 @@ class Running:
 
 @contextmanager
 def saved(running: Running) -> Iterator[Any]:
-    """A saved state that is freed at the end."""
     state = running.save()
     try:
         yield state

@@ -29,7 +29,6 @@ def code_responses(certificate: CodeCertificate) -> xr.Dataset:
 
 
 def code_json(c: CodeCertificate) -> dict[str, Any]:
-    """All figures as JSON's types."""
     return {
         "format": CODE, "code": c.code.key, "title": c.code.title, "source": c.code.source, "date": c.code.date,
         "f_n": c.f_n, "verdict": c.verdict, "sentence": c.sentence(), "model": c.description.model_name,

@@ -124,7 +124,6 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
 
 
 def rte_code(declared: Mapping[str, float]) -> GridCode:
-    """RTE's rows for what an applicant declares."""
     rows = [
         made
         for scr in (STRONG, WEAK)
