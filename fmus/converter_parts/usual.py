@@ -30,4 +30,4 @@ FOLLOWING = {
     "reactive_power.X_s": Usual(0.05, 2, "short-circuit ratios of 0.5 to 20"),
     "frequency_droop.R_f": Usual(0.002, 0.3, DROOP),
 }
-"""Of converters that follow the grid by a PLL."""
+"""The same for converters that follow the grid by a PLL."""

@@ -22,7 +22,7 @@ MODES = f"{COLIB}, mode 0; 0.1667 and 50 in mode 1"
 
 @dataclass(frozen=True)
 class Following:
-    """What the variants show: frame, current into the bus in it [pu, S_n], and magnitudes."""
+    """Quantities that the variants show: frame, current into the bus in it [pu, S_n], and magnitudes."""
 
     frame: Frame
     into_bus: Phasor

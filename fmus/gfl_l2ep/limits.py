@@ -10,7 +10,7 @@ from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
 SMALLEST = 1e-3
-"""Of the square of the limit, what is left below a root for its derivative to be finite."""
+"""Least part of the limit's square under a root, for a finite derivative."""
 
 
 @dataclass(frozen=True)

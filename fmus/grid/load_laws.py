@@ -167,7 +167,7 @@ def _of_law(law: Zip, ratio: ca.SX, k: float, deviation: Scalar) -> Scalar:
 
 
 def _missing(load: Load, declared: DeclaredLoad, v_0: Phasor) -> Phasor:
-    """What the admittance does not draw of the power at the operating point: all of it for static generation."""
+    """The power at the operating point less the admittance's: all of it for static generation."""
     G = declared.G_0 if load.conductance_mw == 0 and load.p_mw else 0.0
     B = declared.B_0 if load.susceptance_mvar == 0 and load.q_mvar else 0.0
     return v_0 * Phasor(G, B) if load.p_mw < 0 else ZERO

@@ -114,7 +114,7 @@ def declare_winding_powers(m: ModelBuilder, windings: Windings, buses: dict[str,
 
 
 def _admittances(windings: Windings) -> tuple[tuple[Phasor, ...], ...]:
-    """Of the three windings behind their ratios: y_j·y_k/Σy beside the diagonal, without dividing by any Z."""
+    """Admittances of the three windings behind their ratios: y_j·y_k/Σy off the diagonal, without dividing by Z."""
     a, b, c = windings.Z
     scale = _ONE / (a * b + b * c + c * a) * windings.connected
     return (

@@ -21,7 +21,7 @@ S_N, P_0 = 1500.0, 0.9
 
 @dataclass(frozen=True)
 class Signals:
-    """What both variants show beside their port."""
+    """Quantities that both variants show beside their port."""
 
     frame: Frame
     limited: Limited

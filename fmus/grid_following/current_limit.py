@@ -15,7 +15,7 @@ SMALLEST = 1e-6
 
 @dataclass(frozen=True)
 class Limited:
-    """What is asked for, what is allowed [pu, S_n], and what is asked for in parts of the limit [1]."""
+    """Requested current, permitted current [pu, S_n], and their ratio to the limit [1]."""
 
     demanded: Phasor
     allowed: Phasor
@@ -23,7 +23,7 @@ class Limited:
 
     @property
     def excess(self) -> Phasor:
-        """What is asked for beyond the limit; exactly 0 within it."""
+        """Excess of the request over the limit; exactly 0 within it."""
         return self.demanded - self.allowed
 
 

@@ -1,4 +1,4 @@
-"""What tells the catalogue's generators apart, and what all of them show: with stator transients and without alike."""
+"""The case studies' generators, and the outputs that all generators have."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

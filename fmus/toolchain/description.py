@@ -19,7 +19,7 @@ from fmus.toolchain.description_common import (
 from fmus.toolchain.model import Model
 
 _GROUPS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "InitialUnknown": "InitialUnknowns"}
-"""What FMI 2.0 calls the list of each kind of unknown."""
+"""FMI 2.0's name of the list of each kind of unknown."""
 
 
 def model_description(

@@ -1,4 +1,4 @@
-"""What modelDescription.xml says in FMI 2.0 and in FMI 3.0 alike, from a model's declarations.
+"""The part of modelDescription.xml that FMI 2.0 and FMI 3.0 share, from a model's declarations.
 
 `description` and `description3` write the rest: the names that a version gives its elements, and their order.
 """
@@ -77,7 +77,7 @@ def unknowns(model: Model, *, listed: bool = True) -> dict[str, tuple[Unknown, .
 
 
 def component_element(model: Model) -> Element:
-    """What the component is, and the usual ranges of its parameters: ours, beside what FMI has a place for."""
+    """Our annotation: the component's kind, and the usual ranges of its parameters."""
     element = Element("Component", {"kind": model.kind} if model.kind else {})
     for parameter in model.parameters:
         if (usual := parameter.usual) is not None:

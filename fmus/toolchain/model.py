@@ -13,7 +13,7 @@ from fmus.toolchain.variables import CalculatedParameter, Input, Kind, Output, P
 Integrator = Literal["runge_kutta", "sdirk"]
 
 FmiVersion = Literal["2.0", "3.0"]
-"""Of an FMU without Python."""
+"""FMI versions of a native FMU."""
 
 Function = Any
 """A ``casadi.Function``. CasADi has no types, and the catalogue can be listed without it."""

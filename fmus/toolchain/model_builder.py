@@ -25,7 +25,7 @@ from fmus.toolchain.variables import (
 )
 
 Scalar = ca.SX | float
-"""What equations are made of."""
+"""An operand of equations."""
 
 
 class ModelBuilder:

@@ -20,7 +20,7 @@ BREAKER_TIME = 1e-3  # time constant τ [s] with which the current of an open br
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """What the power flow says about a device, and the frame that it is said in."""
+    """A device's operating point from the power flow, and its frame."""
 
     # v_0, i_0: bus voltage and injected current of the power flow, network frame [pu, S_n].
     v_0: Phasor

@@ -10,7 +10,7 @@ from typing import Literal
 VariableType = Literal["Real", "Integer", "Boolean"]
 
 Kind = Literal["converter", "machine", "network", "load", ""]
-"""What a component is in a power system; empty for what is none of these, such as a controller alone."""
+"""A component's role in a power system; empty for none of these, such as a controller alone."""
 
 UNITS: dict[str, dict[str, float]] = {
     # unit -> exponents of SI base units, with the factor to them (FMI 2.0, section 2.2.2)

@@ -44,7 +44,7 @@ def read_plain_file(path: Path, most: int = _MOST_BYTES) -> bytes:
 
 
 def read_answer(path: Path) -> dict[str, Any]:
-    """What the process wrote: ``error``, or ``interface`` and ``trial``."""
+    """The process's answer: ``error``, or ``interface`` and ``trial``."""
     try:
         content = json.loads(read_plain_file(path))
     except (ValueError, RecursionError) as error:
@@ -85,7 +85,7 @@ def _text(value: Any, where: str) -> str:
 
 
 def _name(value: Any, where: str) -> str:
-    """As it is: `DllInterface.faults` refuses names that cannot be written."""
+    """The name unchanged: `DllInterface.faults` refuses those that cannot be written."""
     _text(value, where)
     return str(value)
 

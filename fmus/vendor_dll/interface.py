@@ -1,4 +1,4 @@
-"""What an IEEE/CIGRE DLL declares: its signals, parameters and states, and where each lies in the host's memory.
+"""Declarations of an IEEE/CIGRE DLL: its signals, parameters and states, and where each lies in the host's memory.
 
 Source of the structures: CIGRE Technical Brochure 958 (2025) and the header of its API, version 2.
 """
@@ -100,7 +100,7 @@ class DllInterface:
         return replace(self, parameters=rows)
 
     def faults(self) -> list[str]:
-        """What the DLL declares that no host can run, in words; empty for a sound one."""
+        """Declarations that no host can run, in words; empty for a sound DLL."""
         found = [
             f"it has no function Model_{call}, which every host calls" for call in NEEDED if call not in self.calls
         ]

@@ -31,7 +31,7 @@ class Library(Protocol):
         """Whether it has a function."""
 
     def call(self, name: str, argument: int = 0) -> int:
-        """What a function returns for one pointer, as 64 bits."""
+        """A function's answer to one pointer, as 64 bits."""
 
     def read(self, address: int, size: int) -> bytes:
         """A stretch of memory."""
@@ -59,7 +59,7 @@ class LocalLibrary:
         return hasattr(self._library, name)
 
     def call(self, name: str, argument: int = 0) -> int:
-        """What a function returns for one pointer, as 64 bits."""
+        """A function's answer to one pointer, as 64 bits."""
         function = getattr(self._library, name)
         function.restype, function.argtypes = c.c_int64, [c.c_void_p]
         self._note(f"{name} runs")

@@ -126,7 +126,7 @@ def _parameter(row: _Parameter, text: _Text) -> DllParameter:
 
 
 def read(library: Library, texts: Mapping[str, str] | None) -> dict[str, Any]:
-    """What a DLL declares, and, where texts are given, how it keeps its state with them, as JSON has it."""
+    """A DLL's declarations and, where texts are given, how it keeps its state with them [JSON]."""
     interface = read_interface(library)
     trial = (
         Trial("not tried") if texts is None or interface.faults() else tried(library, interface.with_defaults(texts))

@@ -21,7 +21,7 @@ _HEADERS = "#define _GNU_SOURCE\n" + "".join(
 
 PARAMETER, INITIAL, INPUT, OUTPUT, HELD, INT_STATE, FLOAT_STATE, DOUBLE_STATE, MEMORY_STATE, SAMPLES = range(10)
 CIRCUIT_PARAMETER, CIRCUIT_INPUT, CIRCUIT_STATE, CIRCUIT_VALUE, HELD_INPUT, CONSTANT_INPUT = range(10, 16)
-"""What a variable is to the host. What lies up to `INITIAL` is set before the start."""
+"""A variable's role for the host. Those up to `INITIAL` are set before the start."""
 
 _ROLES = ("PARAMETER", "INITIAL", "INPUT", "OUTPUT", "HELD", "INT_STATE", "FLOAT_STATE", "DOUBLE_STATE",
           "MEMORY_STATE", "SAMPLES", "CIRCUIT_PARAMETER", "CIRCUIT_INPUT", "CIRCUIT_STATE",

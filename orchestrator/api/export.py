@@ -24,7 +24,7 @@ _TABLES: dict[str, Any] = {
     "reference": True,
     "solver": {"record_interval", "record", "record_filter"},
 }
-"""What of a case file SSP has no place for and no structure of our annotation holds."""
+"""Tables of a case file that go into our annotation as they are, as SSP has no place for them."""
 
 
 def export(what: Any, kind: str, out: str | Path | None = None, **how: Any) -> list[Path]:

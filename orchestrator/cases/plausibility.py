@@ -119,7 +119,7 @@ def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
 
 
 def _to_rating(plan: ComponentPlan, variable: str) -> float:
-    """What carries a machine's value from the base of its data, ``machine.S_data``, to the rating; otherwise 1."""
+    """The factor from the base of a machine's data, ``machine.S_data``, to its rating; otherwise 1."""
     S_data, S_n = value_of(plan, "machine.S_data"), value_of(plan, "S_n")
     if not S_data or not S_n:
         return 1.0

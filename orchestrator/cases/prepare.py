@@ -243,7 +243,7 @@ class Preparer:
             )
 
     def _parts(self, name: str, table: ComponentTable) -> tuple[tuple[str, str], ...]:
-        """What a component of the catalogue is made of; the strongest layer decides on each part."""
+        """The parts of a component of the catalogue; the strongest layer decides on each."""
         known = parts_of(table.model) if table.model in model_names() and not takes_network(table) else {}
         chosen = {part: found for part in PARTS if (found := getattr(table, part)) is not None}
         choices = [choice for layer in self.draft.layers for choice in layer.parts]

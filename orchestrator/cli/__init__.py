@@ -103,7 +103,7 @@ How do the models get into another tool, and does it compute alike?
 
 `gfor COMMAND --help` has a command's options, `gfor --help` all commands.
 """
-"""What ``gfor`` alone prints."""
+"""The page that ``gfor`` alone prints."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -105,7 +105,7 @@ def _tested(
 def _take_needs(
     options: argparse.Namespace, found: CodeCertificate, cell: MatrixCell, folder: Path, console: Console
 ) -> None:
-    """What the failed criteria would take; where that cannot be found, the certificate stands."""
+    """Find the needs of failed criteria; where that fails, the certificate stands."""
     if not options.json:
         console.print(escape(f"{cell.device}, {cell.code}:"), highlight=False)
     note = _Note()

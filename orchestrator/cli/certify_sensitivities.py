@@ -43,7 +43,7 @@ def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"by so much of itself a parameter is changed to either side (default: {100 * CHANGE:g} percent)",
     )  # fmt: skip
     group.add_argument("--confirm", action="store_true",
-                       help="run the one change that a straight line lets expect most of")  # fmt: skip
+                       help="run the single change predicted to help most")  # fmt: skip
 
 
 def relative_change(text: str) -> float:

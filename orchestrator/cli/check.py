@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _each_once(results: list[CheckResult]) -> list[CheckResult]:
-    """What was not asked for one and the same reason goes into one line."""
+    """Join checks that were left out for the same reason in one line."""
     lines: list[CheckResult] = []
     for result in results:
         if result.verdict is Verdict.NOT_APPLICABLE and lines and lines[-1].evidence == result.evidence:

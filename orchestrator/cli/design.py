@@ -113,7 +113,7 @@ def _check_over_points(options: argparse.Namespace) -> None:
 
 
 def _how_it_goes_on(folder: Path) -> str:
-    """What an interrupt leaves; "" where that is nothing, and no empty folder either."""
+    """How to go on after an interrupt; "" and no empty folder where nothing is kept."""
     if any_kept(folder):
         return f"what was computed is in {folder}; the same command continues from there"
     with suppress(OSError):

@@ -1,4 +1,4 @@
-"""What the commands on many points have in common: options, the folder, what is printed, and the last line."""
+"""Parts that the commands on many points share: options, the folder, what is printed, and the last line."""
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -43,11 +43,11 @@ class ComponentPlan:
 
     @property
     def kind(self) -> str:
-        """As the model declares it; what has a device's port and does not say is a converter."""
+        """The model's declaration; a device's port without one is a converter's."""
         return self.description.kind or ("converter" if self.has_port else "")
 
     def value(self, name: str) -> Scalar | None:
-        """What a parameter or an input is set to, else its start value; None where there is neither."""
+        """The value of a parameter or an input, else its start value; None without both."""
         info = self.description.variables[name]
         return self.parameters.get(name, self.inputs.get(name, info.start))
 
@@ -112,7 +112,7 @@ class System:
         self._feeding[end] = start
 
     def _sources(self) -> dict[Endpoint, Endpoint]:
-        """What feeds each connected input; collected anew where the list of connections was changed from outside."""
+        """The source of each connected input; collected anew where the list of connections was changed from outside."""
         if self._counted is not self.connections or len(self._feeding) != len(self.connections):
             self._counted = self.connections
             self._feeding = {c.target: c.source for c in reversed(self.connections)}

@@ -71,7 +71,7 @@ class Component(Protocol):
         """Set variables of any numeric type by name."""
 
     def read(self, batch: "RealBatch") -> None:
-        """Read a batch, and take the FMU at its log's word: after new parameters it may have to refuse."""
+        """Read a batch; raise if the FMU logged an error, as it may after new parameters."""
 
     def get(self, names: Iterable[str]) -> dict[str, float]:
         """Read Real variables by name."""

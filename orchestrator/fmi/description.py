@@ -1,4 +1,4 @@
-"""What an FMU's file declares, read and checked before anything is loaded."""
+"""An FMU's declarations, read and checked before anything is loaded."""
 
 import re
 import zipfile
@@ -157,7 +157,7 @@ def read_description(path: Path | str) -> FmuDescription:
 
 
 def missing_binary(described: FmuDescription) -> tuple[str, str] | None:
-    """What an FMU lacks that it could run on this platform, and the remedy."""
+    """The reason why an FMU cannot run on this platform, and the remedy; None where it can."""
     if fmpy.platform in described.platforms or runs_under_wine(described):
         return None
     has = ", ".join(described.platforms) or "none"
@@ -168,7 +168,7 @@ def missing_binary(described: FmuDescription) -> tuple[str, str] | None:
 
 
 def _or_wine(described: FmuDescription) -> str:
-    """What else would help, to the end of a sentence."""
+    """Another remedy, as the end of a sentence."""
     if wine.PLATFORM not in described.platforms or not described.fmi_version.startswith("2"):
         return ""
     try:
@@ -184,7 +184,7 @@ def runs_under_wine(described: FmuDescription) -> bool:
 
 
 def read_declared(path: Path | str) -> FmuDescription:
-    """As `read_description`, also where the FMU has no binary for this platform and cannot run here."""
+    """The same as `read_description`, also where the FMU has no binary for this platform and cannot run here."""
     path = as_fmu(Path(path))
     return parse_description(path, read_model_description_text(path), names_in(path))
 
@@ -253,7 +253,7 @@ def _lacks_initial(variable: ElementTree.Element) -> bool:
 
 
 def _root(path: Path, text: bytes) -> ElementTree.Element:
-    """What the file says, parsed once: in a large network that takes longer than all else."""
+    """The file parsed, once: in a large network that takes longer than all else."""
     try:
         return ElementTree.fromstring(text)
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two of its encoding
@@ -305,7 +305,7 @@ def _describe(
 
 
 def _sampling(path: Path, root: ElementTree.Element, variables: Mapping[str, VariableInfo]) -> dict[str, Any]:
-    """What a sampled controller says of its sample time, and of the frequency at which it repeats."""
+    """A sampled controller's sample time, and the frequency at which it repeats."""
     listed = root.find(f"{_OURS}/DiscreteStates")
     if listed is None:
         return {}
@@ -334,7 +334,7 @@ def _states(path: Path, md: ModelDescription) -> list[str]:
 
 
 def _events(root: ElementTree.Element, version: str) -> dict[str, Any]:
-    """What an FMU of FMI 3.0 says of events, early returns and clocks."""
+    """Declarations of FMI 3.0 on events, early returns and clocks."""
     interface = root.find("CoSimulation")
     if version != "3.0" or interface is None:
         return {}

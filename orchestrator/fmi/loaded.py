@@ -163,7 +163,7 @@ class LoadedComponent(Derived):
         return True
 
     def _call(self, call: str, function: Any, *arguments: Any) -> Any:
-        """Call through fmpy; an FMU that returns OK but logs an error is taken at its log's word."""
+        """Call through fmpy; raise if the FMU logs an error, even where it returns OK."""
         self._messages.clear()
         try:
             with calls:

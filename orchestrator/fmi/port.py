@@ -1,4 +1,4 @@
-"""What a foreign FMU looks like once its variables are mapped to our port, in plain numbers.
+"""A foreign FMU whose variables are mapped to our port, in plain numbers.
 
 The port of a device: inputs ``v_re``, ``v_im`` [pu of the bus] and outputs ``i_re``, ``i_im`` [pu, 100 MVA] in the
 network's frame, ``p`` and ``q`` at the bus [pu, S_n]; parameters ``S_n`` [MVA] and the power flow's ``P_0``, ``Q_0``
@@ -35,7 +35,7 @@ Matrix2 = tuple[float, float, float, float]  # A real 2×2 matrix, by rows
 
 
 class Form(IntEnum):
-    """What the variables of a port are; the numbers are those of port_adapter.c."""
+    """The form of a port's variables; numbers as in port_adapter.c."""
 
     RECTANGULAR = 0
     POLAR = 1
@@ -167,7 +167,7 @@ class BoundDescription(FmuDescription):
                         yield name, said
 
     def likely_cause(self) -> str:
-        """What of the ratings does not fit, as the end of a sentence on something that went wrong; "" for nothing."""
+        """Ratings that do not fit, as the end of a sentence; "" without any."""
         unlike = self.unlike_delivered()
         return f"likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]" if unlike else ""
 
@@ -234,7 +234,7 @@ def _info(
 def _dependencies(
     inner: FmuDescription, port: PortMap, renamed: Mapping[str, str]
 ) -> dict[str, tuple[str, ...] | None]:
-    """What the outputs depend on directly, in the new names; None where the FMU does not say."""
+    """Direct dependencies of the outputs, in the new names; None where the FMU does not say."""
 
     def translated(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
         if names is None:

@@ -1,4 +1,4 @@
-"""What excitation systems have in common: parameters, the measured voltage, a rate feedback, rectifier and saturation.
+"""Parts that excitation systems share: parameters, the measured voltage, a rate feedback, rectifier and saturation.
 
 Signals of a regulator are per unit of the terminal voltage (base S_n) before the gain and of E_fd after it.
 """

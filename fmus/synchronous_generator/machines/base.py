@@ -1,4 +1,4 @@
-"""What all machines of `synchronous_generator` declare: their base, motion and the transformer in series.
+"""Declarations of all machines of `synchronous_generator`: their base, motion and the transformer in series.
 
 Data sheets give reactances, H and D on ratings of their own; networks on 100 MVA. ``machine.S_data`` says on which.
 """

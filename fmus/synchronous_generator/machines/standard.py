@@ -99,7 +99,7 @@ def _time_1(m: ModelBuilder, axis: str) -> ca.SX:
 
 
 def _one_winding(common: Common, X: ca.SX, X1: ca.SX, T_0: ca.SX, X_l: ca.SX | float = 0.0) -> AxisData:
-    """Of an axis with one winding the leakage reactance changes nothing that is seen from outside."""
+    """Data of an axis with one winding, whose leakage reactance cannot be seen from outside."""
     k = common.scale
     return AxisData(k * X, k * X1, k * X1, ca.SX(k * X_l), T_0, ca.SX(_NO_TIME))
 

@@ -1,4 +1,4 @@
-"""What stabilisers have in common: parameters, lead/lag stages and the limits of the signal."""
+"""Parts that stabilisers share: parameters, lead/lag stages and the limits of the signal."""
 
 from functools import partial
 

@@ -1,4 +1,4 @@
-"""What governors and turbines have in common: their parameters, the reference and the check of their start."""
+"""Parts that governors and turbines share: their parameters, the reference and the check of their start."""
 
 from functools import partial
 
