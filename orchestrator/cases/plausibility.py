@@ -39,22 +39,22 @@ def check_plausibility(draft: Draft) -> None:
 
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     """Add questions to the draft's, without those that the case answers; equal ones become one."""
-    draft.questions += _merged([d for d in doubts if not _is_meant(draft, d.name)])
+    draft.found.questions += _merged([d for d in doubts if not _is_meant(draft, d.name)])
 
 
 def _check_meant(draft: Draft) -> None:
     """Check the entries of ``meant``. A component may exist in another scenario, where its variable is checked."""
-    for pattern in draft.case.meant:
+    for pattern in draft.given.case.meant:
         component, _, variable = pattern.partition(".")
-        if draft.whole and not fnmatch.filter(draft.known, component):
+        if draft.given.whole and not fnmatch.filter(draft.known, component):
             hint = close_names(component, sorted(draft.known), "name it as [components] does")
-            draft.note(draft.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
+            draft.note(draft.given.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
         plans = [p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)]
         elsewhere = variable in (*PARTS, SOLVED) or variable.partition(".")[0] in _OF_PARTS
         here = (v for p in plans for v in p.description.variables)
         if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
             draft.note(
-                draft.place("meant"),
+                draft.given.place("meant"),
                 f"{pattern!r}: {component} has no variable {variable!r}; `gfor fmu info` lists them",
             )
 
@@ -84,14 +84,14 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
             continue
         for rated, said in found.unlike_delivered().items():
             text = f"the binding has {said}: is the binding's rating that of one unit as delivered?"
-            yield UnusualValue(f"{name}.{rated}", draft.place("components", name, "binding"), text)
+            yield UnusualValue(f"{name}.{rated}", draft.given.place("components", name, "binding"), text)
 
 
 def question_loading(draft: Draft) -> None:
     """Ask about converters whose operating point exceeds their rating. The operating point is the power flow's if there
     is one.
     """
-    asked = {question.place for question in draft.questions}  # one question about a rating is enough
+    asked = {question.place for question in draft.found.questions}  # one question about a rating is enough
     question(draft, (d for d in _overloaded(draft) if d.place not in asked))
 
 
@@ -153,7 +153,7 @@ def _check_frequencies(draft: Draft) -> None:
         common = known[grid] if grid else max(set(known.values()), key=list(known.values()).count)
         reference = grid or next(name for name, f in known.items() if f == common)
         for name, f in known.items():
-            if f != common and not any(p.place == _frequency_place(draft, name) for p in draft.problems):
+            if f != common and not any(p.place == _frequency_place(draft, name) for p in draft.found.problems):
                 draft.note(
                     _frequency_place(draft, name),
                     f"{name} is rated at {f:g} Hz and {reference} at {common:g} Hz; what is coupled has one rated "
@@ -169,7 +169,7 @@ def _frequency(plan: ComponentPlan) -> float | None:
 
 def _frequency_place(draft: Draft, name: str) -> str:
     if isinstance(draft.system.components[name].description, BoundDescription):
-        return draft.place("components", name, "binding")
+        return draft.given.place("components", name, "binding")
     return place_of(draft, name, "f_n")
 
 
@@ -203,7 +203,7 @@ def _small_units(draft: Draft) -> Iterator[UnusualValue]:
 
 
 def _is_meant(draft: Draft, name: str) -> bool:
-    return any(fnmatch.fnmatchcase(name, pattern) for pattern in draft.case.meant)
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in draft.given.case.meant)
 
 
 def _merged(doubts: list[UnusualValue]) -> list[Problem]:

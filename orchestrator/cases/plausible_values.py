@@ -23,7 +23,9 @@ class UnusualValue:
 def place_of(draft: Draft, name: str, *variables: str) -> str:
     """Place of the first of some variables of a component that was set, or otherwise the place of the component."""
     found = (draft.places.get(f"{name}.{variable}") for variable in variables)
-    return next((place for place in found if place), f"{draft.place('components', name)}, {variables[0]} (its default)")
+    return next(
+        (place for place in found if place), f"{draft.given.place('components', name)}, {variables[0]} (its default)"
+    )
 
 
 def value_of(plan: ComponentPlan, variable: str) -> float | None:
