@@ -24,24 +24,16 @@ from orchestrator.points.store import PointStore, any_kept
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, several=False)
-    parser.add_argument(
-        "--controller",
-        action="append",
-        required=True,
-        choices=DAMPING_CONTROLLERS,
-        help="the controller to design (with --points repeatable)",
-    )
+    parser.add_argument("--controller", action="append", required=True, choices=DAMPING_CONTROLLERS,
+                        help="the controller to design (with --points repeatable)")  # fmt: skip
     repeatable(parser, "--component", "NAME", "the converter, or a pattern such as 'gfor*' for several with one "
                "setting (default: all with this POD); with --points repeatable: each gets a setting of "
                "its own")  # fmt: skip
     repeatable(parser, "--mode", "NAME", "the case's mode to damp (default: its first); with --points repeatable, all "
                "from 0.1 to 2 Hz by default")  # fmt: skip
-    parser.add_argument(
-        "--gain-from",
-        choices=("non-compensated", "compensated"),
-        default="non-compensated",
-        help="sensitivity that the gain is computed from, without or with the lead/lag (default: non-compensated)",
-    )
+    parser.add_argument("--gain-from", choices=("non-compensated", "compensated"), default="non-compensated",
+                        help="sensitivity that the gain is computed from, without or with the lead/lag (default: "
+                        "non-compensated)")  # fmt: skip
     add_request_arguments(parser, DesignRequest)
     switch(parser, "--no-margins", "leave out the margins, which take longest")
     switch(parser, "--json", "print JSON")

@@ -36,14 +36,9 @@ from orchestrator.study.modes import modes_json
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
     add_range_argument(parser, "frequencies shown [Hz] (default: 0.1:2)")
-    parser.add_argument(
-        "--critical",
-        type=read_percent,
-        nargs="?",
-        const=0.2,
-        metavar="PERCENT",
-        help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
-    )
+    parser.add_argument("--critical", type=read_percent, nargs="?", const=0.2, metavar="PERCENT",
+                        help="only modes with less damping than this (20 by default), by sparse search instead of the "
+                        "full spectrum")  # fmt: skip
     switch(parser, "--directional", "linearise with the FMUs' own directional derivatives instead of by perturbation "
            "(with --native)")  # fmt: skip
     switch(parser, "--black-box", "identify the components that hide their states from their inputs and outputs")

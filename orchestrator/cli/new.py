@@ -16,10 +16,8 @@ _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "files", nargs="*", type=Path, metavar="FILE",
-        help="the network: .raw (with .dyr), .m, .mat, pandapower's .json, a CGMES model; without any, gfor asks",
-    )  # fmt: skip
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="the network: .raw (with .dyr), .m, .mat, "
+                        "pandapower's .json, a CGMES model; without any, gfor asks")  # fmt: skip
     parser.add_argument("--converter", metavar="TEXT", help="'bus 9, 300 MVA, 200 MW, less sg3'")
     device = parser.add_mutually_exclusive_group()
     device.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="a vendor's FMU in place of our converter")
