@@ -9,7 +9,6 @@ import argparse
 import logging
 import posixpath
 import re
-from importlib import import_module
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -116,8 +115,10 @@ def commands() -> str:
 
 
 def _command(name: str, words: str) -> str:
+    from orchestrator.cli import module_of  # noqa: PLC0415 - as above
+
     parser = argparse.ArgumentParser(prog=f"gfor {name}", formatter_class=_formatter)
-    import_module(f"orchestrator.cli.{name.replace('-', '_')}").add_arguments(parser)
+    module_of(name).add_arguments(parser)
     rows = ["| Argument | Meaning |", "|---|---|"]
     for action in parser._actions:
         shown = ", ".join(action.option_strings) or str(action.metavar or action.dest)

@@ -20,6 +20,7 @@ from gfor_fmu.converter import P_0, S_N, OuterControl, outer_control
 from gfor_fmu.droop import declare_droop
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.three_phases import V_N
+from gfor_fmu.usual import FORMING
 
 LEAD = "output_lead"
 """Parameter with which the bridge voltage makes up for the time until it is applied."""
@@ -30,7 +31,9 @@ _THIRD = (1.0, -0.5, -0.5)
 
 def grid_forming_control() -> Model:
     """The control part of `grid_forming_converter` with instantaneous phase quantities in kV and kA."""
-    m = ModelBuilder("gfor_control", "Control of the grid-forming converter: measured u, i_s, i_g to bridge voltage")
+    m = ModelBuilder(
+        "gfor_control", "Control of the grid-forming converter: measured u, i_s, i_g to bridge voltage", usual=FORMING
+    )
     rating = declare_rating(m, S_N)
     V_n = m.parameter("V_n", V_N, "kV", "Rated voltage at the filter, line to line, rms", minimum=1e-3)
     angle_0 = m.parameter(

@@ -12,6 +12,7 @@ from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 from gfor_fmu.droop import Droop, declare_droop, frequency, voltage_reference
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.pod import pod
+from gfor_fmu.usual import FORMING
 
 S_N, P_0 = 1500.0, 0.9
 """Default rating [MVA] and dispatch [pu]: the two-area system's converter."""
@@ -43,7 +44,12 @@ class Converter:
 
 def grid_forming_converter() -> Model:
     """Average EMT-type model of a droop-controlled grid-forming converter, stiff DC side (the paper's Fig. 1)."""
-    m = ModelBuilder("gfor", "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (EMT-type average model)")
+    m = ModelBuilder(
+        "gfor",
+        "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (EMT-type average model)",
+        kind="converter",
+        usual=FORMING,
+    )
     port = device_port(m, S_n=S_N, P_0=P_0)
     converter = declare_converter(m, port)
     declare_port_outputs(m, port, converter.current)

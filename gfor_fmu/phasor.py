@@ -16,11 +16,17 @@ from fmus.toolchain.port import device_port
 from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, outer_control
 from gfor_fmu.current_limit import declare_box_limits
 from gfor_fmu.droop import declare_droop
+from gfor_fmu.usual import FORMING
 
 
 def grid_forming_converter_phasor() -> Model:
     """Droops and POD controllers of `grid_forming_converter` behind an algebraic electrical side."""
-    m = phasor_builder("gfor_phasor", "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (phasor type)")
+    m = phasor_builder(
+        "gfor_phasor",
+        "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (phasor type)",
+        kind="converter",
+        usual=FORMING,
+    )
     port = device_port(m, S_n=S_N, P_0=P_0)
     electrical = declare_filter_data(m, port)
     P, Q = m.algebraic("P"), m.algebraic("Q")

@@ -6,13 +6,17 @@ Therefore φ is held as well. This holds the voltage's phasor in the network fra
 point, exactly as in the variant with v_re and v_im.
 """
 
+from dataclasses import replace
+
 import casadi as ca
 
+from fmus.toolchain import port_variables
 from fmus.toolchain.frames import of_phases, phases, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import declare_rating, port_at
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
+from gfor_fmu.usual import FORMING
 
 V_N = 230.0
 """Default rated voltage [kV, line to line, rms]."""
@@ -20,9 +24,14 @@ V_N = 230.0
 
 def grid_forming_converter_abc() -> Model:
     """The converter of `grid_forming_converter` behind a three-phase port in volts and amperes."""
-    m = ModelBuilder("gfor_abc", "Grid-forming converter with instantaneous phase voltages and currents (EMT-type)")
+    m = ModelBuilder(
+        "gfor_abc",
+        "Grid-forming converter with instantaneous phase voltages and currents (EMT-type)",
+        kind="converter",
+        usual=FORMING,
+    )
     rating = declare_rating(m, S_N)
-    V_n = m.parameter("V_n", V_N, "kV", "Rated voltage at the bus, line to line, rms", minimum=1e-3)
+    V_n = m.declare(replace(port_variables.V_N, start=V_N))
     angle_0 = m.parameter(
         "angle_0", 0.0, "rad", "Angle of the network frame at the start; phase a is v·cos(angle_0 + theta_0) there"
     )

@@ -18,10 +18,14 @@ _HOMES = {
     "Modes": "api.results",
     "Run": "api.results",
     "Scenario": "api.scenario",
+    "admittance": "api.admittance",
+    "bind": "api.binding",
     "build": "api.models",
     "built_in_cases": "api.case",
+    "certify": "api.certification",
     "check": "api.acceptance",
     "compare": "api.comparison",
+    "export": "api.export",
     "export_comtrade": "api.comtrade",
     "identify": "api.identification",
     "info": "api.fmu",
@@ -30,6 +34,7 @@ _HOMES = {
     "open_fmu": "api.fmu",
     "read_linear_model": "api.linear",
     "source": "api.source",
+    "verify": "api.certification",
 }
 """Name → module of this package that defines it."""
 

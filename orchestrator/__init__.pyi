@@ -1,9 +1,14 @@
 from orchestrator.api.acceptance import check as check
+from orchestrator.api.admittance import admittance as admittance
+from orchestrator.api.binding import bind as bind
 from orchestrator.api.case import Case as Case
 from orchestrator.api.case import built_in_cases as built_in_cases
 from orchestrator.api.case import load as load
+from orchestrator.api.certification import certify as certify
+from orchestrator.api.certification import verify as verify
 from orchestrator.api.comparison import compare as compare
 from orchestrator.api.comtrade import export_comtrade as export_comtrade
+from orchestrator.api.export import export as export
 from orchestrator.api.fmu import info as info
 from orchestrator.api.fmu import open_fmu as open_fmu
 from orchestrator.api.identification import identify as identify

@@ -6,5 +6,4 @@ MOST_THREADS = 64  # as ``MOST_MEMBERS`` of ``coupling/team.c``
 
 
 def number_of_cores() -> int:
-    """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -172,12 +172,8 @@ class CouplingError(CosimError):
 class EndedError(CosimError):
     """A running FMU ended its simulation by itself, as FMI allows; ``ended_at`` is when [s].
 
-    Attributes
-    ----------
-    status, log
-        What the call returned, and the FMU's own words.
-    time
-        Of the step that it did not make [s].
+    ``status``, ``log``: what the call returned, and the FMU's own words; ``time``: of the step that it did not make
+    [s].
     """
 
     def __init__(self, component: str, status: str, log: str, time: float, ended_at: float) -> None:

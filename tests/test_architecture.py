@@ -177,7 +177,7 @@ def test_plain_data_are_read_without_casadi(name):
 
 FOR_TYPES = {"api.results", "cli.terminal", "coupling.observers", "report.plot_style", "results.recording",
              "results.room", "results.storage"}  # fmt: skip
-"""Imported by `gfor compare` and `gfor verify`, which start without what computes; `imports` counts these arrows."""
+"""Imported by `signal compare` and `gfor verify`, which start without what computes; `imports` counts these arrows."""
 
 
 def test_only_libraries_that_come_late_are_imported_for_type_checkers_alone():
@@ -271,10 +271,14 @@ def test_a_library_is_used_in_one_place(library, users):
 
 
 ON_THE_FACE = {
+    "admittance": {"api.admittance.admittance"},
+    "bind": {"api.binding.bind"},
     "build": {"api.models.build", "api.models.catalogue_model"},
     "check": {"api.acceptance.check"},
     "compare": {"api.comparison.compare"},
     "design": {"api.design.design_controller"},
+    "export_ssp": {"api.export.write_ssp"},
+    "verify": {"api.certification.verify_anew"},
     "export_comtrade": {"api.comtrade.export_comtrade"},
     "identify": {"api.identification.identify"},
     "info": {"api.fmu.info"},

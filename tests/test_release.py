@@ -12,7 +12,7 @@ from fmus.toolchain.catalogue import model_names
 from orchestrator.acceptance.checks.all import CHECKS
 from orchestrator.acceptance.runner import FILE_CHECKS
 from orchestrator.cases.case import BUILT_IN
-from orchestrator.cli import COMMANDS
+from orchestrator.cli import COMMANDS, OLD
 from orchestrator.interop.masters import MASTERS
 
 ROOT = Path(__file__).parents[1]
@@ -51,8 +51,10 @@ def test_the_changelog_counts_what_there_is():
 
 def test_the_changelog_names_commands_models_and_cases_that_exist():
     text = CHANGELOG[NEWEST.start() :]
-    assert set(re.findall(r"`gfor ([a-z][\w-]*)", text)) <= set(COMMANDS)
-    assert set(COMMANDS) - {"info"} <= set(re.findall(r"`gfor ([a-z][\w-]*)", CHANGELOG))
+    named = {OLD.get(one, one).split()[0] for one in re.findall(r"`gfor ([a-z][\w-]*)", text)}
+    assert named <= {name.split()[0] for name in COMMANDS}
+    everywhere = {OLD.get(one, one) for one in re.findall(r"`gfor ([a-z][\w-]*)", CHANGELOG)}
+    assert set(COMMANDS) - {"fmu info"} <= everywhere | set(re.findall(r"`gfor ([a-z]+ [a-z]+)", CHANGELOG))
     assert {"gfor", "gfor_abc", "gfor_phasor", "infinite_bus"} <= set(model_names())
     for case in (path.parent.name for path in BUILT_IN.glob("*/case.toml")):
         assert f"`{case}`" in text

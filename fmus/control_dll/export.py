@@ -36,7 +36,6 @@ class WrittenDll:
 
 
 def control_names() -> tuple[str, ...]:
-    """Names of the converters whose control can be written, sorted."""
     return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
 
 

@@ -21,10 +21,7 @@ SHORT = 1e-3
 class ExtrapolatedVoltage:
     """Bus voltage through one lag and through two, in the network frame, in which a master holds it.
 
-    Attributes
-    ----------
-    delay, more
-        Of the first lag at the end of a communication step, and how much later the second is [s].
+    ``delay``, ``more``: of the first lag at the end of a communication step, and how much later the second is [s].
     """
 
     once: Phasor

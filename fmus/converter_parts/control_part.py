@@ -15,14 +15,9 @@ GROUP = "gfor_cosim.controls"
 class CircuitElement:
     """One element of the circuit between bridge and bus, the same in each phase.
 
-    Attributes
-    ----------
-    symbol, place
-        Its name, and where it lies.
-    parameter
-        Of the control, per unit: the control's gains follow from it, so circuit and control must agree.
-    kind
-        What the parameter becomes: ``damping`` is the resistance 1/(30·B_c) in series with the capacitor.
+    ``symbol``, ``place``: its name, and where it lies; ``parameter``: of the control, per unit: the control's gains
+    follow from it, so circuit and control must agree; ``kind``: what the parameter becomes: ``damping`` is the
+    resistance 1/(30·B_c) in series with the capacitor.
     """
 
     symbol: str
@@ -50,14 +45,8 @@ class CircuitElement:
 class ControlPart:
     """A converter cut in two: its control as a model, and the rest as a circuit of the host.
 
-    Attributes
-    ----------
-    model
-        Measurements in, bridge voltage out.
-    lead
-        Parameter with which the bridge voltage makes up for the host's hold [s].
-    circuit
-        From the bridge to the bus.
+    ``model``: measurements in, bridge voltage out; ``lead``: parameter with which the bridge voltage makes up for the
+    host's hold [s]; ``circuit``: from the bridge to the bus.
     """
 
     model: Model

@@ -14,20 +14,9 @@ def current_control(
 
     Its gains L_c/τ and R_c/τ cancel the inductor's pole, so that the current follows its reference as 1/(1 + s·τ).
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    f
-        The declared filter.
-    omega_b
-        Base angular frequency [rad/s].
-    w
-        Frequency of the converter's frame [pu, f_n].
-    i_ref
-        Reference of the current in the inductor, converter's frame [pu, S_n].
-    u_lagged
-        Measured voltage across the capacitor branch [pu, S_n].
+    ``f``: the declared filter; ``omega_b``: base angular frequency [rad/s]; ``w``: frequency of the converter's frame
+    [pu, f_n]; ``i_ref``: reference of the current in the inductor, converter's frame [pu, S_n]; ``u_lagged``: measured
+    voltage across the capacitor branch [pu, S_n].
     """
     start = f.initial
     with m.scope("current_control"):

@@ -93,20 +93,9 @@ def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
 def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, theta: ca.SX, w: ca.SX) -> None:
     """Voltage over each inductor and current into the capacitor.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    f
-        The filter as it is declared.
-    port
-        The port, which gives the bus voltage and the breaker's position.
-    v_c
-        The converter's own voltage, in its own frame [pu, S_n].
-    theta
-        Angle of that frame in the network frame [rad].
-    w
-        Frequency of the converter [pu, f_n].
+    ``port``: the port, which gives the bus voltage and the breaker's position; ``v_c``: the converter's own voltage, in
+    its own frame [pu, S_n]; ``theta``: angle of that frame in the network frame [rad]; ``w``: frequency of the
+    converter [pu, f_n].
     """
     v_bus = port.v.rotated(-theta)
     i_s, u_c, i_g = f.i_s.value, f.u_c.value, f.i_g.value

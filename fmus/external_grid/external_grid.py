@@ -17,7 +17,9 @@ S_SC = 20000.0
 
 def external_grid() -> Model:
     """Source and impedance in the network frame, EMT type."""
-    m = ModelBuilder("external_grid", "External grid: a voltage source behind its short-circuit impedance (EMT type)")
+    m = ModelBuilder(
+        "external_grid", "External grid: a voltage source behind its short-circuit impedance (EMT type)", kind="network"
+    )
     port, Z, e = _declare(m)
     i = Phasor(
         m.state("i_x", port.i_0.re, "pu", "Current into the bus, real part", base="S_n"),
@@ -33,7 +35,9 @@ def external_grid() -> Model:
 
 def external_grid_phasor() -> Model:
     """The same without network transients."""
-    m = phasor_builder("external_grid_phasor", "External grid: a voltage source behind its impedance (phasor type)")
+    m = phasor_builder(
+        "external_grid_phasor", "External grid: a voltage source behind its impedance (phasor type)", kind="network"
+    )
     port, Z, e = _declare(m)
     declare_phasor_outputs(m, port, SourceEmf(behind=e, ahead=e), Z)
     return m.build()

@@ -22,7 +22,7 @@ MODES = f"{COLIB}, mode 0; 0.1667 and 50 in mode 1"
 
 @dataclass(frozen=True)
 class Following:
-    """What the variants show: frame, current into the bus in it [pu, S_n], and magnitudes."""
+    """Quantities that the variants show: frame, current into the bus in it [pu, S_n], and magnitudes."""
 
     frame: Frame
     into_bus: Phasor
@@ -34,14 +34,7 @@ class Following:
 def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Following:
     """Declare the whole converter.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    port
-        Its port.
-    v
-        Voltage at the bus, network frame [pu].
+    ``v``: voltage at the bus, network frame [pu].
     """
     t = declare_transformer(m, port)
     theta = m.algebraic("theta")

@@ -3,6 +3,7 @@
 import casadi as ca
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
+from fmus.converter_parts.usual import FOLLOWING
 from fmus.gfl_l2ep.control import Following, following_converter
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
@@ -20,7 +21,12 @@ extrapolated bus voltage matter."""
 
 def gfl_l2ep() -> Model:
     """Average EMT-type model: the grid-following converter of the four-VSC benchmark."""
-    m = ModelBuilder("gfl_l2ep", "Grid-following converter of L2EP in the four-VSC benchmark (EMT type)")
+    m = ModelBuilder(
+        "gfl_l2ep",
+        "Grid-following converter of L2EP in the four-VSC benchmark (EMT type)",
+        kind="converter",
+        usual=FOLLOWING,
+    )
     port = device_port(m, S_n=S_N, P_0=P_0)
     found = following_converter(m, port, port.v)
     declare_port_outputs(m, port, found.into_bus.rotated(found.frame.theta))
@@ -30,7 +36,12 @@ def gfl_l2ep() -> Model:
 
 def gfl_l2ep_phasor() -> Model:
     """The same equations at a network of admittances: the benchmark's phasor model keeps di/dt of its transformer."""
-    m = phasor_builder("gfl_l2ep_phasor", "Grid-following converter of L2EP in the four-VSC benchmark (phasor type)")
+    m = phasor_builder(
+        "gfl_l2ep_phasor",
+        "Grid-following converter of L2EP in the four-VSC benchmark (phasor type)",
+        kind="converter",
+        usual=FOLLOWING,
+    )
     port = device_port(m, S_n=S_N, P_0=P_0)
     master = declare_master_step(m)
     seen = extrapolated_voltage(m, port, master)

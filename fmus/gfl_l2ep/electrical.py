@@ -53,18 +53,8 @@ def declare_transformer(m: ModelBuilder, port: DevicePort) -> Transformer:
 def transformer_equation(m: ModelBuilder, t: Transformer, port: DevicePort, v_c: Phasor, u: Phasor, w: ca.SX) -> None:
     """(X/ω_b)·di/dt = v_c − u − (R + j·w·X)·i; behind an open breaker the current fades.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    t
-        The transformer as it is declared.
-    port
-        The port, which gives the breaker's position.
-    v_c, u
-        Voltage of the converter, and of the bus behind the ratio, converter's frame [pu, S_n].
-    w
-        Frequency of that frame [pu, f_n].
+    ``port``: the port, which gives the breaker's position; ``v_c``, ``u``: voltage of the converter, and of the bus
+    behind the ratio, converter's frame [pu, S_n]; ``w``: frequency of that frame [pu, f_n].
     """
     i = t.i.value
     closed = (v_c - u - Phasor(t.R, w * t.X) * i) * (port.omega_b / t.X)

@@ -12,12 +12,7 @@ MEMORY = 1e-3
 def running(m: ModelBuilder, v: ca.SX) -> ca.SX:
     """1 while the PLL runs, 0 while it stands: below ``V_low``, and from there until ``V_high``.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    v
-        Magnitude of the bus voltage [pu].
+    ``v``: magnitude of the bus voltage [pu].
     """
     with m.scope("pll"), m.scope("freezing"):
         low = m.parameter(

@@ -10,7 +10,7 @@ from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
 SMALLEST = 1e-3
-"""Of the square of the limit, what is left below a root for its derivative to be finite."""
+"""Least part of the limit's square under a root, for a finite derivative."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,8 @@ class Limits:
 def declare_limits(m: ModelBuilder, start: Start, reactive: ca.SX) -> Limits:
     """Declare the limit and the state that carries the active current's share.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    start
-        The operating point. It leaves sqrt(I_max² − i_q0²) for the reactive current of the voltage control.
-    reactive
-        Reactive current in the converter [pu, S_n].
+    ``start``: the operating point. It leaves sqrt(I_max² − i_q0²) for the reactive current of the voltage control;
+    ``reactive``: reactive current in the converter [pu, S_n].
     """
     with m.scope("current_limit"):
         I_max = m.parameter("I_max", 1.0, "pu", "Largest current", base="S_n", minimum=0.1, source=COLIB)

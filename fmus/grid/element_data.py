@@ -66,17 +66,10 @@ LEAST_LOW_VOLTAGE = 0.3
 class Load:
     """A load that draws P + jQ [MW, Mvar] at the power flow's voltage and rated frequency; P < 0 is static generation.
 
-    Attributes
-    ----------
-    active, reactive
-        How P and Q follow the voltage.
-    k_pf, k_qf
-        Change of P and Q [pu of it] by the frequency [pu].
-    v_min
-        Voltage [pu] below which the load is an impedance. None is `LOW_VOLTAGE` where there is a share of constant
-        power, else 0: never.
-    tau
-        Lag [s] with which the load follows these laws; None for the default of the network's model.
+    ``active``, ``reactive``: how P and Q follow the voltage; ``k_pf``, ``k_qf``: change of P and Q [pu of it] by the
+    frequency [pu]; ``v_min``: voltage [pu] below which the load is an impedance. None is `LOW_VOLTAGE` where there is a
+    share of constant power, else 0: never; ``tau``: lag [s] with which the load follows these laws; None for the
+    default of the network's model.
     """
 
     name: str
@@ -148,15 +141,9 @@ class Port:
 class ThreeWinding:
     """A three-winding transformer: three windings that meet at a star point which is no bus.
 
-    Attributes
-    ----------
-    buses
-        Of windings 1, 2 and 3.
-    X, R
-        Of each winding in the star [pu, 100 MVA]. One X may be negative, as long as any two windings together, and
-        all three, have a positive inductance.
-    tap, shift
-        Ideal ratio tap·e^{j·shift} [1, rad] between each bus and its winding.
+    ``buses``: of windings 1, 2 and 3; ``X``, ``R``: of each winding in the star [pu, 100 MVA]. One X may be negative,
+    as long as any two windings together, and all three, have a positive inductance; ``tap``, ``shift``: ideal ratio
+    tap·e^{j·shift} [1, rad] between each bus and its winding.
     """
 
     name: str

@@ -28,18 +28,10 @@ class Bus:
 class Branch:
     """An inductive current state with R and X, from a voltage to a voltage or to earth.
 
-    Attributes
-    ----------
-    current
-        The state with the current; behind the ratio, if there is one.
-    drawn
-        Current that the branch takes from its from bus.
-    ratio
-        Complex ratio at the from side.
-    connected
-        1 for a connected branch, 0 for an open one; None for a branch that cannot be opened.
-    capacitor
-        Voltage of a capacitor in series, a state, and its reactance.
+    ``current``: the state with the current; behind the ratio, if there is one; ``drawn``: current that the branch takes
+    from its from bus; ``ratio``: complex ratio at the from side; ``connected``: 1 for a connected branch, 0 for an open
+    one; None for a branch that cannot be opened; ``capacitor``: voltage of a capacitor in series, a state, and its
+    reactance.
     """
 
     current: Phasor
@@ -168,18 +160,8 @@ def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar
     The bus feeds ``scale`` times this current. A load that is switched off and on again therefore comes back without a
     direct component.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    bus
-        The bus whose injected current is reduced by the inductor's.
-    name
-        Name of the bus.
-    X
-        Reactance [pu, 100 MVA].
-    scale
-        Factor from the state to the current drawn.
+    ``bus``: the bus whose injected current is reduced by the inductor's; ``name``: name of the bus; ``X``: reactance
+    [pu, 100 MVA]; ``scale``: factor from the state to the current drawn.
     """
     current = _current_state(m, bus.v_0 / Phasor(0, X), "Inductor current at scale 1")
     drawn = current * scale
@@ -192,18 +174,9 @@ def declare_load(
 ) -> DeclaredLoad:
     """Declare a load, and put the part of it that is a constant impedance to its bus.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    load
-        Its power and name; the power is the default of parameters.
-    buses
-        By name; that of the load is changed.
-    alone
-        Whether this load alone determines the voltage of its bus, and therefore cannot be switched off.
-    inductor
-        Declares the inductor of a load that draws reactive power.
+    ``load``: its power and name; the power is the default of parameters; ``buses``: by name; that of the load is
+    changed; ``alone``: whether this load alone determines the voltage of its bus, and therefore cannot be switched off;
+    ``inductor``: declares the inductor of a load that draws reactive power.
     """
     bus = buses[load.bus]
     v_squared = bus.v_0.re**2 + bus.v_0.im**2
@@ -240,16 +213,8 @@ def declare_shunt(
 ) -> list[Branch]:
     """Declare an admittance to earth: conductance, and a capacitor or an inductor.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    shunt
-        Its powers at 1 pu and its name; the powers are the defaults of parameters.
-    buses
-        By name; that of the shunt is changed.
-    inductor
-        Declares the inductor of a shunt that draws reactive power.
+    ``shunt``: its powers at 1 pu and its name; the powers are the defaults of parameters; ``buses``: by name; that of
+    the shunt is changed; ``inductor``: declares the inductor of a shunt that draws reactive power.
     """
     bus = buses[shunt.bus]
     with m.scope(shunt.name):
@@ -289,18 +254,9 @@ def declare_network_outputs(
 ) -> None:
     """Declare the outputs: all voltages, the power of every line at its from bus, and the power of every device.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    network
-        Its lines and ports.
-    buses
-        By name, with their voltages.
-    drawn
-        Current of every line at its from bus, in the order of the lines: network frame [pu, 100 MVA].
-    fed
-        Current of every device, in the order of the ports: network frame [pu, 100 MVA].
+    ``network``: its lines and ports; ``buses``: by name, with their voltages; ``drawn``: current of every line at its
+    from bus, in the order of the lines: network frame [pu, 100 MVA]; ``fed``: current of every device, in the order of
+    the ports: network frame [pu, 100 MVA].
     """
     for name, bus in buses.items():
         with m.scope(name):
@@ -318,16 +274,8 @@ def declare_network_outputs(
 def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omega_b: ca.SX) -> None:
     """(X/ω_b)·di/dt = v_from/t − v_to − (R + jX)·i; where the line is open, di/dt = −i/τ.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    branch
-        With its current as a state.
-    buses
-        By name, with their voltages.
-    omega_b
-        Base angular frequency [rad/s].
+    ``branch``: with its current as a state; ``buses``: by name, with their voltages; ``omega_b``: base angular
+    frequency [rad/s].
     """
     over = buses[branch.from_bus].v
     if branch.ratio is not None:
@@ -361,18 +309,8 @@ def _capacitor_equation(m: ModelBuilder, branch: Branch, omega_b: ca.SX) -> None
 def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active: str, reactive: str) -> None:
     """Declare ``<name>.p`` and ``<name>.q`` of a current at a voltage.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    name
-        Scope of both outputs.
-    v
-        Voltage [pu].
-    current
-        In the same frame [pu, 100 MVA].
-    active, reactive
-        Descriptions of the two outputs.
+    ``name``: scope of both outputs; ``v``: voltage [pu]; ``current``: in the same frame [pu, 100 MVA]; ``active``,
+    ``reactive``: descriptions of the two outputs.
     """
     s = power(v, current)
     with m.scope(name):

@@ -30,7 +30,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 
 def grid(network: Network) -> Model:
     """Build the model of a network; parameters are named after its elements (``X_<line>``, ``<load>.P``)."""
-    m = ModelBuilder(network.name, f"EMT network {network.name} in the frame turning at ω_b")
+    m = ModelBuilder(network.name, f"EMT network {network.name} in the frame turning at ω_b", kind="network")
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     omega_b = 2 * ca.pi * f_n
     buses = {bus: declare_bus(m, bus) for bus in network.buses}

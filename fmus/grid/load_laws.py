@@ -49,20 +49,9 @@ FREQUENCY_TIME = 0.02
 class FollowingLoad:
     """A declared load with its correction c at scale 1.
 
-    Attributes
-    ----------
-    data
-        The load's laws.
-    load
-        Its admittance at scale 1.
-    correction
-        The state c.
-    tau
-        Its lag [s].
-    v_min
-        Voltage below which it is an impedance [pu]; None for never.
-    delayed
-        The bus voltage behind a lag, and that lag [s], for the frequency; None for a load that does not depend on it.
+    ``data``: the load's laws; ``load``: its admittance at scale 1; ``correction``: the state c; ``tau``: its lag [s];
+    ``v_min``: voltage below which it is an impedance [pu]; None for never; ``delayed``: the bus voltage behind a lag,
+    and that lag [s], for the frequency; None for a load that does not depend on it.
     """
 
     data: Load
@@ -86,20 +75,10 @@ def declare_following_load(
 ) -> FollowingLoad:
     """Make a declared load follow its laws.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    load
-        The load's bus, name and laws.
-    declared
-        The same load as a constant impedance, as `declare_load` returns it.
-    buses
-        By name; the correction is added to what is injected at the load's bus.
-    omega_b
-        Base angular frequency [rad/s]; None where no load depends on the frequency.
-    phasors
-        Whether the network is one of phasors, with longer steps.
+    ``load``: the load's bus, name and laws; ``declared``: the same load as a constant impedance, as `declare_load`
+    returns it; ``buses``: by name; the correction is added to what is injected at the load's bus; ``omega_b``: base
+    angular frequency [rad/s]; None where no load depends on the frequency; ``phasors``: whether the network is one of
+    phasors, with longer steps.
     """
     bus = buses[load.bus]
     only_current = load.active.i == 1 and not (load.reactive_follows or load.k_pf)
@@ -188,7 +167,7 @@ def _of_law(law: Zip, ratio: ca.SX, k: float, deviation: Scalar) -> Scalar:
 
 
 def _missing(load: Load, declared: DeclaredLoad, v_0: Phasor) -> Phasor:
-    """What the admittance does not draw of the power at the operating point: all of it for static generation."""
+    """The power at the operating point less the admittance's: all of it for static generation."""
     G = declared.G_0 if load.conductance_mw == 0 and load.p_mw else 0.0
     B = declared.B_0 if load.susceptance_mvar == 0 and load.q_mvar else 0.0
     return v_0 * Phasor(G, B) if load.p_mw < 0 else ZERO

@@ -27,13 +27,8 @@ def solve(Y: Admittances, currents: dict[str, Phasor], *, checked: bool = False)
     The bus with the fewest neighbours is eliminated first. There is no pivoting: a passive network needs none, unless
     a bus has no admittance at all, and then its voltage is not finite.
 
-    Parameters
-    ----------
-    Y, currents
-        The equations.
-    checked
-        Whether no voltage is finite where the solution leaves more than `LARGEST_REST` over: for networks that are not
-        passive, in which an element that is divided by may vanish.
+    ``Y``, ``currents``: the equations; ``checked``: whether no voltage is finite where the solution leaves more than
+    `LARGEST_REST` over: for networks that are not passive, in which an element that is divided by may vanish.
     """
     voltages = _solve(Y, currents)
     if not checked:
@@ -87,14 +82,7 @@ def solved_as_data(
 ) -> dict[str, Phasor]:
     """Voltages of all buses, which the model's kernel solves for.
 
-    Parameters
-    ----------
-    m
-        The model.
-    Y, currents
-        As `solve`.
-    written_out
-        Makes the same model by `solve`.
+    ``written_out``: makes the same model by `solve`.
     """
     place = {bus: k for k, bus in enumerate(Y)}
     elements = {

@@ -56,7 +56,7 @@ def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) ->
     """The model, solved by code or from data; or its variables with the voltages that a power flow gives, at which
     nothing is solved.
     """
-    m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency")
+    m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency", kind="network")
     following: list[FollowingLoad] = []
     omega_b: ca.SX | None = None
     if any(load.follows and (load.k_pf or load.k_qf) for load in network.loads):

@@ -76,16 +76,8 @@ def declare_transformer(m: ModelBuilder, data: ThreeWinding, buses: dict[str, Bu
 def transformer_equations(m: ModelBuilder, windings: Windings, buses: dict[str, Bus], omega_b: ca.SX) -> None:
     """Give both currents their rates; where the transformer is open they fade, as a line's current does.
 
-    Parameters
-    ----------
-    m
-        The grid's model.
-    windings
-        The declared transformer, with its currents.
-    buses
-        By name; they give the voltages.
-    omega_b
-        Rated angular frequency [rad/s].
+    ``windings``: the declared transformer, with its currents; ``buses``: by name; they give the voltages; ``omega_b``:
+    rated angular frequency [rad/s].
     """
     assert windings.currents is not None
     behind = [buses[bus].v / t for bus, t in zip(windings.data.buses, windings.ratio, strict=True)]
@@ -122,7 +114,7 @@ def declare_winding_powers(m: ModelBuilder, windings: Windings, buses: dict[str,
 
 
 def _admittances(windings: Windings) -> tuple[tuple[Phasor, ...], ...]:
-    """Of the three windings behind their ratios: y_j·y_k/Σy beside the diagonal, without dividing by any Z."""
+    """Admittances of the three windings behind their ratios: y_j·y_k/Σy off the diagonal, without dividing by Z."""
     a, b, c = windings.Z
     scale = _ONE / (a * b + b * c + c * a) * windings.connected
     return (

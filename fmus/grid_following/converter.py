@@ -6,6 +6,7 @@ import casadi as ca
 
 from fmus.converter_parts.current_control import current_control
 from fmus.converter_parts.filter import APPENDIX, Filter, declare_filter, filter_equations
+from fmus.converter_parts.usual import FOLLOWING
 from fmus.grid_following.current_limit import Limited
 from fmus.grid_following.outer_control import TRACKING_TIME, Measured, outer_control
 from fmus.grid_following.pll import Frame, phase_locked_loop
@@ -20,7 +21,7 @@ S_N, P_0 = 1500.0, 0.9
 
 @dataclass(frozen=True)
 class Signals:
-    """What both variants show beside their port."""
+    """Quantities that both variants show beside their port."""
 
     frame: Frame
     limited: Limited
@@ -30,7 +31,12 @@ class Signals:
 
 def grid_following_converter() -> Model:
     """Average EMT-type model of a grid-following converter with a stiff DC side."""
-    m = ModelBuilder("gfl", "Grid-following converter with PLL, current control and P, Q or voltage control (EMT type)")
+    m = ModelBuilder(
+        "gfl",
+        "Grid-following converter with PLL, current control and P, Q or voltage control (EMT type)",
+        kind="converter",
+        usual=FOLLOWING,
+    )
     port = device_port(m, S_n=S_N, P_0=P_0)
     f = declare_filter(m, port)
     seen, tau = _declare_measurement(m, f)

@@ -15,7 +15,7 @@ SMALLEST = 1e-6
 
 @dataclass(frozen=True)
 class Limited:
-    """What is asked for, what is allowed [pu, S_n], and what is asked for in parts of the limit [1]."""
+    """Requested current, permitted current [pu, S_n], and their ratio to the limit [1]."""
 
     demanded: Phasor
     allowed: Phasor
@@ -23,21 +23,15 @@ class Limited:
 
     @property
     def excess(self) -> Phasor:
-        """What is asked for beyond the limit; exactly 0 within it."""
+        """Excess of the request over the limit; exactly 0 within it."""
         return self.demanded - self.allowed
 
 
 def limited_current(m: ModelBuilder, start: SteadyState, demanded: Phasor) -> Limited:
     """Declare the limit and apply it; a dispatch beyond it is refused.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    start
-        Operating point of the filter.
-    demanded
-        Reference of the converter's current, its own frame: real part active, imaginary part reactive [pu, S_n].
+    ``start``: operating point of the filter; ``demanded``: reference of the converter's current, its own frame: real
+    part active, imaginary part reactive [pu, S_n].
     """
     with m.scope("current_limit"):
         most = m.parameter("I_max", 1.1, "pu", "Largest current", base="S_n", minimum=0.1, source=SOURCE)

@@ -34,18 +34,9 @@ def outer_control(
 ) -> tuple[Limited, Phasor]:
     """Declare both controllers and the current limit; return what is asked for, and the converter's reference.
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    f
-        Filter data with the operating point.
-    port
-        The port, which gives the breaker's position.
-    measured
-        Without the lags of the measurement, which are declared here.
-    standby
-        Current that the converter injects behind an open breaker, its own frame [pu, S_n].
+    ``f``: filter data with the operating point; ``port``: the port, which gives the breaker's position; ``measured``:
+    without the lags of the measurement, which are declared here; ``standby``: current that the converter injects behind
+    an open breaker, its own frame [pu, S_n].
     """
     start = f.initial
     with m.scope("measurement"):

@@ -8,6 +8,7 @@ import casadi as ca
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
 from fmus.converter_parts.filter import APPENDIX, FilterData, declare_filter_data
+from fmus.converter_parts.usual import FOLLOWING
 from fmus.grid_following.converter import P_0, S_N, Signals, declare_signals
 from fmus.grid_following.outer_control import Measured, outer_control
 from fmus.grid_following.pll import phase_locked_loop
@@ -19,7 +20,12 @@ from fmus.toolchain.port import device_port
 
 def grid_following_converter_phasor() -> Model:
     """PLL and outer control of `grid_following_converter` behind an algebraic electrical side."""
-    m = phasor_builder("gfl_phasor", "Grid-following converter with PLL and P, Q or voltage control (phasor type)")
+    m = phasor_builder(
+        "gfl_phasor",
+        "Grid-following converter with PLL and P, Q or voltage control (phasor type)",
+        kind="converter",
+        usual=FOLLOWING,
+    )
     port = device_port(m, S_n=S_N, P_0=P_0)
     f = declare_filter_data(m, port)
     master = declare_master_step(m)

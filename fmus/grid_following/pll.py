@@ -39,20 +39,9 @@ def phase_locked_loop(
 
     For a voltage of 1 pu the angle follows as (2ξω_0·s + ω_0²)/(s² + 2ξω_0·s + ω_0²).
 
-    Parameters
-    ----------
-    m
-        The converter's model.
-    angle_0
-        Angle of the frame at the start [rad], a calculated value.
-    omega_b
-        Base angular frequency [rad/s].
-    measured
-        Voltage in the converter's own frame [pu], a function of states.
-    defaults
-        Of its parameters.
-    running
-        Factor of u_⊥ and of dθ/dt: 1, or 0 while the loop stands; None for a loop that always runs.
+    ``angle_0``: angle of the frame at the start [rad], a calculated value; ``omega_b``: base angular frequency [rad/s];
+    ``measured``: voltage in the converter's own frame [pu], a function of states; ``defaults``: of its parameters;
+    ``running``: factor of u_⊥ and of dθ/dt: 1, or 0 while the loop stands; None for a loop that always runs.
     """
     seen = measured.im if running is None else measured.im * running
     with m.scope("pll"):

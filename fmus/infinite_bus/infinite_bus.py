@@ -22,7 +22,9 @@ A Runge-Kutta step that ends at that time sees it in its last stage, with a sixt
 
 def infinite_bus() -> Model:
     """Source, bus and load of a single-machine system, in the network frame, per unit on 100 MVA."""
-    m = ModelBuilder("infinite_bus", "Infinite bus behind an impedance, with a load, a voltage dip and a load step")
+    m = ModelBuilder(
+        "infinite_bus", "Infinite bus behind an impedance, with a load, a voltage dip and a load step", kind="network"
+    )
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     omega_b = 2 * ca.pi * f_n
     v_0, i_0 = _operating_point(m)

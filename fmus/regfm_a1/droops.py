@@ -16,14 +16,7 @@ def active_droop(m: ModelBuilder, P_0: Scalar, Pf: ca.SX) -> ca.SX:
 
     ω = 1 + mp·(Pref − Pf) + u_max + u_min, where u_max ≤ 0 and u_min ≥ 0 act beyond a limit.
 
-    Parameters
-    ----------
-    m
-        The model.
-    P_0
-        Active power of the operating point [pu, S_n].
-    Pf
-        Measured active power [pu, S_n].
+    ``P_0``: active power of the operating point [pu, S_n]; ``Pf``: measured active power [pu, S_n].
     """
     mp = m.parameter("mp", 0.01, "pu", "P-f droop gain", base="S_n", minimum=1e-4, tunable=True, source=SPECIFICATION)
     change = m.parameter("delta_Pref", 0, "pu", "Change of Pref", base="S_n", tunable=True)
@@ -39,14 +32,8 @@ def active_droop(m: ModelBuilder, P_0: Scalar, Pf: ca.SX) -> ca.SX:
 def internal_voltage(m: ModelBuilder, V_0: Scalar, E_0: Scalar, Q_0: Scalar, Qf: ca.SX, Vf: ca.SX) -> ca.SX:
     """Declare the Q-V droop with Qmax and Qmin and the voltage control; return the internal voltage's magnitude [pu].
 
-    Parameters
-    ----------
-    m
-        The model.
-    V_0, E_0, Q_0
-        Terminal voltage, internal voltage and reactive power of the operating point [pu, S_n].
-    Qf, Vf
-        Measured reactive power and terminal voltage [pu, S_n].
+    ``V_0``, ``E_0``, ``Q_0``: terminal voltage, internal voltage and reactive power of the operating point [pu, S_n];
+    ``Qf``, ``Vf``: measured reactive power and terminal voltage [pu, S_n].
     """
     mq = m.parameter("mq", 0.05, "pu", "Q-V droop gain", base="S_n", minimum=0, tunable=True, source=SPECIFICATION)
     kpv = m.parameter("kpv", 0.0, "pu", "Proportional gain of the voltage control", base="S_n", minimum=0,

@@ -51,7 +51,9 @@ class Following:
 
 def static_generation() -> Model:
     """The device, EMT type."""
-    m = ModelBuilder("static_generation", "Static generation: a constant current at a constant power factor (EMT type)")
+    m = ModelBuilder(
+        "static_generation", "Static generation: a constant current at a constant power factor (EMT type)", kind="load"
+    )
     port = device_port(m, S_n=S_N, P_0=P_0)
     following = _declare_current(m, port)
     following.follow(m, port, port.v)
@@ -62,7 +64,9 @@ def static_generation() -> Model:
 def static_generation_phasor() -> Model:
     """The same for a network of admittances: the emf is the bus voltage that it sees, and what its current adds."""
     m = phasor_builder(
-        "static_generation_phasor", "Static generation: a constant current at a constant power factor (phasor type)"
+        "static_generation_phasor",
+        "Static generation: a constant current at a constant power factor (phasor type)",
+        kind="load",
     )
     port = device_port(m, S_n=S_N, P_0=P_0)
     X = m.parameter("X", 0.5, "pu", "Reactance of the port, across which the current is fed", base="S_n", minimum=0.01)

@@ -13,24 +13,12 @@ from dataclasses import dataclass
 class DyrField:
     """One number of a record.
 
-    Attributes
-    ----------
-    name
-        PSS/E's name of the field.
-    parameters
-        Parameters of the component that take the value; none where the field only chooses something.
-    negated
-        Parameters that take the negative value.
-    times
-        Name of another field of the record; the parameters take the product of both. PSS/E gives some leads as T_A/T_B.
-    only
-        The only values that our part can stand for; empty where it takes every one.
-    same_as
-        Name of another field that must have the same value, because our part has one parameter for both.
-    not_zero
-        Whether 0, by which PSS/E means that it chooses a value itself, must be refused.
-    switch
-        Whether the parameters are truth values; 0 is false.
+    ``name``: PSS/E's name of the field; ``parameters``: parameters of the component that take the value; none where the
+    field only chooses something; ``negated``: parameters that take the negative value; ``times``: name of another field
+    of the record; the parameters take the product of both. PSS/E gives some leads as T_A/T_B; ``only``: the only values
+    that our part can stand for; empty where it takes every one; ``same_as``: name of another field that must have the
+    same value, because our part has one parameter for both; ``not_zero``: whether 0, by which PSS/E means that it
+    chooses a value itself, must be refused; ``switch``: whether the parameters are truth values; 0 is false.
     """
 
     name: str
@@ -47,15 +35,9 @@ class DyrField:
 class DyrRecord:
     """One kind of record.
 
-    Attributes
-    ----------
-    kind
-        Key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``converter`` for a
-        record that is a whole component.
-    part
-        Its value, the name of our part; for a whole component, its model.
-    fields
-        In the file's order.
+    ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``converter`` for
+    a record that is a whole component; ``part``: its value, the name of our part; for a whole component, its model;
+    ``fields``: in the file's order.
     """
 
     kind: str

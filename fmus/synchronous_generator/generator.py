@@ -1,12 +1,30 @@
 """Machine, exciter and governor put together; one model for each excitation system."""
 
-from fmus.synchronous_generator.governors import ieeeg1
-from fmus.synchronous_generator.machine import declare_machine, machine_equations, terminal_power, terminal_voltage
-from fmus.synchronous_generator.stabilizers import pss2a
-from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Variant, declare_generator_outputs
+from functools import partial
+
+from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.machine import (
+    Machine,
+    declare_machine,
+    machine_equations,
+    terminal_power,
+    terminal_voltage,
+)
+from fmus.synchronous_generator.stabilization.norm631 import pss2a
+from fmus.synchronous_generator.turbines.without_limits import ieeeg1
+from fmus.synchronous_generator.usual import MACHINE
+from fmus.synchronous_generator.variants import (
+    AC4A,
+    ST1,
+    ST4B,
+    Governor,
+    Stabilizer,
+    Variant,
+    declare_generator_outputs,
+)
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.port import declare_port_outputs, device_port
+from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 
 
 def synchronous_generator_ac4a() -> Model:
@@ -30,16 +48,22 @@ def synchronous_generator_st4b_pss2a() -> Model:
 
 
 def _generator(variant: Variant, stabilizer: str = "") -> Model:
-    m = ModelBuilder(variant.model_name(stabilizer), variant.title("EMT-type", stabilizer))
+    title = variant.title("EMT-type", stabilizer)
+    m = ModelBuilder(variant.model_name(stabilizer), title, kind="machine", usual=MACHINE)
     port = device_port(m, variant.data.S_n, variant.data.P_0)
     machine = declare_machine(m, port, variant.data)
-    v_s = pss2a(m, machine.w - 1, *terminal_power(machine, port)) if stabilizer else 0.0
-    E_fd, v_t = variant.exciter(
-        m, machine.start, lambda E: terminal_voltage(machine, port, E), machine.field_current, v_s
-    )
-    P_m = ieeeg1(m, machine.w, machine.start.T_e, variant.governor)
-    machine_equations(m, machine, port, E_fd, P_m)
+    governor = partial(ieeeg1, data=variant.governor)
+    return with_controls(m, port, machine, variant.exciter, governor, pss2a if stabilizer else None)
 
-    declare_port_outputs(m, port, machine.current.rotated(machine.delta))
-    declare_generator_outputs(m, machine, v_t, E_fd, P_m)
+
+def with_controls(
+    m: ModelBuilder, port: DevicePort, g: Machine, exciter: Exciter, governor: Governor, stabilizer: Stabilizer | None
+) -> Model:
+    """A machine with stator transients and its controls."""
+    v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))
+    E_fd, v_t = exciter(m, g.start, lambda E: terminal_voltage(g, port, E), g.field_current, v_s)
+    P_m = governor(m, g.w, g.start.T_e)
+    machine_equations(m, g, port, E_fd, P_m)
+    declare_port_outputs(m, port, g.current.rotated(g.delta))
+    declare_generator_outputs(m, g, v_t, E_fd, P_m)
     return m.build()

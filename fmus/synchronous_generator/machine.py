@@ -80,16 +80,7 @@ class Machine:
 def flux_state(m: ModelBuilder, name: str, start: ca.SX, text: str) -> ca.SX:
     """Declare a flux linkage as a state [pu, S_n].
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name
-        Of the state.
-    start
-        Its initial value [pu, S_n].
-    text
-        Its description.
+    ``start``: its initial value [pu, S_n].
     """
     return m.state(name, start, "pu", text, base="S_n")
 
@@ -119,18 +110,8 @@ def declare_machine(
 def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
     """Give the derivatives of fluxes, speed and angle.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    g
-        The machine as it is declared, its stator fluxes as states.
-    port
-        Gives the bus voltage.
-    E_fd
-        Field voltage; 1 pu gives 1 pu of voltage on open circuit.
-    P_m
-        Mechanical power [pu, S_n].
+    ``port``: gives the bus voltage; ``E_fd``: field voltage; 1 pu gives 1 pu of voltage on open circuit; ``P_m``:
+    mechanical power [pu, S_n].
     """
     psi_q, psi_d = _flux_rates(g, port, E_fd)[:2]
     m.derivative(g.q.psi, psi_q)
@@ -139,15 +120,7 @@ def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX
 
 
 def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
-    """Give the derivatives of the rotor's fluxes, speed and angle.
-
-    Parameters
-    ----------
-    m, port, E_fd, P_m
-        As `machine_equations`.
-    g
-        The machine as it is declared.
-    """
+    """Give the derivatives of the rotor's fluxes, speed and angle."""
     for axis, rates in zip((g.d, g.q), _rotor_flux_rates(g, port, E_fd), strict=True):
         for winding, rate in zip(axis.windings, rates, strict=True):
             m.derivative(winding.psi, rate)

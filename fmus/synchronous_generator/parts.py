@@ -9,13 +9,13 @@ import casadi as ca
 
 from fmus.synchronous_generator.excitation.ac1a import ac1a
 from fmus.synchronous_generator.excitation.ac4a import ac4a
+from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.excitation.dc1a import dc1a, ieeet1
 from fmus.synchronous_generator.excitation.external import external
 from fmus.synchronous_generator.excitation.manual import manual
 from fmus.synchronous_generator.excitation.sexs import sexs
 from fmus.synchronous_generator.excitation.st1a import st1a
 from fmus.synchronous_generator.excitation.st4b import st4b
-from fmus.synchronous_generator.exciters import Exciter
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
 from fmus.synchronous_generator.machines.standard import genrou, genrou_rated_speed, gensal, two_axis
@@ -26,17 +26,12 @@ from fmus.synchronous_generator.turbines.gast import gast
 from fmus.synchronous_generator.turbines.hygov import hygov
 from fmus.synchronous_generator.turbines.ieeeg1 import ieeeg1
 from fmus.synchronous_generator.turbines.tgov1 import tgov1
+from fmus.synchronous_generator.variants import Governor, Stabilizer
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
 
 MachinePart = Callable[[ModelBuilder, DevicePort, ca.SX, FluxDeclaration], Machine]
 """Declares a machine at its port: builder, port, rating [MVA], declaration of the stator's fluxes."""
-
-GovernorPart = Callable[[ModelBuilder, ca.SX, ca.SX], ca.SX]
-"""Mechanical power [pu, S_n] from speed and the power of the operating point."""
-
-StabilizerPart = Callable[[ModelBuilder, ca.SX, ca.SX, ca.SX], ca.SX]
-"""Signal [pu] from w − 1, electrical power and the power of the operating point."""
 
 NONE = "none"
 """The stabiliser of a generator that has none."""
@@ -49,11 +44,11 @@ EXCITERS: dict[str, Exciter] = {
     "manual": manual, "sexs": sexs, "ieeet1": ieeet1, "dc1a": dc1a, "ac1a": ac1a, "ac4a": ac4a, "st1a": st1a,
     "st4b": st4b, "external": external,
 }  # fmt: skip
-GOVERNORS: dict[str, GovernorPart] = {
+GOVERNORS: dict[str, Governor] = {
     "constant_power": constant_power, "constant_torque": constant_torque, "tgov1": tgov1, "hygov": hygov, "gast": gast,
     "ieeeg1": ieeeg1,
 }  # fmt: skip
-STABILIZERS: dict[str, StabilizerPart | None] = {NONE: None, "pss1a": pss1a, "pss2a": pss2a, "pss2b": pss2b}
+STABILIZERS: dict[str, Stabilizer | None] = {NONE: None, "pss1a": pss1a, "pss2a": pss2a, "pss2b": pss2b}
 
 
 @dataclass(frozen=True)
@@ -62,8 +57,8 @@ class Parts:
 
     machine: MachinePart
     exciter: Exciter
-    governor: GovernorPart
-    stabilizer: StabilizerPart | None
+    governor: Governor
+    stabilizer: Stabilizer | None
     names: tuple[str, ...]
 
     def model_name(self, suffix: str = "") -> str:
@@ -76,13 +71,7 @@ class Parts:
 
 
 def chosen_parts(machine: str, exciter: str, governor: str, stabilizer: str) -> Parts:
-    """The parts of these names.
-
-    Parameters
-    ----------
-    machine, exciter, governor, stabilizer
-        Names of `MACHINES`, `EXCITERS`, `GOVERNORS` and `STABILIZERS`.
-    """
+    """The parts of these names."""
     found = Parts(
         _part("machine", MACHINES, machine),
         _part("exciter", EXCITERS, exciter),

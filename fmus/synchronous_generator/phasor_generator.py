@@ -12,11 +12,23 @@ Where X''_q ≠ X''_d a constant admittance needs an emf of its own for the diff
 taken from i_q through a short lag, so that the emf follows from states alone; in steady state it is exact.
 """
 
+from functools import partial
+
 import casadi as ca
 
-from fmus.synchronous_generator.governors import ieeeg1
-from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations
-from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Variant, declare_generator_outputs
+from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations, terminal_power
+from fmus.synchronous_generator.turbines.without_limits import ieeeg1
+from fmus.synchronous_generator.usual import MACHINE
+from fmus.synchronous_generator.variants import (
+    AC4A,
+    ST1,
+    ST4B,
+    Governor,
+    Stabilizer,
+    Variant,
+    declare_generator_outputs,
+)
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -40,16 +52,23 @@ def synchronous_generator_st4b_phasor() -> Model:
 
 
 def _generator(variant: Variant) -> Model:
-    m = phasor_builder(variant.model_name("phasor"), variant.title("phasor type"))
+    m = phasor_builder(variant.model_name("phasor"), variant.title("phasor type"), kind="machine", usual=MACHINE)
     port = device_port(m, variant.data.S_n, variant.data.P_0)
     g = declare_machine(m, port, variant.data, stator_flux=lambda m, name, start, text: m.algebraic(name))
-    emf = Phasor(g.d.emf, g.q.emf) * g.w
+    return with_controls(m, port, g, variant.exciter, partial(ieeeg1, data=variant.governor), None)
+
+
+def with_controls(
+    m: ModelBuilder, port: DevicePort, g: Machine, exciter: Exciter, governor: Governor, stabilizer: Stabilizer | None
+) -> Model:
+    """A machine without stator transients, its stator's fluxes as open signals, and its controls."""
+    emf = Phasor(g.d.emf, g.q.emf) * (1.0 if g.at_rated_speed else g.w)
     close_stator(m, g, port, emf)
     v_t = phasor_terminal_voltage(g, port, emf)
-    E_fd, _ = variant.exciter(m, g.start, lambda E: v_t, g.field_current)
-    P_m = ieeeg1(m, g.w, g.start.T_e, variant.governor)
+    v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))
+    E_fd, _ = exciter(m, g.start, lambda E: v_t, g.field_current, v_s)
+    P_m = governor(m, g.w, g.start.T_e)
     rotor_equations(m, g, port, E_fd, P_m)
-
     declare_phasor_port(m, g, port, emf)
     declare_generator_outputs(m, g, v_t, E_fd, P_m)
     return m.build()
@@ -58,16 +77,7 @@ def _generator(variant: Variant) -> Model:
 def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
     """Declare emf and admittance, and the lag for what saliency the admittance cannot show.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    g
-        The machine.
-    port
-        Of the generator.
-    emf
-        Behind the subtransient reactance, rotor frame [pu].
+    ``emf``: behind the subtransient reactance, rotor frame [pu].
     """
     impedance = Phasor(g.R, g.d.X_between)
     start = g.start.v + impedance * g.start.i
@@ -78,16 +88,8 @@ def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phas
 def close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
     """Stator currents from emf and bus voltage, two real equations; then the fluxes ψ̃ = e'' − X·i.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    g
-        The machine, its stator's fluxes as open signals.
-    port
-        Gives the bus voltage.
-    emf
-        Behind the subtransient reactance, rotor frame [pu].
+    ``g``: the machine, its stator's fluxes as open signals; ``port``: gives the bus voltage; ``emf``: behind the
+    subtransient reactance, rotor frame [pu].
     """
     over = (emf - port.v.rotated(-g.delta)) * port.connected
     R, X_d, X_q = g.R, g.d.X_between, g.q.X_between

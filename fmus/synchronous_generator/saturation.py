@@ -11,12 +11,7 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 def saturated_part(x: ca.SX, one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar]) -> ca.SX:
     """S(x)·x for x ≥ 0: what saturation adds to what is proportional.
 
-    Parameters
-    ----------
-    x
-        Flux or voltage [pu].
-    one, other
-        Two points (x, S) in either order; S = 0 at both for no saturation.
+    ``x``: flux or voltage [pu]; ``one``, ``other``: two points (x, S) in either order; S = 0 at both for no saturation.
     """
     first, last = _ordered(one, other)
     high = last[0] * last[1]
@@ -29,14 +24,7 @@ def saturated_part(x: ca.SX, one: tuple[Scalar, Scalar], other: tuple[Scalar, Sc
 def require_rising(m: ModelBuilder, one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar], text: str) -> None:
     """Refuse points between which S(x)·x does not rise.
 
-    Parameters
-    ----------
-    m
-        The model.
-    one, other
-        As `saturated_part`.
-    text
-        Names the points.
+    ``text``: names the points.
     """
     first, last = _ordered(one, other)
     none = ca.logic_and(first[1] <= 0, last[1] <= 0)

@@ -1,27 +1,28 @@
-"""What tells the catalogue's generators apart, and what all of them show: with stator transients and without alike."""
+"""The case studies' generators, and the outputs that all generators have."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 
 from fmus.synchronous_generator.data import IEEE118, IEEEG1_NTS631, IEEEG1_STAMP, SG1, SG2, GovernorData, MachineData
-from fmus.synchronous_generator.exciters import Exciter, ac4a, st1, st4b
+from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.excitation.without_ceilings import ac4a, st1, st4b
 from fmus.synchronous_generator.machine import Machine
 from fmus.toolchain.model_builder import ModelBuilder
+
+Governor = Callable[[ModelBuilder, ca.SX, ca.SX], ca.SX]
+"""Mechanical power [pu, S_n] from speed and the power of the operating point."""
+
+Stabilizer = Callable[[ModelBuilder, ca.SX, ca.SX, ca.SX], ca.SX]
+"""Signal [pu] from w − 1, electrical power and the power of the operating point."""
 
 
 @dataclass(frozen=True)
 class Variant:
     """An excitation system, and default values of machine and governor.
 
-    Attributes
-    ----------
-    name
-        Of the exciter, as models are called: ``st4b``.
-    exciter
-        Declares it.
-    data, governor
-        Default values.
+    ``name``: of the exciter, as models are called: ``st4b``.
     """
 
     name: str
@@ -55,18 +56,8 @@ ST4B = Variant("st4b", st4b, SG1, IEEEG1_NTS631)
 def declare_generator_outputs(m: ModelBuilder, machine: Machine, v_t: ca.SX, E_fd: ca.SX, P_m: ca.SX) -> None:
     """Declare what a generator shows beside its port.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    machine
-        Gives speed, angle and torque.
-    v_t
-        Voltage magnitude at the terminal [pu, S_n].
-    E_fd
-        Field voltage; 1 pu gives 1 pu of voltage on open circuit.
-    P_m
-        Mechanical power [pu, S_n].
+    ``machine``: gives speed, angle and torque; ``v_t``: voltage magnitude at the terminal [pu, S_n]; ``E_fd``: field
+    voltage; 1 pu gives 1 pu of voltage on open circuit; ``P_m``: mechanical power [pu, S_n].
     """
     m.output("omega", machine.w, "pu", "Rotor speed", base="f_n")
     m.output("delta", machine.delta, "rad", "Rotor angle in the network frame")

@@ -16,7 +16,9 @@ from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
 def test_bench() -> Model:
     """Source, impedance, bus, load and fault in the network frame, per unit on 100 MVA."""
     m = ModelBuilder(
-        "test_bench", "Test bench: a programmable source behind a settable impedance, and a load (EMT type)"
+        "test_bench",
+        "Test bench: a programmable source behind a settable impedance, and a load (EMT type)",
+        kind="network",
     )
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     omega_b = 2 * ca.pi * f_n

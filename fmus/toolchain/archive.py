@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 NAMESPACE = uuid.UUID("b0f1a1f6-6f1d-5d0e-9f3c-5a7c0d2f9e11")
-"""Of the guids: each is the uuid5 of everything that the FMU is made from."""
+"""Namespace of the guids: each is the uuid5 of everything that the FMU is made from."""
 
 _TIMESTAMP = (2020, 1, 1, 0, 0, 0)
 

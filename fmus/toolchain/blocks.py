@@ -22,18 +22,7 @@ longest internal step of any model, so that no stage of Runge-Kutta's method lan
 def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """s·T_W/(1 + s·T_W); its output is 0 in steady state.
 
-    Parameters
-    ----------
-    m
-        The model.
-    name
-        Of the state.
-    u
-        What goes in.
-    T_W
-        Time constant [s].
-    initial
-        Of u, in steady state.
+    ``T_W``: time constant [s].
     """
     x = m.state(name, initial, "pu", "washout, slow part of the signal", base="S_n")
     m.derivative(x, (u - x) / T_W)
@@ -43,18 +32,7 @@ def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar =
 def low_pass(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """1/(1 + s·T), T > 0: the output is a state, so nothing passes directly.
 
-    Parameters
-    ----------
-    m
-        The model.
-    name
-        Of the state.
-    u
-        What goes in.
-    T
-        Time constant [s].
-    initial
-        Of u, in steady state.
+    ``T``: time constant [s].
     """
     x = m.state(name, initial, "pu", "first-order lag", base="S_n")
     m.derivative(x, (u - x) / T)
@@ -64,12 +42,7 @@ def low_pass(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 
 def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """1/(1 + s·T); passed through where T = 0.
 
-    Parameters
-    ----------
-    m, name, u, initial
-        As `low_pass`.
-    T
-        Time constant [s], 0 or more.
+    ``T``: time constant [s], 0 or more.
     """
     x = m.state(name, initial, "pu", "first-order lag", base="S_n")
     left_out = _is_zero(T)
@@ -80,12 +53,7 @@ def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial
 def washout_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T_W: ca.SX, initial: Scalar = 0.0) -> ca.SX:
     """s·T_W/(1 + s·T_W); passed through where T_W = 0, and then ``initial`` must be 0 or be taken off later.
 
-    Parameters
-    ----------
-    m, name, u, initial
-        As `washout`.
-    T_W
-        Time constant [s], 0 or more.
+    ``T_W``: time constant [s], 0 or more.
     """
     left_out = _is_zero(T_W)
     return ca.if_else(left_out, u, washout(m, name, u, ca.if_else(left_out, BYPASS_TIME, T_W), initial))
@@ -94,12 +62,7 @@ def washout_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T_W: ca.SX, initial
 def lead_lag(m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0.
 
-    Parameters
-    ----------
-    m, name, u, initial
-        As `low_pass`.
-    T_lead, T_lag
-        Time constants [s], 0 or more.
+    ``T_lead``, ``T_lag``: time constants [s], 0 or more.
     """
     x = m.state(name, initial, "pu", "lead/lag", base="S_n")
     left_out = _is_zero(T_lag)
@@ -111,20 +74,8 @@ def lead_lag(m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar
 def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar, K_I: Scalar, initial: Scalar) -> ca.SX:
     """K_P + K_I/s.
 
-    Parameters
-    ----------
-    m
-        The model.
-    name
-        Of the state, the integrator's output.
-    error
-        What goes in; 0 in steady state.
-    K_P
-        Proportional gain.
-    K_I
-        Integral gain [1/s, times the unit of K_P].
-    initial
-        Of the output, in steady state; the integrator carries it.
+    ``error``: what goes in; 0 in steady state; ``K_P``: proportional gain; ``K_I``: integral gain [1/s, times the unit
+    of K_P]; ``initial``: of the output, in steady state; the integrator carries it.
     """
     x = m.state(name, initial, "pu", "integrator", base="S_n")
     m.derivative(x, K_I * error)
@@ -132,7 +83,6 @@ def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar,
 
 
 def limit(u: ca.SX, magnitude: Scalar) -> ca.SX:
-    """Clamp to ±magnitude."""
     return ca.fmin(ca.fmax(u, -magnitude), magnitude)
 
 
@@ -146,29 +96,14 @@ def limited_low_pass(
 ) -> ca.SX:
     """1/(1 + s·T) that stops at its limits and leaves them as soon as its input does (non-windup); T = 0: a limiter.
 
-    Parameters
-    ----------
-    m, name, u, initial
-        As `low_pass`.
-    T
-        Time constant [s], 0 or more.
-    low, high
-        Limits of the output.
+    ``T``: time constant [s], 0 or more; ``low``, ``high``: limits of the output.
     """
     x = m.state(name, initial, "pu", "first-order lag with limits", base="S_n")
     return close_limited_low_pass(m, x, u, T, low, high)
 
 
 def close_limited_low_pass(m: ModelBuilder, x: ca.SX, u: ca.SX, T: Scalar, low: Scalar, high: Scalar) -> ca.SX:
-    """`limited_low_pass` with a state that is declared already, for what the input is fed back from.
-
-    Parameters
-    ----------
-    m, u, T, low, high
-        As `limited_low_pass`.
-    x
-        The state.
-    """
+    """`limited_low_pass` with a state that is declared already, for what the input is fed back from."""
     left_out = _is_zero(T)
     rate = (u - x) / ca.if_else(left_out, BYPASS_TIME, T)
     m.derivative(x, ca.if_else(left_out, rate, held_at_limits(x, rate, low, high)))
@@ -180,14 +115,7 @@ def limited_proportional_integral(
 ) -> ca.SX:
     """K_P + K_I/s, the output limited; the integrator stops while the output is at a limit (IEEE 421.5, annex E).
 
-    Parameters
-    ----------
-    m, name, error, K_P, K_I
-        As `proportional_integral`.
-    low, high
-        Limits of the output.
-    initial
-        Of the integrator, in steady state.
+    ``low``, ``high``: limits of the output; ``initial``: of the integrator, in steady state.
     """
     x = m.state(name, initial, "pu", "integrator with limits", base="S_n")
     u = K_P * error + x
@@ -199,14 +127,7 @@ def limited_proportional_integral(
 def held_at_limits(x: ca.SX, rate: Scalar, low: Scalar, high: Scalar) -> ca.SX:
     """The rate of a state with non-windup limits: what lies beyond a limit after a step returns to it at once.
 
-    Parameters
-    ----------
-    x
-        The state.
-    rate
-        Its rate without limits.
-    low, high
-        The limits; use the state through `clamp`.
+    ``rate``: its rate without limits; ``low``, ``high``: the limits; use the state through `clamp`.
     """
     above = ca.logic_and(x >= high, ca.SX(rate) > 0)
     below = ca.logic_and(x <= low, ca.SX(rate) < 0)

@@ -16,7 +16,7 @@ from fmus.toolchain.extras import SetupError
 _LOG = logging.getLogger("gfor")
 _HASH = ".sha256"
 _checked: dict[Path, tuple[int, int, int]] = {}
-"""What was found intact in this process: inode, size and time of the last change."""
+"""Files found intact in this process: inode, size and time of the last change."""
 
 
 class CacheError(SetupError):

@@ -25,7 +25,7 @@ def needs_arguments(name: str) -> bool:
 
 
 def parts_of(name: str) -> dict[str, str]:
-    """What a model can be made of, such as ``machine`` and ``exciter``, each with the part that it is made of if
+    """The parts that a model lets choose, such as ``machine`` and ``exciter``, each with the one that it has if
     nothing is chosen; empty for a model without parts.
     """
     return dict(_signature(name)["parts"])
@@ -41,7 +41,6 @@ def entry_of(name: str) -> EntryPoint:
 
 
 def build_model(name: str, **arguments: Any) -> Model:
-    """Build one model of the catalogue."""
     return _made(name, _factory(name), arguments)
 
 
@@ -75,7 +74,7 @@ def _entries() -> dict[str, EntryPoint]:
 
 @cache
 def _signature(name: str) -> dict[str, Any]:
-    """What a model's arguments are, without its code where that was looked at before."""
+    """A model's arguments, without importing it where they are noted."""
 
     def find() -> dict[str, Any]:
         parameters = inspect.signature(_factory(name)).parameters.values()

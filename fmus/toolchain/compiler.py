@@ -34,7 +34,7 @@ FLAGS = (
     # (llvm/llvm-project#200833): an FMU would not be the same file on each machine. It costs a grid's step 4 %.
     *("-fno-unroll-loops", "-fno-vectorize"),
 )
-"""Of every library."""
+"""Flags of every library."""
 
 # Without a name of its own a Mac library would carry the path of the temporary folder.
 _MAC_FLAGS = ("-Wl,-install_name,@rpath/library.dylib",)

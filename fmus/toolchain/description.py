@@ -7,7 +7,9 @@ each output and derivative depends on, so that a master can order its calls and 
 from xml.etree.ElementTree import Element, SubElement
 
 from fmus.toolchain.description_common import (
+    COMPONENT,
     TOOL,
+    component_element,
     described_variables,
     root_element,
     text_of,
@@ -17,7 +19,7 @@ from fmus.toolchain.description_common import (
 from fmus.toolchain.model import Model
 
 _GROUPS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "InitialUnknown": "InitialUnknowns"}
-"""What FMI 2.0 calls the list of each kind of unknown."""
+"""FMI 2.0's name of the list of each kind of unknown."""
 
 
 def model_description(
@@ -54,8 +56,9 @@ def model_description(
     if source_file:
         SubElement(SubElement(kind, "SourceFiles"), "File", name=source_file)
     write_definitions(root, model, "fmi2")
-    annotation = SubElement(SubElement(root, "VendorAnnotations"), "Tool", name=TOOL)
-    SubElement(annotation, "ContinuousStates", settable="true")
+    annotations = SubElement(root, "VendorAnnotations")
+    SubElement(SubElement(annotations, "Tool", name=TOOL), "ContinuousStates", settable="true")
+    SubElement(annotations, "Tool", name=COMPONENT).append(component_element(model))  # a Tool has one element
     _variables(root, model)
     _structure(root, model, listed=listed)
     return text_of(root)

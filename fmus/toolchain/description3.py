@@ -3,7 +3,9 @@
 from xml.etree.ElementTree import Element, SubElement
 
 from fmus.toolchain.description_common import (
+    COMPONENT,
     TOOL,
+    component_element,
     described_variables,
     root_element,
     text_of,
@@ -37,6 +39,7 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     _structure(root, model)
     annotations = SubElement(root, "Annotations")
     SubElement(annotations, "Annotation", type=f"{TOOL}.ContinuousStates").text = "settable"
+    SubElement(annotations, "Annotation", type=COMPONENT).append(component_element(model))
     return text_of(root)
 
 

@@ -1,4 +1,4 @@
-"""What modelDescription.xml says in FMI 2.0 and in FMI 3.0 alike, from a model's declarations.
+"""The part of modelDescription.xml that FMI 2.0 and FMI 3.0 share, from a model's declarations.
 
 `description` and `description3` write the rest: the names that a version gives its elements, and their order.
 """
@@ -12,6 +12,8 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable
 
 TOOL = "gfor-cosim"
+COMPONENT = f"{TOOL}.Component"
+"""Names of our annotations."""
 
 _CALCULATED = {"causality": "local", "variability": "continuous", "initial": "calculated"}
 
@@ -74,8 +76,17 @@ def unknowns(model: Model, *, listed: bool = True) -> dict[str, tuple[Unknown, .
     return {"Output": known.outputs, "ContinuousStateDerivative": known.derivatives, "InitialUnknown": known.initial}
 
 
+def component_element(model: Model) -> Element:
+    """Our annotation: the component's kind, and the usual ranges of its parameters."""
+    element = Element("Component", {"kind": model.kind} if model.kind else {})
+    for parameter in model.parameters:
+        if (usual := parameter.usual) is not None:
+            bounds = {"name": parameter.name, "low": repr(float(usual.low)), "high": repr(float(usual.high))}
+            SubElement(element, "Usual", bounds | ({"orZero": "true"} if usual.or_zero else {}) | {"why": usual.why})
+    return element
+
+
 def text_of(root: Element) -> bytes:
-    """The file's text."""
     indent(root)
     text: str = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()

@@ -59,7 +59,6 @@ def export(
 
 
 def kept_at(recipe: Recipe) -> Path:
-    """Path at which this machine's FMU is kept, whether it is there or not."""
     folder = cache_directory("fmus") / f"{recipe.cache_prefix}{recipe.digest[:32]}"
     return folder / f"{recipe.model.name}.fmu"
 

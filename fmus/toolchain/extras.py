@@ -19,7 +19,7 @@ EXTRAS = {
 
 
 class SetupError(Exception):
-    """What was asked needs another set-up of this machine; the message says what the user can change."""
+    """The machine needs another set-up for this; the message says which."""
 
 
 class MissingLibraryError(SetupError, RuntimeError):

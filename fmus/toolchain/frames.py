@@ -60,7 +60,6 @@ class Phasor:
         return self * polar(1.0, angle)
 
     def clamped(self, limit_re: Scalar, limit_im: Scalar) -> Phasor:
-        """Each part limited to ± its limit."""
         return Phasor(ca.fmin(ca.fmax(self.re, -limit_re), limit_re), ca.fmin(ca.fmax(self.im, -limit_im), limit_im))
 
 

@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import Any, Literal
 
 from fmus.toolchain.plan import Plan
-from fmus.toolchain.variables import CalculatedParameter, Input, Output, Parameter, State, Variable
+from fmus.toolchain.variables import CalculatedParameter, Input, Kind, Output, Parameter, State, Variable
 
 Integrator = Literal["runge_kutta", "sdirk"]
 
 FmiVersion = Literal["2.0", "3.0"]
-"""Of an FMU without Python."""
+"""FMI versions of a native FMU."""
 
 Function = Any
 """A ``casadi.Function``. CasADi has no types, and the catalogue can be listed without it."""
@@ -23,18 +23,9 @@ Function = Any
 class NodalEquations:
     """Y·v = i of a large network: a matrix whose pattern never changes, and currents.
 
-    Attributes
-    ----------
-    plan
-        Order and fill of the factorisation of Y.
-    values
-        (u, p, c) → real parts of the elements of Y in the plan's order, then their imaginary parts.
-    currents
-        (x, u, p, c) → real parts of i by bus, then imaginary parts.
-    given
-        Numbers of the inputs that Y depends on.
-    written_out
-        Makes the same model without such equations.
+    ``plan``: order and fill of the factorisation of Y; ``values``: (u, p, c) → real parts of the elements of Y in the
+    plan's order, then their imaginary parts; ``currents``: (x, u, p, c) → real parts of i by bus, then imaginary parts;
+    ``given``: numbers of the inputs that Y depends on; ``written_out``: makes the same model without such equations.
     """
 
     plan: Plan
@@ -70,6 +61,8 @@ class Model:
     nodal
         Equations of a large network, which a kernel solves as data. Their voltages are a fifth argument of
         ``derivatives`` and ``outputs_function`` then.
+    kind
+        What the component is in a power system.
     """
 
     name: str
@@ -87,6 +80,7 @@ class Model:
     integrator: Integrator = "runge_kutta"
     implicit: Function | None = None
     nodal: NodalEquations | None = None
+    kind: Kind = ""
 
     @property
     def written_out(self) -> Model:

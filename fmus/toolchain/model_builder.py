@@ -11,28 +11,42 @@ import casadi as ca
 
 from fmus.toolchain.model import Integrator, Model
 from fmus.toolchain.nodes import Complex, Nodes
-from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable, VariableType
+from fmus.toolchain.variables import (
+    UNITS,
+    CalculatedParameter,
+    Input,
+    Kind,
+    Output,
+    Parameter,
+    State,
+    Usual,
+    Variable,
+    VariableType,
+)
 
 Scalar = ca.SX | float
-"""What equations are made of."""
+"""An operand of equations."""
 
 
 class ModelBuilder:
     """Collects declarations and equations of one model.
 
-    Parameters
-    ----------
-    name
-        Identifier of the FMU (letters, digits, underscore).
-    title
-        One line that says what the model is.
-    internal_step, longest_step
-        Default and maximum of the parameter ``internal_step`` [s]. The defaults are for electromagnetic transients.
+    ``name``: identifier of the FMU (letters, digits, underscore); ``title``: one line that says what the model is;
+    ``internal_step``, ``longest_step``: default and maximum of the parameter ``internal_step`` [s]. The defaults are
+    for electromagnetic transients. ``usual``: ranges of parameters by their full name.
     """
 
-    def __init__(self, name: str, title: str, internal_step: float = 1e-4, longest_step: float = 2e-4) -> None:
-        self.name = name
-        self.title = title
+    def __init__(
+        self,
+        name: str,
+        title: str,
+        internal_step: float = 1e-4,
+        longest_step: float = 2e-4,
+        *,
+        kind: Kind = "",
+        usual: Mapping[str, Usual] | None = None,
+    ) -> None:
+        self.name, self.title, self.kind, self._usual = name, title, kind, usual or {}
         self._prefix: list[str] = []
         self._declared: dict[str, tuple[Variable, ca.SX]] = {}
         self._expressions: dict[str, ca.SX] = {}
@@ -68,6 +82,8 @@ class ModelBuilder:
     def _declare(self, variable: Variable) -> ca.SX:
         if variable.name in self._declared:
             raise ValueError(f"model {self.name}: {variable.name!r} is declared twice")
+        if isinstance(variable, Parameter) and variable.name in self._usual:
+            variable = replace(variable, usual=self._usual[variable.name])
         symbol = ca.SX.sym(variable.name)
         self._declared[variable.name] = (variable, symbol)
         return symbol
@@ -98,52 +114,23 @@ class ModelBuilder:
     ) -> ca.SX:
         """Declare a parameter.
 
-        Parameters
-        ----------
-        name
-            Without the scope.
-        start
-            Its default.
-        unit
-            One of `UNITS`.
-        description
-            One sentence.
-        base
-            What 1 pu is, such as ``"S_n"``; required where the unit is ``pu``.
-        minimum, maximum
-            Bounds; None for an unbounded side.
-        tunable
-            Whether it can be set at any communication point, not only before initialisation.
-        type
-            In the equations an Integer or a Boolean is a number as well.
-        source
-            Source of the default value; empty if it is not given.
+        ``name``: without the scope; ``base``: what 1 pu is, such as ``"S_n"``; required where the unit is ``pu``;
+        ``minimum``, ``maximum``: bounds; None for an unbounded side; ``tunable``: whether it can be set at any
+        communication point, not only before initialisation; ``type``: in the equations an Integer or a Boolean is a
+        number as well; ``source``: source of the default value; empty if it is not given.
         """
         return self._declare(
             Parameter(self._full(name), unit, description, base, float(start), minimum, maximum, tunable, type, source)
         )
 
     def switch(self, name: str, start: bool, description: str, *, tunable: bool = False) -> ca.SX:
-        """Declare a Boolean parameter; in the equations it is 0 or 1.
-
-        Parameters
-        ----------
-        name, description, tunable
-            As `parameter`.
-        start
-            Its default.
-        """
+        """Declare a Boolean parameter; in the equations it is 0 or 1."""
         return self.parameter(name, float(start), "1", description, tunable=tunable, type="Boolean")
 
     def calculated(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
         """Declare a quantity computed at initialisation from fixed parameters.
 
-        Parameters
-        ----------
-        name, unit, description, base
-            As `parameter`.
-        value
-            An expression of fixed parameters.
+        ``value``: an expression of fixed parameters.
         """
         full = self._full(name)
         self._expressions[full] = ca.SX(value)
@@ -152,12 +139,7 @@ class ModelBuilder:
     def input(self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0) -> ca.SX:
         """Declare an input.
 
-        Parameters
-        ----------
-        name, unit, description, base
-            As `parameter`.
-        start
-            Its value until it is set.
+        ``start``: its value until it is set.
         """
         return self._declare(Input(self._full(name), unit, description, base, start))
 
@@ -166,16 +148,9 @@ class ModelBuilder:
     ) -> ca.SX:
         """Declare a continuous state.
 
-        Parameters
-        ----------
-        name, description, base
-            As `parameter`.
-        initial
-            Its initial value, an expression of parameters.
-        unit
-            One of `UNITS`; the same per second must be one of them too.
-        stepwise
-            Whether it is held during a communication step, as inputs are, and moves by rate × step size at its end.
+        ``initial``: its initial value, an expression of parameters; ``unit``: one of `UNITS`; the same per second must
+        be one of them too; ``stepwise``: whether it is held during a communication step, as inputs are, and moves by
+        rate × step size at its end.
         """
         full = self._full(name)
         if f"{unit}/s" not in UNITS:
@@ -186,15 +161,9 @@ class ModelBuilder:
     def derivative(self, state: ca.SX, rate: Scalar, implicit: Scalar | None = None) -> None:
         """Give the time derivative of a declared state.
 
-        Parameters
-        ----------
-        state
-            As `state` returned it.
-        rate
-            [unit of the state per second]
-        implicit
-            The part of the rate that an implicit integrator solves for; it is linear in the states. By default all
-            of it. What is left is evaluated at the stages of a step and must be slow against it.
+        ``rate``: [unit of the state per second]; ``implicit``: the part of the rate that an implicit integrator solves
+        for; it is linear in the states. By default all of it. What is left is evaluated at the stages of a step and
+        must be slow against it.
         """
         declared = self._declared.get(state.name())
         if declared is None or not isinstance(declared[0], State):
@@ -208,12 +177,7 @@ class ModelBuilder:
     def output(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> None:
         """Declare an output as a function of states, inputs and parameters.
 
-        Parameters
-        ----------
-        name, unit, description, base
-            As `parameter`.
-        value
-            An expression of states, inputs and parameters.
+        ``value``: an expression of states, inputs and parameters.
         """
         full = self._full(name)
         self._expressions[full] = ca.SX(value)
@@ -241,13 +205,7 @@ class ModelBuilder:
     def nodes(
         self, elements: Mapping[tuple[int, int], Complex], currents: Sequence[Complex], written_out: Callable[[], Model]
     ) -> list[tuple[ca.SX, ca.SX]]:
-        """Let the kernel solve complex nodal equations Y·v = i as data; returns real and imaginary part of each v.
-
-        Parameters
-        ----------
-        elements, currents, written_out
-            As `Nodes`.
-        """
+        """Let the kernel solve complex nodal equations Y·v = i as data; returns real and imaginary part of each v."""
         self._nodes = Nodes(elements, currents, written_out)
         return self._nodes.voltages
 
@@ -315,6 +273,7 @@ class ModelBuilder:
             integrator=integrator,
             implicit=implicit,
             nodal=nodal,
+            kind=self.kind,
         )
 
     def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:

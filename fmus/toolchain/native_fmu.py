@@ -26,8 +26,6 @@ _FOLDERS_3 = {
 
 
 class NativeFmu:
-    """All parts of a native FMU, with one hash over them."""
-
     cache_prefix = "native_"
 
     def __init__(self, model: Model, version: FmiVersion = "2.0", *, sources: bool = False) -> None:
@@ -50,7 +48,6 @@ class NativeFmu:
         return with_guid(self._text, guid_of(self.digest), "guid" if self._version == "2.0" else "instantiationToken")
 
     def default_platforms(self) -> tuple[str, ...]:
-        """All of them."""
         return tuple(TARGETS)
 
     def host_platforms(self) -> tuple[str, ...]:

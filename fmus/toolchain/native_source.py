@@ -65,7 +65,6 @@ def _adjoint(name: str, known: list[ca.SX], follows: list[ca.SX]) -> ca.Function
 
 
 def _data(model: Model) -> str:
-    """Data of the model for the instance, as C declarations."""
     parameters, rules = model.parameters, model.requirement_texts
     texts = [*rules, *model.value_references]
     start = [p.start for p in parameters] + [u.start for u in model.inputs]

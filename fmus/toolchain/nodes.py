@@ -47,6 +47,5 @@ class Nodes:
 
 
 def _parts(entries: Sequence[Complex]) -> ca.SX:
-    """Real parts, then imaginary parts."""
     parts = [ca.SX(re) for re, _ in entries] + [ca.SX(im) for _, im in entries]
     return ca.SX(ca.vertcat(*parts))

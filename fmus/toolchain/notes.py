@@ -26,7 +26,7 @@ _LIBRARIES = ("gfor-cosim", "casadi", "numpy", "pythonfmu", "scipy", "ziglang")
 
 
 def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:
-    """What is noted, or else what is found, which is noted for the next time.
+    """The cached note; computed and cached if missing.
 
     ``entry``: The catalogue's entry of the model. Of a model from another distribution nothing is noted, since nobody
     knows what its code imports.
@@ -45,7 +45,7 @@ def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:
 
 
 def known(entry: EntryPoint, asked: str) -> Any | None:
-    """What is noted; None if nothing is."""
+    """The cached note; None without one."""
     path = note_of(entry, asked)
     return json.loads(path.read_bytes()) if path is not None and intact(path) else None
 
@@ -85,7 +85,6 @@ def _code_now() -> str:
 
 @cache
 def _code_loaded() -> str:
-    """The code when this module was imported, and with it what is loaded."""
     return _code_now()
 
 

@@ -6,6 +6,7 @@ a solver that fed it back would have an algebraic loop.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
@@ -21,9 +22,9 @@ steps below 2.78 of them."""
 DERIVATIVE_LAG = 5e-3  # lag [s] of the derivative that carries an emf half a communication step ahead
 
 
-def phasor_builder(name: str, title: str) -> ModelBuilder:
+def phasor_builder(name: str, title: str, **what: Any) -> ModelBuilder:
     """A builder for a model without network transients."""
-    return ModelBuilder(name, title, INTERNAL_STEP, LONGEST_STEP)
+    return ModelBuilder(name, title, INTERNAL_STEP, LONGEST_STEP, **what)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ BREAKER_TIME = 1e-3  # time constant τ [s] with which the current of an open br
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """What the power flow says about a device, and the frame that it is said in."""
+    """A device's operating point from the power flow, and its frame."""
 
     # v_0, i_0: bus voltage and injected current of the power flow, network frame [pu, S_n].
     v_0: Phasor
@@ -73,7 +73,7 @@ def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> Dev
 
 def declare_operating_point(m: ModelBuilder, P_0: float) -> OperatingPoint:
     """Declare the rated frequency and the power-flow start values; ``P_0`` is the default active power [pu, S_n]."""
-    f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
+    f_n = m.declare(port_variables.F_N)
     v_0, theta_0 = m.declare(port_variables.V_0), m.declare(port_variables.THETA_0)
     p_0, q_0 = m.declare(replace(port_variables.P_0, start=float(P_0))), m.declare(port_variables.Q_0)
     bus = polar(v_0, theta_0)

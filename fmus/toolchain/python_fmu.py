@@ -26,7 +26,7 @@ _EXECUTED = """import ctypes
 from {} import Slave
 ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
 """
-"""What the wrapper executes for each instance: a class that were made there would stay in memory.
+"""Code that the wrapper executes for each instance: a class that were made there would stay in memory.
 
 The wrapper also gives back the module's dictionary, which it never took.
 """
@@ -49,7 +49,6 @@ class PythonFmu:
         self.digest = digest_of(self._c, self._python, self._slave, description, data, exporter, *recipe())
 
     def default_platforms(self) -> tuple[str, ...]:
-        """The platform of this machine."""
         return this_machine()
 
     def host_platforms(self) -> tuple[str, ...]:

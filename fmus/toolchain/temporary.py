@@ -84,7 +84,6 @@ def leave(folder: Path) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Remove a folder, and give its lock back."""
     remove_tree(folder)
     _give_back(folder)
 

@@ -9,6 +9,9 @@ from typing import Literal
 
 VariableType = Literal["Real", "Integer", "Boolean"]
 
+Kind = Literal["converter", "machine", "network", "load", ""]
+"""A component's role in a power system; empty for none of these, such as a controller alone."""
+
 UNITS: dict[str, dict[str, float]] = {
     # unit -> exponents of SI base units, with the factor to them (FMI 2.0, section 2.2.2)
     "1": {},
@@ -28,6 +31,23 @@ UNITS: dict[str, dict[str, float]] = {
     "A": {"A": 1},
     "kA": {"A": 1, "factor": 1e3},
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Usual:
+    """The usual range of a parameter in its unit, both ends included. A value outside is questioned, not refused.
+
+    It is wide: it finds a wrong unit (ms for s, kVA for MVA) or a wrong base, and does not judge data.
+    """
+
+    low: float
+    high: float
+    why: str
+    or_zero: bool = False  # whether 0 is usual as well, because it switches a part off
+    slip: str = ""  # the likely mistake behind a value outside; found from the value where empty
+
+    def fits(self, value: float) -> bool:
+        return self.low <= value <= self.high or (self.or_zero and value == 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +76,6 @@ class Variable:
 
     @property
     def text(self) -> str:
-        """The description with its base."""
         return f"{self.description} [pu, base {self.base}]" if self.base else self.description
 
 
@@ -70,6 +89,7 @@ class Parameter(Variable):
     tunable: bool = False
     type: VariableType = "Real"
     source: str = ""
+    usual: Usual | None = None
 
 
 @dataclass(frozen=True, slots=True)

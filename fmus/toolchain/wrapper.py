@@ -91,7 +91,7 @@ def _put(binary: bytes, at: int, what: bytes) -> bytes:
 
 
 def _segments(binary: bytes) -> list[tuple[int, int, int, int, int, int]]:
-    """Of every segment of a 64-bit ELF file: type, flags, offset, address, size, and where its header is."""
+    """Type, flags, offset, address, size and header's place of every segment of a 64-bit ELF file."""
     (table,) = struct.unpack_from("<Q", binary, 32)
     size, count = struct.unpack_from("<HH", binary, 54)
     places = [table + size * n for n in range(count)]

@@ -3,7 +3,7 @@
 The DLL's code runs in that process and can write the file as well. So it is taken for what the DLL says of itself: read
 as a plain file of bounded size, of the form that was asked for, with no character that XML or a terminal takes for more
 than text. An answer of the DLL's own making that has this form says no more than its Model_GetInfo could have said; and
-how it keeps its state is tried again by `gfor check`.
+how it keeps its state is tried again by `gfor fmu check`.
 """
 
 import json
@@ -44,7 +44,7 @@ def read_plain_file(path: Path, most: int = _MOST_BYTES) -> bytes:
 
 
 def read_answer(path: Path) -> dict[str, Any]:
-    """What the process wrote: ``error``, or ``interface`` and ``trial``."""
+    """The process's answer: ``error``, or ``interface`` and ``trial``."""
     try:
         content = json.loads(read_plain_file(path))
     except (ValueError, RecursionError) as error:
@@ -85,7 +85,7 @@ def _text(value: Any, where: str) -> str:
 
 
 def _name(value: Any, where: str) -> str:
-    """As it is: `DllInterface.faults` refuses names that cannot be written."""
+    """The name unchanged: `DllInterface.faults` refuses those that cannot be written."""
     _text(value, where)
     return str(value)
 

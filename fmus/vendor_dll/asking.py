@@ -30,7 +30,6 @@ class Answer:
 
 
 def note_beside(answer: Path) -> Path:
-    """File in which the process notes what the DLL is doing."""
     return answer.with_name(answer.name + ".doing")
 
 
@@ -78,7 +77,7 @@ def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
 
 
 def _doing(note: Path) -> str:
-    """What the DLL is doing by the note; its code can write there too."""
+    """The DLL's present call by the note, which its code can overwrite."""
     if not os.path.lexists(note):
         return ""
     try:
@@ -110,7 +109,7 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 
 def _processor_time(session: int) -> float:
-    """Of all processes of a session [s]; 0 where there is no /proc."""
+    """Processor time of all processes of a session [s]; 0 without /proc."""
     ticks = 0
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError, ValueError, IndexError):

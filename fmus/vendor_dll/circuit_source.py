@@ -32,7 +32,7 @@ _PLACES = {
 
 
 def kernel_source(model: Model) -> str:
-    """What stands before the host: the kernel, under names that the host does not have."""
+    """The kernel's source, under names that the host does not have."""
     define = "\n".join(f"#define {name} {other}" for name, other in _KERNEL.items())
     undefine = "\n".join(f"#undef {name}" for name in _KERNEL)
     size = f"enum {{ CIRCUIT_SIZE = {len(model.value_references)}, RULES = {len(model.requirement_texts)} }};"
@@ -45,7 +45,6 @@ def no_kernel_source() -> str:
 
 
 def circuit_source(model: Model, device: Device) -> str:
-    """What stands after the host."""
     places = model.value_references
     at = ", ".join(f"{name} = {places[variable]}" for name, variable in _PLACES.items())
     flags = {"DELAY": int(device.delay), "MEASUREMENTS": len(device.measured)}

@@ -97,7 +97,7 @@ def dll_description(
 
 
 def _plain(words: str) -> str:
-    """What a file of XML can hold, as a DLL's own words may be in it."""
+    """A DLL's own words without characters that XML cannot hold."""
     return "".join(c if c.isprintable() else " " for c in words)[:_LONGEST_WHY]
 
 

@@ -25,10 +25,10 @@ _MEASURED_KIND = (
     | dict.fromkeys(MEASURED[6:], "current")
     | dict.fromkeys(("P_ref", "Q_ref", "p_u", "q_u", "p", "q"), "power")
 )
-"""What can be given in the DLL's own unit."""
+"""Signals that can be given in the DLL's own unit."""
 
 _PER_UNIT = ("V_ref", "u", "i_s")
-"""What can be given in per unit alone: whether a unit would mean a peak or an rms value, nothing says."""
+"""Signals in per unit alone: whether a unit would mean a peak or an rms value, nothing says."""
 
 _WORDS_FOR_PER_UNIT = ("pu", "p.u.", "p.u", "PU")
 
@@ -114,7 +114,7 @@ class _Reader:
         self._own = self._unit()
 
     def _unit(self) -> dict[str, float]:
-        """What 1 pu is to the DLL [kV, kA, MVA], where it controls one of several units in parallel."""
+        """The DLL's bases [kV, kA, MVA], where it controls one of several units in parallel."""
         part = self._part("unit")
         if not part:
             return {}

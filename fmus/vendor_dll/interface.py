@@ -1,4 +1,4 @@
-"""What an IEEE/CIGRE DLL declares: its signals, parameters and states, and where each lies in the host's memory.
+"""Declarations of an IEEE/CIGRE DLL: its signals, parameters and states, and where each lies in the host's memory.
 
 Source of the structures: CIGRE Technical Brochure 958 (2025) and the header of its API, version 2.
 """
@@ -13,8 +13,6 @@ Number = int | float
 
 @dataclass(frozen=True)
 class DataType:
-    """One of the interface's ten data types."""
-
     name: str  # as the interface has it, such as ``real64``
     c: str
     size: int  # of one value, which is also its alignment [bytes]
@@ -77,8 +75,6 @@ class DllParameter:
 
 @dataclass(frozen=True)
 class DllInterface:
-    """Everything that a DLL declares of itself."""
-
     texts: dict[str, str]  # ``ModelName``, ``ModelVersion`` and the eight others, by the interface's names
     interface_version: tuple[int, ...]  # four numbers
     sample_time: float  # ``FixedStepBaseSampleTime`` [s]; not positive means: that of the host
@@ -94,7 +90,6 @@ class DllInterface:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "DllInterface":
-        """What `as_json` gave."""
         signals = {name: tuple(Signal(**row) for row in data[name]) for name in ("inputs", "outputs")}
         rows = {"parameters": tuple(DllParameter(**row) for row in data["parameters"])}
         plain = {name: tuple(data[name]) for name in ("interface_version", "states", "calls")}
@@ -105,7 +100,7 @@ class DllInterface:
         return replace(self, parameters=rows)
 
     def faults(self) -> list[str]:
-        """What the DLL declares that no host can run, in words; empty for a sound one."""
+        """Declarations that no host can run, in words; empty for a sound DLL."""
         found = [
             f"it has no function Model_{call}, which every host calls" for call in NEEDED if call not in self.calls
         ]

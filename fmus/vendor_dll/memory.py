@@ -19,8 +19,6 @@ def unheard(_doing: str) -> None:
 
 
 class LibraryEndedError(ValueError):
-    """The process that a DLL is in has ended."""
-
     def __init__(self, words: str, *, passing: bool = False) -> None:
         super().__init__(words)
         self.passing = passing
@@ -33,7 +31,7 @@ class Library(Protocol):
         """Whether it has a function."""
 
     def call(self, name: str, argument: int = 0) -> int:
-        """What a function returns for one pointer, as 64 bits."""
+        """A function's answer to one pointer, as 64 bits."""
 
     def read(self, address: int, size: int) -> bytes:
         """A stretch of memory."""
@@ -52,8 +50,6 @@ class Library(Protocol):
 
 
 class LocalLibrary:
-    """A DLL in this process."""
-
     def __init__(self, path: Path, note: Note = unheard) -> None:
         note("it is loaded")
         self._path, self._library, self._note = path, c.CDLL(str(path)), note
@@ -63,7 +59,7 @@ class LocalLibrary:
         return hasattr(self._library, name)
 
     def call(self, name: str, argument: int = 0) -> int:
-        """What a function returns for one pointer, as 64 bits."""
+        """A function's answer to one pointer, as 64 bits."""
         function = getattr(self._library, name)
         function.restype, function.argtypes = c.c_int64, [c.c_void_p]
         self._note(f"{name} runs")
@@ -79,7 +75,6 @@ class LocalLibrary:
         return c.string_at(address) if address else b""
 
     def write(self, address: int, content: bytes) -> None:
-        """Change a stretch of memory."""
         c.memmove(address, content, len(content))
 
     def allocate(self, size: int) -> int:

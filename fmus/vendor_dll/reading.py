@@ -25,8 +25,6 @@ _Row = TypeVar("_Row", bound=c.Structure)
 
 
 class _Value(c.Union):
-    """A default, or a bound."""
-
     _fields_ = (
         *(("char", c.c_int8), ("c_string", c.c_void_p), ("int8", c.c_int8), ("uint8", c.c_uint8)),
         *(("int16", c.c_int16), ("uint16", c.c_uint16), ("int32", c.c_int32), ("uint32", c.c_uint32)),
@@ -128,7 +126,7 @@ def _parameter(row: _Parameter, text: _Text) -> DllParameter:
 
 
 def read(library: Library, texts: Mapping[str, str] | None) -> dict[str, Any]:
-    """What a DLL declares, and, where texts are given, how it keeps its state with them, as JSON has it."""
+    """A DLL's declarations and, where texts are given, how it keeps its state with them [JSON]."""
     interface = read_interface(library)
     trial = (
         Trial("not tried") if texts is None or interface.faults() else tried(library, interface.with_defaults(texts))

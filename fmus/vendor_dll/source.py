@@ -21,7 +21,7 @@ _HEADERS = "#define _GNU_SOURCE\n" + "".join(
 
 PARAMETER, INITIAL, INPUT, OUTPUT, HELD, INT_STATE, FLOAT_STATE, DOUBLE_STATE, MEMORY_STATE, SAMPLES = range(10)
 CIRCUIT_PARAMETER, CIRCUIT_INPUT, CIRCUIT_STATE, CIRCUIT_VALUE, HELD_INPUT, CONSTANT_INPUT = range(10, 16)
-"""What a variable is to the host. What lies up to `INITIAL` is set before the start."""
+"""A variable's role for the host. Those up to `INITIAL` are set before the start."""
 
 _ROLES = ("PARAMETER", "INITIAL", "INPUT", "OUTPUT", "HELD", "INT_STATE", "FLOAT_STATE", "DOUBLE_STATE",
           "MEMORY_STATE", "SAMPLES", "CIRCUIT_PARAMETER", "CIRCUIT_INPUT", "CIRCUIT_STATE",
@@ -54,7 +54,6 @@ class HostVariable:
 
     @property
     def fixed(self) -> bool:
-        """Whether a parameter can be set before the start only."""
         p = self.parameter
         return not p.tunable if isinstance(p, Parameter) else p is None or p.fixed
 
@@ -171,7 +170,6 @@ def _tables(
     vendor_file: str,
     variables: Sequence[HostVariable],
 ) -> list[str]:
-    """Declarations of the DLL's data."""
     regions = trial.regions
     sizes = {
         name: layout(rows).size

@@ -21,8 +21,6 @@ _MODEST = (1e-12, 1e12)  # A word is taken for a number where its magnitude is z
 
 @dataclass(frozen=True)
 class Trial:
-    """How a DLL keeps its state."""
-
     # ``arrays``: in the host's arrays alone; ``library``: also in variables of its own, in the library's memory;
     # ``hidden``: neither brings it back; ``not tried``.
     state: str
@@ -41,7 +39,6 @@ class Trial:
 
     @classmethod
     def from_json(cls, data: dict[str, Any]) -> "Trial":
-        """What `as_json` gave."""
         places = {name: tuple(data[name]) for name in ("doubles", "floats")}
         regions = tuple((start, size) for start, size in data["regions"])
         return cls(data["state"], **places, regions=regions, why=data["why"], passing=data["passing"])

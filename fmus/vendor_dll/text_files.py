@@ -36,5 +36,5 @@ def hidden(interface: DllInterface, texts: Mapping[str, str], files: Mapping[str
     said = ", ".join(f"{name} = {value!r}" for name, value in named.items())
     return said and (
         f"it sees no files but those that its text parameters name, and of {said} there is none: put it beside the "
-        "DLL, or give its path in [texts] of a device's file or with gfor build --text NAME=PATH"
+        "DLL, or give its path in [texts] of a device's file or with gfor fmu build --text NAME=PATH"
     )

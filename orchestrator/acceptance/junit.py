@@ -13,7 +13,7 @@ def write_junit(report: AcceptanceReport, path: Path) -> None:
     results = report.results
     suite = Element(
         "testsuite",
-        name=f"gfor check {report.fmu.name}",
+        name=f"gfor fmu check {report.fmu.name}",
         tests=str(len(results)),
         failures=str(len(report.failures)),
         skipped=str(sum(r.verdict is Verdict.NOT_APPLICABLE for r in results)),

@@ -144,7 +144,6 @@ class FmuProcess:
         return found
 
     def table(self, answer: Any) -> dict[str, float | bool]:
-        """The names and numbers that an answer must be."""
         found: dict[str, float | bool] = self._typed(answers.table, answer)
         return found
 
@@ -154,12 +153,10 @@ class FmuProcess:
         return found
 
     def names(self, answer: Any) -> list[str]:
-        """The list of texts that an answer must be."""
         found: list[str] = self._typed(answers.names, answer)
         return found
 
     def hexadecimal(self, answer: Any) -> bytes:
-        """The bytes that an answer must be."""
         found: bytes = self._typed(answers.hexadecimal, answer)
         return found
 

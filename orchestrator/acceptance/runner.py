@@ -69,7 +69,6 @@ class AcceptanceReport:
 
     @property
     def faults(self) -> list[str]:
-        """Names of what is wrong, each once."""
         return list(dict.fromkeys(r.fault for r in self.failures))
 
     @property
@@ -89,11 +88,9 @@ class AcceptanceReport:
 
     @property
     def trusted(self) -> bool:
-        """Whether it was checked, and nothing failed."""
         return not self.failures and not self.not_supported
 
     def as_dict(self) -> dict[str, Any]:
-        """The report as JSON's types."""
         return {
             "tool": f"gfor-cosim {version('gfor-cosim')}",
             "fmu": str(self.fmu),
@@ -118,7 +115,6 @@ FILE_CHECKS = {
 
 
 def question_of(name: str) -> str:
-    """The question that a check asks, in words."""
     return FILE_CHECKS[name] if name in FILE_CHECKS else CHECKS[name].question
 
 
@@ -147,7 +143,7 @@ def check_fmu(
         known = ", ".join([*FILE_CHECKS, *CHECKS])
         raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
     if "binding" in only and binding is None:
-        raise InputError("the check 'binding' needs a binding; give one with --binding (`gfor bind` drafts one)")
+        raise InputError("the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)")
     if fmu.is_dir():
         raise InputError(f"{fmu}: it is a folder; give the path of an .fmu")
     if not fmu.is_file():

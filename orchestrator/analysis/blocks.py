@@ -175,7 +175,6 @@ class Blocks:
 
     @property
     def disagreement(self) -> float:
-        """The largest of all components' disagreements."""
         return max(c.disagreement for c in self.components.values())
 
     def linked(self, name: str) -> dict[int, int]:
@@ -191,7 +190,6 @@ class Blocks:
         return found
 
     def state_names(self) -> list[str]:
-        """Names ``component.state`` of all states, in their order."""
         return [f"{name}.{state}" for name, c in self.components.items() for state in c.states]
 
     def state_windows(self) -> dict[str, slice]:
@@ -245,14 +243,13 @@ def _idle_inputs(master: Master, name: str, found: Mapping[str, ComponentLineari
 
 
 def _by_component(master: Master, names: Sequence[str]) -> dict[str, list[str]]:
-    """Variables of every component among names ``component.variable``."""
     found: dict[str, list[str]] = {name: [] for name in master.components}
     for full in names:
         component, _, variable = full.partition(".")
         if component not in found or variable not in master.components[component].description.variables:
             known = [f"{name}.{own}" for name, one in master.components.items() for own in one.description.variables]
             near = difflib.get_close_matches(full, known, 3)
-            hint = f"did you mean {' or '.join(near)}?" if near else "`gfor info` lists the variables of an FMU"
+            hint = f"did you mean {' or '.join(near)}?" if near else "`gfor fmu info` lists the variables of an FMU"
             raise InputError(f"linear model: there is no variable {full!r}; {hint}")
         found[component].append(variable)
     return found

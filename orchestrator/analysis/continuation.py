@@ -135,7 +135,6 @@ def between(one: LinearModel, other: LinearModel) -> Callable[[float], LinearMod
 
 
 def pair_of(mode: Mode, names: Sequence[str]) -> Eigenpair:
-    """The pair of a mode in a model with these states."""
     return _pair(mode.eigenvalue, *(np.array([v[name] for name in names]) for v in (mode.left, mode.shape)))
 
 

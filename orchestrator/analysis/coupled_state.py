@@ -23,7 +23,6 @@ class CoupledState:
         return np.concatenate([access.read() for access in self._access.values()])
 
     def write(self, x: Matrix) -> None:
-        """Set all states and make every output consistent with them."""
         first = 0
         for access in self._access.values():
             last = first + len(access.batch.names)

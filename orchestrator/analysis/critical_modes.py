@@ -194,7 +194,6 @@ class Search:
         self._blocks: BlockArnoldi | None = None
 
     def nearest(self, count: int) -> NDArray[np.complex128]:
-        """The nearest eigenvalues λ."""
         self._blocks = None
         nu, self._right = self._arnoldi(self._solver.solve, count)
         self._values = self._to_lambda(nu)
@@ -221,7 +220,6 @@ class Search:
         return None
 
     def modes(self, chosen: Sequence[int]) -> list[Mode]:
-        """Modes of some of the eigenvalues of the last search."""
         return [make_mode(value, left, right, self._model.names) for value, left, right in self.pairs(chosen)]
 
     def pairs(self, chosen: Sequence[int]) -> list[tuple[complex, Vector, Vector]]:

@@ -42,7 +42,7 @@ def _with_cause(misfit: Misfit, component: Component) -> Misfit:
 
 
 def _omega_alone(master: Master, name: str) -> tuple[float, bool]:
-    """Its omega at rest in a second instance at an ideal bus, as `gfor check` sees it, and whether it has settled."""
+    """Its omega at rest in a second instance at an ideal bus, as in `gfor fmu check`, and whether it has settled."""
     plan, inputs, h = master.system.components[name], master.exchanges[name].inputs.names, master.clock.step_size
     with closing(open_component(name, plan.description, isolated=plan.isolated)) as alone:
         alone.setup(0.0, None)

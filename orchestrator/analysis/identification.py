@@ -105,7 +105,6 @@ class Sampling:
 
 
 def sampling(times: NDArray[np.float64], highest_hz: float = 10.0) -> Sampling:
-    """Which samples `identify_modes` uses."""
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
     finest = 1 / (10 * highest_hz)
     thin = max(1, round(1 / (10 * highest_hz * step)), -(-len(times) // _MAX_SAMPLES)) if step > 0 else 1

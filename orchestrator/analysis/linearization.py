@@ -41,7 +41,7 @@ def compose(blocks: Blocks, schedule: Schedule, *, within_period: bool = False) 
             f"sampled components ({', '.join(blocks.sampled)}) repeat only after {blocks.period} communication steps "
             f"of {blocks.step_size:g} s ({blocks.period * blocks.step_size:g} s), and the linear model that is asked "
             "for is of a single step, which differs from the next; `gfor modes`, `gfor run` and `gfor sweep` take the "
-            "whole period, `gfor black-box` measures such a component through its port"
+            "whole period, `gfor modes --black-box` measures such a component through its port"
         )
     if schedule.is_second_order:
         return line_model(blocks, schedule)

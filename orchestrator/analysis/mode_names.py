@@ -40,7 +40,6 @@ class Naming:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """A sentence on each name that no mode has for reasons of doubt, and the remarks."""
         return (*self.reasons.values(), *self.remarks)
 
 

@@ -28,8 +28,6 @@ At = TypeVar("At", bound=Hashable)
 
 @dataclass(frozen=True)
 class ModeSet:
-    """The modes of one operating point."""
-
     eigenvalues: Complex  # λ [rad/s], shape (m,)
     # left, right: eigenvectors as rows, shape (m, n), in any scaling
     left: Complex
@@ -38,8 +36,6 @@ class ModeSet:
 
     @classmethod
     def of(cls, modes: Sequence[Mode], names: tuple[str, ...]) -> Self:
-        """The set of some modes of a model with these states."""
-
         def rows(vectors: Iterable[Mapping[str, complex]]) -> Complex:
             return np.array([[v[name] for name in names] for v in vectors], dtype=complex).reshape(
                 len(modes), len(names)

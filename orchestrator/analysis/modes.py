@@ -102,7 +102,6 @@ class Mode:
         return together, [s for s in moving if s not in together]
 
     def participation_of(self, states: Iterable[str]) -> float:
-        """Sum of the factors of some states."""
         wanted = set(states)
         return sum(factor for name, factor in self.participation if name in wanted)
 
@@ -194,7 +193,6 @@ def oscillations(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
 
 
 def least_damped_first(modes: Iterable[Mode]) -> list[Mode]:
-    """Sorted by damping ratio, then frequency."""
     return sorted(modes, key=lambda mode: (mode.damping_ratio, mode.frequency_hz))
 
 

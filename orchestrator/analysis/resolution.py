@@ -122,7 +122,7 @@ def _step_warnings(
         return (
             f"{text}; no shorter step that was tried comes nearer, so that the derivatives which the components "
             "give disagree with their steps, or the coupling is unstable at all of them: compare with "
-            "`gfor linearize --continuous`",
+            "`gfor export linear --continuous`",
         )
     if worst.is_lost and _is_slow(worst):
         raise InputError(f"{text}; {_take(short)}")

@@ -249,7 +249,6 @@ class _Comparison:
         return np.hstack([x @ m.A.T + u @ m.B.T, x @ m.C.T + u @ m.D.T])
 
     def _by_itself(self) -> Matrix:
-        """All signals, from the inputs alone."""
         m = self.model
         over = {k: over_held_inputs(m.A, m.B, k * self.step_size) for k in set(self.plan.holds)}
         x = np.zeros(len(m.A))
@@ -277,6 +276,6 @@ class _Comparison:
             f"{self.plan.ends[k] * self.step_size:.4g} s into small steps of {', '.join(self.model.inputs)}, "
             f"{self.model.signals[columns[worst]]} is {found[k, worst]:.6g} per unit of them, where it should be "
             f"{said[k, worst]:.6g} ({how}): off by {100 * share:.3g} % of its largest value, and {100 * part:g} % is "
-            "allowed; pack the model of this FMU anew (`gfor build --with-linear-model`), or have the FMU measured "
-            "instead (`gfor black-box`)"
+            "allowed; pack the model of this FMU anew (`gfor fmu build --with-linear-model`), or have the FMU measured "
+            "instead (`gfor modes --black-box`)"
         )

@@ -59,5 +59,4 @@ def steps_of_period(master: Master, step_size: float, without: Iterable[str] = (
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
-    """Least common multiple."""
     return Fraction(lcm(a.numerator, b.numerator), gcd(a.denominator, b.denominator))

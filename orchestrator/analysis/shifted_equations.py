@@ -35,8 +35,6 @@ class Factors:
 
 
 class ShiftedEquations:
-    """The equations of a model, ready for any σ."""
-
     def __init__(self, model: LinearModel) -> None:
         n, m = model.G.shape
         parts = sp.block_array([[model.F, model.G], [model.H, model.K - sp.eye_array(m)]], format="coo")
@@ -48,7 +46,6 @@ class ShiftedEquations:
         self._whole, self._n = whole.astype(complex), n
 
     def at(self, sigma: complex) -> Factors:
-        """Factorise A − σI."""
         shifted = self._whole.copy()
         shifted.data[self._diagonal] -= sigma
         try:

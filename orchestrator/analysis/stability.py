@@ -48,8 +48,6 @@ _SWINGS_SHOWN = 3
 
 
 class Cause(StrEnum):
-    """The cause of growth in a system."""
-
     SYSTEM = "system"
     COUPLING = "coupling"
     UNKNOWN = "not known"
@@ -111,8 +109,6 @@ class Hidden:
 
 @dataclass(frozen=True)
 class Stability:
-    """The verdict on a linearised system."""
-
     stable: bool | None  # whether no mode grows; None if this is not known
     # the mode of the largest real part: of the step map, or of the continuous system if only this one grows
     mode: Mode | None = None
@@ -141,7 +137,6 @@ class Stability:
         return {True: "stable", False: "UNSTABLE", None: "not known"}[self.stable]
 
     def sentence(self) -> str:
-        """The verdict in words, with its figures."""
         return f"{self.verdict}: {self.because()}"
 
     def because(self) -> str:

@@ -6,8 +6,8 @@ from orchestrator.errors import AnalysisError, ErrorKind
 from orchestrator.fmi.component import Component, RealBatch
 
 _MEASURE = (
-    "`gfor modes CASE --black-box` identifies it from its inputs and outputs, and `gfor black-box CASE --component {}` "
-    "shows that in detail"
+    "`gfor modes CASE --black-box` identifies it from its inputs and outputs, and "
+    "`gfor modes CASE --black-box --component {}` shows that in detail"
 )
 
 
@@ -27,7 +27,7 @@ def obstacle(component: Component) -> str | None:
             f"component {component.name!r}: its FMU does not let a master set its continuous states, which "
             "linearisation by perturbation needs, and has no linear model inside; "
             f"{_MEASURE.format(component.name)}. (An FMU declares settable states under VendorAnnotations, as "
-            "fmus/toolchain/README.md has it; `gfor build --with-linear-model` packs a model of ours)"
+            "fmus/toolchain/README.md has it; `gfor fmu build --with-linear-model` packs a model of ours)"
         )
     return None
 

@@ -70,7 +70,7 @@ def read_linear_model(path: Path) -> StateSpace:
     """The continuous linear model that an FMU carries; names are those of its variables."""
     model = read_embedded_model(path)
     if model is None:
-        raise InputError(f"{path}: there is no linear model inside; `gfor build --with-linear-model` packs one")
+        raise InputError(f"{path}: there is no linear model inside; `gfor fmu build --with-linear-model` packs one")
     names = (tuple(model.states), tuple(model.inputs), tuple(model.outputs))
     return StateSpace(model.A, model.B, model.C, model.D, *names, step_size=None)
 

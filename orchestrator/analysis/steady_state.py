@@ -26,8 +26,6 @@ _SHORT = 1e-4  # for steps shorter than this [s], the accepted change is a rate 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """A steady state of the coupled system."""
-
     residual: float  # largest change of any state over one communication step [the state's unit, mostly pu]
     drift: float  # largest rate of change of any state [the state's unit per second]
     initial_residual: float  # residual at the power flow's operating point, before any correction
@@ -101,7 +99,7 @@ def what_to_check(master: Master) -> str:
         late = "; ".join(late.text for late in master.late_starts.values())
         return (
             f"{late}. Its partners started from the first value: have the FMU compute its outputs in initialisation "
-            "mode (`gfor check --only initial_outputs` shows it alone)"
+            "mode (`gfor fmu check --only initial_outputs` shows it alone)"
         )
     if misfits := sentences(misfits_of(master)):
         return "; ".join(misfits)

@@ -20,8 +20,6 @@ _MOST_SAMPLES = 4000
 
 @dataclass(frozen=True, slots=True)
 class WindowPart:
-    """Modes of a part of a signal, and what they leave of it."""
-
     modes: Sequence[IdentifiedMode]
     length: float  # of this part [s]
     samples: int

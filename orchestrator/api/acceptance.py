@@ -17,7 +17,7 @@ from orchestrator.fmi.limits import LEAST_MEMORY, Limits
 from orchestrator.fmi.vendor_files import as_fmu
 
 DataFrame = Any
-"""``pandas.DataFrame``; importing the class takes 0.3 s, which ``gfor check`` saves."""
+"""``pandas.DataFrame``; importing the class takes 0.3 s, which ``gfor fmu check`` saves."""
 
 
 class Acceptance:
@@ -55,11 +55,11 @@ class Acceptance:
         return pd.DataFrame.from_dict(rows, orient="index", columns=["verdict", "question", "evidence", "remedy"])
 
     def as_json(self) -> dict[str, Any]:
-        """The same as ``gfor check --json`` prints, as JSON's types."""
+        """The same as ``gfor fmu check --json`` prints, as JSON's types."""
         return self.report.as_dict()
 
     def save_junit(self, path: str | Path) -> Path:
-        """Write the results as JUnit's XML for a CI server, as ``gfor check --junit``; returns the path.
+        """Write the results as JUnit's XML for a CI server, as ``gfor fmu check --junit``; returns the path.
 
         Raises
         ------
@@ -109,7 +109,7 @@ def check(
     path
         Path of the FMU.
     binding
-        File that says what the FMU's variables mean at our port (``gfor bind`` drafts one); by default the case's.
+        File that says what the FMU's variables mean at our port (``gfor fmu bind`` drafts one); by default the case's.
     step
         Communication step of use [s]; by default the case's, and without a case the one that the FMU declares.
     only

@@ -67,7 +67,7 @@ class RunComparison:
         return pd.DataFrame(rows).set_index("signal")
 
     def as_json(self) -> list[dict[str, Any]]:
-        """The same as ``gfor compare --json`` prints, as JSON's types."""
+        """The same as ``gfor signal compare --json`` prints, as JSON's types."""
         return [asdict(c) | {"modes": [m and identified_mode_json(m) for m in c.modes]} for c in self.signals]
 
     def __repr__(self) -> str:

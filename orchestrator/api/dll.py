@@ -15,7 +15,7 @@ KEPT_IN = {
     "library": "it keeps state in variables of its own: each instance gets a copy of the library, whose writable "
     "memory is part of the state",
     "hidden": "it keeps state where a host cannot save it, so it can be run and measured from outside "
-    "(`gfor black-box`), and not perturbed",
+    "(`gfor modes --black-box`), and not perturbed",
     "not tried": "how it keeps its state could not be tried, so its state is not saved",
 }
 """Where a DLL keeps its state, and the way that is chosen for it."""

@@ -209,7 +209,7 @@ class FmuInfo:
         return _variables(self.description)
 
     def as_json(self) -> dict[str, Any]:
-        """The same as ``gfor info --json`` prints, as JSON's types."""
+        """The same as ``gfor fmu info --json`` prints, as JSON's types."""
         d = self.description
         keys = ("name", "type", "causality", "variability", "unit", "start", "minimum", "maximum", "description")
         return {

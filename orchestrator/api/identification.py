@@ -100,7 +100,7 @@ class SignalModes:
         return pd.DataFrame(self.as_json(), columns=figures)
 
     def as_json(self) -> list[dict[str, Any]]:
-        """The same as ``gfor identify --json`` prints, as JSON's types."""
+        """The same as ``gfor signal identify --json`` prints, as JSON's types."""
         return [identified_mode_json(mode) for mode in self.modes]
 
     def __repr__(self) -> str:

@@ -73,7 +73,7 @@ class LinearSystem(StateSpace):
 
 
 def read_linear_model(fmu: str | Path) -> LinearSystem:
-    """The continuous linear model that an FMU carries (``gfor build --with-linear-model``).
+    """The continuous linear model that an FMU carries (``gfor fmu build --with-linear-model``).
 
     Raises
     ------

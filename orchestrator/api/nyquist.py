@@ -34,7 +34,7 @@ class Nyquist:
         return self.result.judgement.reasons
 
     def as_json(self) -> dict[str, Any]:
-        """The same as ``gfor nyquist --json`` prints, as JSON's types."""
+        """The same as ``gfor fmu nyquist --json`` prints, as JSON's types."""
         return self.result.as_json()
 
     def save_pictures(self, folder: str | Path) -> list[Path]:

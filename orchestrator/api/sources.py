@@ -46,7 +46,7 @@ class Sources:
         return len(self.oscillations)
 
     def as_json(self) -> dict[str, Any]:
-        """The same as ``gfor source --json`` prints, as JSON's types."""
+        """The same as ``gfor signal source --json`` prints, as JSON's types."""
         found = [one.as_json() for one in self.oscillations]
         return {"record": self.label, "places": self.places, "remarks": list(self.remarks), "oscillations": found}
 

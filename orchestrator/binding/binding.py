@@ -40,8 +40,7 @@ def bind(fmu: FmuDescription, binding: Path | str) -> BoundDescription:
 
 
 def read_table(path: Path) -> BindingTable:
-    """Read a binding file and check its form."""
-    _, raw = read_toml(path, "the binding", "`gfor bind FILE.fmu` drafts one")
+    _, raw = read_toml(path, "the binding", "`gfor fmu bind FILE.fmu` drafts one")
     try:
         return BindingTable.model_validate(raw)
     except ValidationError as error:
@@ -85,7 +84,6 @@ class _Reader:
 
     @contextmanager
     def _at(self, place: str) -> Iterator[None]:
-        """Inside, mistakes are noted with this place."""
         try:
             yield
         except ValueError as error:
@@ -95,7 +93,7 @@ class _Reader:
     def _variable(self, name: str, *causalities: str, kind: str = "Real") -> VariableInfo:
         info = self._fmu.variables.get(name)
         if info is None:
-            raise ValueError(f"the FMU has no variable {name!r}; `gfor info {self._fmu.path.name}` lists them")
+            raise ValueError(f"the FMU has no variable {name!r}; `gfor fmu info {self._fmu.path.name}` lists them")
         if causalities and info.causality not in causalities:
             raise ValueError(f"{name} is of causality {info.causality}; {' or '.join(causalities)} is needed here")
         if info.type != kind:

@@ -68,10 +68,10 @@ def draft_binding(fmu: FmuDescription, beside: Path | None = None) -> str:
     taken = {v.name for guess in (voltage, current) if guess for v in guess.variables}
     file = fmu.path.name if beside is None else _relative(fmu.path, beside)
     lines = [
-        f"# Binding of {fmu.model_name}, drafted from its model description by `gfor bind`.",
+        f"# Binding of {fmu.model_name}, drafted from its model description by `gfor fmu bind`.",
         "# GUESS marks what the names suggest: confirm it. REQUIRED marks what the FMU does not say: fill it in.",
         "# What is in V, kV, A or kA needs the key 'value' besides its unit: rms or peak, phase or line to line.",
-        "# Then: gfor check FILE.fmu --binding THIS_FILE finds wrong signs and bases by their power balance.",
+        "# Then: gfor fmu check FILE.fmu --binding THIS_FILE finds wrong signs and bases by their power balance.",
         "",
         "[fmu]",
         f"file = {_quoted(file)}",
@@ -237,7 +237,6 @@ def _units(table: str, guess: Guess | None) -> list[str]:
 
 
 def _unit(info: VariableInfo, such_as: str) -> list[str]:
-    """The unit of a variable that declares no unit: from its description, or to be filled in."""
     if not undeclared(info):
         return []
     unit = likely_unit(info)

@@ -45,7 +45,6 @@ class Misfit:
     figures: Mapping[str, float] = field(default_factory=dict)
 
     def sentence(self, name: str) -> str:
-        """The whole finding on the component of a name."""
         return f"{name}: {self.fault}: {self.evidence}; {REMEDIES[self.fault]}"
 
 

@@ -6,7 +6,9 @@ from pydantic import Field, field_validator, model_validator
 
 from orchestrator.toml_files import Table
 
-REQUIRED = "REQUIRED"  # word that `gfor bind` writes for an unknown value. A binding that still contains it is refused.
+REQUIRED = (
+    "REQUIRED"  # word that `gfor fmu bind` writes for an unknown value. A binding that still contains it is refused.
+)
 
 
 class DraftedTable(Table):

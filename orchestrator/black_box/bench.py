@@ -55,7 +55,6 @@ class Bench:
 
     @property
     def saves_state(self) -> bool:
-        """Whether the bench saves and restores the device's state."""
         return self.description.can_save_state if self.restore is None else self.restore
 
     @contextmanager
@@ -127,7 +126,6 @@ class Runs:
         return found / (2 * size)
 
     def close(self) -> None:
-        """Release the instance."""
         component, self._component = self._component, None
         if component is not None:
             if self._state is not None:

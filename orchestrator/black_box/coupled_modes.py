@@ -36,8 +36,6 @@ STILL = 1e-9
 
 @dataclass(frozen=True)
 class BoxedSystem:
-    """A coupled system linearised with one component as a black box."""
-
     component: str
     response: FrequencyResponse
     identified: IdentifiedModel

@@ -15,8 +15,6 @@ from orchestrator.black_box.frequency_response import FrequencyResponse
 
 @dataclass(frozen=True)
 class Passivity:
-    """Passivity of a measured admittance."""
-
     frequencies: Numbers
     index: Numbers  # smallest eigenvalue of (Y + Yᴴ)/2 [unit of Y], shape (f,)
     # ``index`` over the largest singular value of Y: from −1, where the device only delivers power, to 1

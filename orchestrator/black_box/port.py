@@ -11,12 +11,11 @@ from orchestrator.fmi.devices import NO_BUS, is_controller_alone
 
 
 def values_for(description: FmuDescription, given: Mapping[str, Any]) -> dict[str, float | bool]:
-    """Values of ``--set`` in the variables' own units."""
     values = {}
     for name, value in given.items():
         info = description.variables.get(name)
         if info is None:
-            raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor info` lists them")
+            raise InputError(f"--set {name}: {description.path.name} has no such variable; `gfor fmu info` lists them")
         try:
             values[name] = convert(info, value)
             check_system_base(description, name, values[name])

@@ -21,7 +21,7 @@ def assign_values(draft: Draft) -> None:
                 draft.note(draft.place_of_value(name, group, key.split(".")), f"{key}: {TWICE}")
             for path, value in flat:
                 _assign(draft, name, ".".join(path), value, draft.place_of_value(name, group, path))
-    for layer in draft.layers:
+    for layer in draft.given.layers:
         chosen = [(choice.pattern, choice.place) for choice in layer.natives]  # made when the components were added
         chosen += [(choice.pattern, choice.place) for choice in layer.parts]
         for pattern, place in chosen:
@@ -46,7 +46,7 @@ def _assign_frequency(draft: Draft) -> None:
     for name, plan in draft.system.components.items():
         if "f_n" in plan.description.parameters:
             plan.parameters["f_n"] = draft.data.frequency
-            draft.places[f"{name}.f_n"] = draft.place("network", "frequency")
+            draft.places[f"{name}.f_n"] = draft.given.place("network", "frequency")
 
 
 def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
@@ -55,7 +55,7 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
         return  # done when the connections are made
     pattern, _, variable = key.partition(".")
     meant = fnmatch.filter(draft.tables, pattern) if variable else []
-    fitting = [name for name in meant if name not in draft.exchanged]
+    fitting = [name for name in meant if name not in draft.given.exchanged]
     having = [name for name in fitting if _has(draft, name, variable)]
     if pattern not in draft.tables and all(name in draft.system.components for name in fitting):
         if fitting == meant and fitting and not having:
@@ -79,10 +79,10 @@ def _settable(draft: Draft, name: str) -> tuple[str, ...]:
 
 
 def _check_component(draft: Draft, pattern: str, where: str) -> None:
-    if draft.network_failed and draft.case.units is not None:
+    if draft.found.network_failed and draft.given.case.units is not None:
         return  # the units may be what is missing
     if not fnmatch.filter(draft.known, pattern):
-        some = ", ".join([*draft.case.components, *draft.origins][:12])
+        some = ", ".join([*draft.given.case.components, *draft.origins][:12])
         draft.note(where, f"there is no component {pattern!r}; the case has: {some}")
 
 
@@ -94,7 +94,7 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
     if info is None:
         if draft.is_repeated(name, variable):
             return
-        hint = close_names(variable, _settable(draft, name), f"`gfor info {plan.description.path}` lists them")
+        hint = close_names(variable, _settable(draft, name), f"`gfor fmu info {plan.description.path}` lists them")
         draft.note(where, f"component {name!r} has no variable {variable!r}; {hint}")
         return
     if info.causality not in ("parameter", "input"):

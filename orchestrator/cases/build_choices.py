@@ -59,8 +59,6 @@ class PartChoice:
 
 @dataclass(frozen=True)
 class ShareChoice:
-    """A converter's share of its unit."""
-
     label: str
     given: Value
     place: str

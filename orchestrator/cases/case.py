@@ -95,7 +95,7 @@ class Case(CaseDefinition):
             prepared.append(_told(preparer.prepare(step_size, stop_time), lost, shared))
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
-            questions += [q for q in preparer.draft.questions if q not in questions]
+            questions += [q for q in preparer.draft.found.questions if q not in questions]
         if not problems and self.numbered and unmatched(self.table, named, self.place):
             problems += self._mentions
         if problems:  # unusual data may be the reason of the failure

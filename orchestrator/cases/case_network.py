@@ -21,20 +21,20 @@ def takes_network(table: ComponentTable) -> bool:
 
 def read_network(draft: Draft) -> None:
     """Read the elements of the network table. Its source may have data for the units."""
-    table = draft.case.network
+    table = draft.given.case.network
     if table is None:
         return
     given = [key for key in ("matpower", "pandapower", "raw", "cgmes") if getattr(table, key) is not None]
     if len(given) > 1:
         names = " or ".join(map(repr, given))
-        draft.note_network(draft.place("network"), f"give either {names}, not both")
+        draft.note_network(draft.given.place("network"), f"give either {names}, not both")
         return
     source = given[0] if given else None
     try:
-        draft.data = network_data(table, draft.directory)
-        draft.questions += draft.data.changes
+        draft.data = network_data(table, draft.given.directory)
+        draft.found.questions += draft.data.changes
     except InputError as error:
-        where = draft.place("network", source) if source else draft.place("network")
+        where = draft.given.place("network", source) if source else draft.given.place("network")
         draft.note_network(where, str(error))
 
 
@@ -42,11 +42,11 @@ def check_network_is_used(draft: Draft, everything: Tables) -> None:
     """Refuse a network that nothing is built from; its frequency alone would still set that of every component."""
     tables = everything.values()
     unknown = [table.model for table in tables if table.model is not None and table.model not in model_names()]
-    if draft.case.network is None or draft.case.units is not None or unknown:
+    if draft.given.case.network is None or draft.given.case.units is not None or unknown:
         return
     if not any(takes_network(table) for table in tables):
         draft.note(
-            draft.place("network"),
+            draft.given.place("network"),
             "no component is built from this network; give the grid the model 'grid' or 'phasor_grid', or remove "
             "the table",
         )
@@ -60,13 +60,13 @@ def find_network(draft: Draft, everything: Tables) -> None:
     grid = draft.tables.get(draft.grid)
     if grid is None:
         hint = close_names(draft.grid, draft.tables, f"the case has: {', '.join([*draft.tables][:12])}")
-        draft.note_network(draft.place("power_flow", "grid"), f"there is no component {draft.grid!r}; {hint}")
+        draft.note_network(draft.given.place("power_flow", "grid"), f"there is no component {draft.grid!r}; {hint}")
     elif takes_network(grid):
         draft.network = _from_table(draft, grid, everything)
     elif grid.model in model_names():
         draft.network = _with_ports(draft, grid)
     elif grid.model is not None:
-        draft.network_failed = True  # what is wrong with its model is said where it is added
+        draft.found.network_failed = True  # what is wrong with its model is said where it is added
 
 
 def _with_ports(draft: Draft, grid: ComponentTable) -> Network | None:
@@ -86,7 +86,7 @@ def _check_buses_have_a_grid(draft: Draft) -> None:
     for name, table in draft.tables.items():
         if table.bus is not None:
             place = "units" if name in draft.origins else "components"
-            where = draft.place(place) if place == "units" else draft.place(place, name, "bus")
+            where = draft.given.place(place) if place == "units" else draft.given.place(place, name, "bus")
             draft.note_network(
                 where, "a bus needs a [power_flow] table whose grid is a model with a network; or use [[connections]]"
             )
@@ -96,25 +96,25 @@ def _check_buses_have_a_grid(draft: Draft) -> None:
 def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Network | None:
     data = draft.data
     if data is None:
-        if draft.case.network is None:
+        if draft.given.case.network is None:
             draft.note_network(
-                draft.place("power_flow", "grid"),
+                draft.given.place("power_flow", "grid"),
                 f"the model {grid.model!r} needs a [network] table with buses, lines and loads",
             )
         return None
-    if draft.network_failed:
+    if draft.found.network_failed:
         return None
     held = {table.bus for table in everything.values()}
     idle = [bus for bus in data.generation if bus not in held]
     if idle:
         draft.note_network(
-            draft.place("network"),
+            draft.given.place("network"),
             f"the source has generators at {', '.join(idle)}, where the case has no unit and no component; "
             "add a row to the units' file, or a component with this bus",
         )
         return None
     ports = tuple(Port(n, t.bus) for n, t in draft.tables.items() if t.bus)
-    name = f"{draft.case.name}_grid"
+    name = f"{draft.given.case.name}_grid"
     try:
         network = Network(
             name, data.buses, data.lines, data.loads, ports, data.shunts, data.stray_B, (), data.transformers,
@@ -122,7 +122,7 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
         )  # fmt: skip
         return _with_switches(network, draft)
     except ValueError as error:
-        draft.note_network(draft.place("network"), str(error))
+        draft.note_network(draft.given.place("network"), str(error))
         return None
 
 
@@ -131,8 +131,8 @@ def _with_switches(network: Network, draft: Draft) -> Network:
 
     Unknown names are the events' matter.
     """
-    case = draft.case
-    network = replace(network, injections=network.buses) if draft.injections else network
+    case = draft.given.case
+    network = replace(network, injections=network.buses) if draft.given.injections else network
     tables = [*case.events, *(event for scenario in case.scenarios.values() for event in scenario.events or ())]
     faults = {table.bus for table in tables if isinstance(table, BusFaultTable)}
     switched = {table.shunt for table in tables if isinstance(table, ShuntTripTable | ShuntReconnectionTable)}

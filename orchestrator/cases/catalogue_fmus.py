@@ -17,8 +17,6 @@ _TO_COME = "not-built"  # identity of an FMU that is not there
 
 @dataclass(frozen=True, eq=False)
 class PlannedFmu:
-    """An FMU of the catalogue that may have to be built."""
-
     model: str
     network: Network | None
     native: bool
@@ -82,7 +80,6 @@ def _place(recipe: Any) -> list[str]:
 
 @cache
 def build_fmu(planned: PlannedFmu) -> FmuDescription:
-    """Build the FMU if it is not there."""
     if planned.is_there:
         return planned.description
     from fmus.toolchain.exporter import cached  # noqa: PLC0415 - needs the extra `build`

@@ -77,7 +77,6 @@ def _units(case: CaseTable, place: Locate) -> Iterator[Problem]:
 
 
 def _again(names: Iterable[str]) -> Iterator[tuple[str, int]]:
-    """The names that stood before, each with its number."""
     seen: set[str] = set()
     for k, name in enumerate(names):
         if name in seen:
@@ -86,7 +85,6 @@ def _again(names: Iterable[str]) -> Iterator[tuple[str, int]]:
 
 
 def doubts(case: CaseTable, place: Locate) -> list[Problem]:
-    """What is used in part or not at all, as questions."""
     ring = case.analysis.ring_down
     found = []
     if ring is not None and not case.analysis.modes:

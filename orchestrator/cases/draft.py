@@ -27,8 +27,8 @@ class UnitOrigin:
 
 
 @dataclass
-class Draft:
-    """Data that the steps of the preparation share."""
+class DraftInput:
+    """What a scenario is prepared from."""
 
     source: str  # the case file, as errors name it
     case: CaseTable
@@ -36,12 +36,39 @@ class Draft:
     scenario: ScenarioTable
     directory: Path
     place: Locate  # key path → its text with the line of the file
+    # the parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
+    parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
+    # whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
+    whole: bool = True
+    injections: bool = False  # as in `CaseDefinition`
+    # components whose device is another than the file's own, which no layer's value reaches.
+    exchanged: frozenset[str] = frozenset()
+    # variables, by ``component.variable``, that the command line or its parameter files set.
+    from_outside: frozenset[str] = frozenset()
     # values and choices from parameter files, the scenario and the command line; a later layer overrides an earlier
     # one.
     layers: list[Layer] = field(default_factory=list)
-    # variables, by ``component.variable``, that the command line or its parameter files set.
-    from_outside: frozenset[str] = frozenset()
+
+
+@dataclass
+class Findings:
+    """Mistakes and questions."""
+
     problems: list[Problem] = field(default_factory=list)
+    questions: list[Problem] = field(default_factory=list)
+    not_reached: list[float] = field(default_factory=list)
+    # components whose form the network cannot take, each with its model; what follows from that is not noted.
+    misfits: dict[str, str] = field(default_factory=dict)
+    network_failed: bool = False
+    missed: set[tuple[str, str]] = field(default_factory=set)  # variables of units of a kind that none of them has
+
+
+@dataclass
+class Draft:
+    """A scenario in preparation: what it is made from, what was found, and what is made so far."""
+
+    given: DraftInput
+    found: Findings = field(default_factory=Findings)
     # elements of the network, and the source's data of units; None if the case has no network of its own.
     data: NetworkData | None = None
     network: Network | None = None  # the network behind the grid component
@@ -49,38 +76,24 @@ class Draft:
     known: set[str] = field(default_factory=set)
     tables: dict[str, ComponentTable] = field(default_factory=dict)
     system: System = field(default_factory=System)
-    network_failed: bool = False
     places: dict[str, str] = field(default_factory=dict)  # place of the last assignment of each ``component.variable``
     origins: dict[str, UnitOrigin] = field(default_factory=dict)
     # least and most reactive power of the units at a bus together [Mvar], by bus.
     reactive_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     # least and most active power of a unit in sharing [MW], by component.
     active_limits: dict[str, tuple[float, float]] = field(default_factory=dict)
-    questions: list[Problem] = field(default_factory=list)
-    not_reached: list[float] = field(default_factory=list)
-    # the parameter files that scenarios name, as the case was loaded with them; text says why one cannot be read.
-    parameter_files: Mapping[str, ParameterFile | str] = field(default_factory=dict)
-    # components whose form the network cannot take, each with its model; what follows from that is not noted.
-    misfits: dict[str, str] = field(default_factory=dict)
-    # components whose device is another than the file's own, which no layer's value reaches.
-    exchanged: frozenset[str] = frozenset()
-    # whether the case is the user's own file; an SSP is one scenario of a case, and may name components of others.
-    whole: bool = True
     dispatch: Dispatch | None = None  # what the units fed before an outage that they share; None without one
-    injections: bool = False  # as in `CaseDefinition`
-    _missed: set[tuple[str, str]] = field(default_factory=set)
 
     def note(self, place: str, text: str, kind: ErrorKind = ErrorKind.VALUES) -> None:
-        """Add a problem, once."""
         problem = Problem(place, text, kind)
-        if problem not in self.problems:
-            self.problems.append(problem)
-            if len(self.problems) > MOST_PROBLEMS:
-                raise CaseError(self.source, [*self.problems[:MOST_PROBLEMS], TOO_MANY])
+        if problem not in self.found.problems:
+            self.found.problems.append(problem)
+            if len(self.found.problems) > MOST_PROBLEMS:
+                raise CaseError(self.given.source, [*self.found.problems[:MOST_PROBLEMS], TOO_MANY])
 
     def note_network(self, place: str, text: str) -> None:
         """Add a problem that leaves no network. Problems that follow from the missing network are then not noted."""
-        self.network_failed = True
+        self.found.network_failed = True
         self.note(place, text)
 
     def is_repeated(self, name: str, variable: str) -> bool:
@@ -89,26 +102,25 @@ class Draft:
         if origin is None:
             return False
         missed = (origin.common, variable)
-        repeated = missed in self._missed
-        self._missed.add(missed)
+        repeated = missed in self.found.missed
+        self.found.missed.add(missed)
         return repeated
 
     def place_of_component(self, name: str) -> str:
-        """Place of a component: its table, or the row of its unit."""
         origin = self.origins.get(name)
-        return self.place("components", name) if origin is None else origin.row
+        return self.given.place("components", name) if origin is None else origin.row
 
     def place_of_value(self, name: str, group: str, path: Sequence[str]) -> str:
         """Place of a value of a component's table: the table, or the row and the table of its unit."""
         origin = self.origins.get(name)
         if origin is None or group != "parameters":
-            return self.place("components", name, group, *path)
-        common = getattr(self.case.units, origin.common)
+            return self.given.place("components", name, group, *path)
+        common = getattr(self.given.case.units, origin.common)
         if ".".join(path) not in origin.own and path[0] in common:
-            return self.place("units", origin.common, *path)
+            return self.given.place("units", origin.common, *path)
         line = origin.lines.get(".".join(path))
         return f"{origin.row}{'' if line is None else f', line {line}'}, {name}.{'.'.join(path)}"
 
     @property
     def grid(self) -> str | None:
-        return self.case.power_flow.grid if self.case.power_flow else None
+        return self.given.case.power_flow.grid if self.given.case.power_flow else None

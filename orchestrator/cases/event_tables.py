@@ -6,7 +6,7 @@ from typing import Any
 
 from fmus.grid.names import lines_among
 from orchestrator.cases.assignment import convert_value
-from orchestrator.cases.draft import Draft
+from orchestrator.cases.draft import Draft, Findings
 from orchestrator.cases.fault_tables import component_events, note_conflicts, wire_events
 from orchestrator.cases.islands import question_islands
 from orchestrator.cases.names import close_names
@@ -58,27 +58,31 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
     """The events of the scenario, or of the case if the scenario has no events, up to the stop time [s]. Problems are
     noted.
     """
-    own = draft.scenario.events is not None
-    tables = draft.scenario.events if draft.scenario.events is not None else draft.case.events
+    own = draft.given.scenario.events is not None
+    tables = draft.given.scenario.events if draft.given.scenario.events is not None else draft.given.case.events
     if clock is None:
         return ()
     fed = {c.target: c.source for c in draft.system.connections}
     events: list[tuple[Event, str]] = []
     for index, table in enumerate(tables):
-        where = draft.place("scenarios", draft.name, "events", index) if own else draft.place("events", index)
+        where = (
+            draft.given.place("scenarios", draft.given.name, "events", index)
+            if own
+            else draft.given.place("events", index)
+        )
         where = table.place if isinstance(table, ForcingTable) and table.place else where
         if not _is_point(draft, clock, table.time, "the event", where):
             continue
         if table.time >= stop:
             _note_late(draft, table.time, stop, where)
-            draft.not_reached.append(table.time)
+            draft.found.not_reached.append(table.time)
         else:
-            draft.questions += [Problem(where, text) for text in _endless(table, stop)]
+            draft.found.questions += [Problem(where, text) for text in _endless(table, stop)]
         for event in _all_events_of(draft, table, clock, stop, where):
             checked = event if isinstance(event, Fault) else _checked(draft, event, fed, where)
             if checked is not None and _is_point(draft, clock, event.time, "the event", where):
                 events.append((checked, where))
-    where = "--stop" if stop != draft.case.solver.stop_time else draft.place("solver", "stop_time")
+    where = "--stop" if stop != draft.given.case.solver.stop_time else draft.given.place("solver", "stop_time")
     _is_point(draft, clock, stop, "the stop", where)
     question_islands(draft, [(event, where) for event, where in events if event.time < stop])
     return tuple(event for event in note_conflicts(draft, events, clock) if event.time < stop)
@@ -88,16 +92,18 @@ def other_scenarios(draft: Draft, wanted: Collection[str]) -> Iterator[Problem]:
     """What is wrong with events of scenarios that are not asked for: a time after the run, an element that the network
     of this one lacks. Their units may be others.
     """
-    for name in (name for name in draft.case.scenarios if name not in wanted):
-        other = replace(draft, name=name, problems=[], questions=[])
-        for index, table in enumerate(draft.case.scenarios[name].events or ()):
-            where = draft.place("scenarios", name, "events", index)
-            if table.time >= draft.case.solver.stop_time:
-                _note_late(other, table.time, draft.case.solver.stop_time, where)
+    for name in (name for name in draft.given.case.scenarios if name not in wanted):
+        other = replace(draft, given=replace(draft.given, name=name), found=Findings())
+        for index, table in enumerate(draft.given.case.scenarios[name].events or ()):
+            where = draft.given.place("scenarios", name, "events", index)
+            if table.time >= draft.given.case.solver.stop_time:
+                _note_late(other, table.time, draft.given.case.solver.stop_time, where)
             if isinstance(table, GridEventBase) and not isinstance(table, UnitTripTable | UnitReconnectionTable):
                 for event in _events_of(other, table, where):
                     _checked(other, event, {}, where)
-        yield from (Problem(p.place, f"scenario {name!r}, which was not asked for: {p.text}") for p in other.problems)
+        yield from (
+            Problem(p.place, f"scenario {name!r}, which was not asked for: {p.text}") for p in other.found.problems
+        )
 
 
 def _is_point(draft: Draft, clock: Clock, time: float, what: str, where: str) -> bool:
@@ -113,10 +119,10 @@ def _is_point(draft: Draft, clock: Clock, time: float, what: str, where: str) ->
 def _note_late(draft: Draft, time: float, stop: float, where: str) -> None:
     """An event that no run reaches: the file's mistake, or worth a word where the stop was chosen for one run."""
     text = f"the event at {time:g} s never happens, as the run stops at {stop:g} s"
-    if stop == draft.case.solver.stop_time:
+    if stop == draft.given.case.solver.stop_time:
         draft.note(where, f"{text}; give it an earlier time, or the run a later solver.stop_time")
     else:
-        draft.questions.append(Problem(where, f"{text} (--stop)"))
+        draft.found.questions.append(Problem(where, f"{text} (--stop)"))
 
 
 def _endless(table: EventTable, stop: float) -> Iterator[str]:
@@ -147,7 +153,7 @@ def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event
     """What a table stands for; its values are still as the file has them. Nothing for a component that is removed."""
     if isinstance(table, ReferenceChangeTable | ParameterChangeTable):
         component = table.component
-    elif table.component is None and draft.network_failed:
+    elif table.component is None and draft.found.network_failed:
         return []
     elif table.component is None and draft.grid is None:
         draft.note(where, "the key 'component' is missing; name the grid here, or in a [power_flow] table")
@@ -155,7 +161,7 @@ def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event
     else:
         component = table.component or draft.grid or ""
     concerned = {component, table.unit if isinstance(table, UnitTripTable | UnitReconnectionTable) else component}
-    if concerned & set(draft.scenario.remove):
+    if concerned & set(draft.given.scenario.remove):
         return []
     if isinstance(table, UnitTripTable | UnitReconnectionTable):
         return _unit_switching(draft, table, component)
@@ -163,10 +169,9 @@ def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event
 
 
 def forcing_events(draft: Draft, table: ForcingTable, clock: Clock, stop: float, where: str) -> list[Event]:
-    """A forcing of the table's reference, checked."""
     plan = draft.system.components.get(table.component)
     if plan is None:
-        if table.component not in draft.scenario.remove:
+        if table.component not in draft.given.scenario.remove:
             known = close_names(
                 table.component, list(draft.system.components), f"the case has: {', '.join(draft.tables)}"
             )
@@ -249,11 +254,11 @@ def _fault(table: BusFaultTable, grid: str) -> list[Event]:
 
 def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where: str) -> Event | None:
     """The event with its values in the variables' units; None if something is wrong with it."""
-    before = len(draft.problems)
+    before = len(draft.found.problems)
     for component, settings in event.changes().items():
         plan = draft.system.components.get(component)
         if plan is None:
-            if component not in draft.tables and not (draft.network_failed and component == draft.grid):
+            if component not in draft.tables and not (draft.found.network_failed and component == draft.grid):
                 names = ", ".join(draft.tables)
                 draft.note(where, f"there is no component {component!r}; the case has: {names}")
             return None
@@ -278,7 +283,7 @@ def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where
                 converted = convert_value(draft, info, value, where)
                 if isinstance(event, ParameterChange) and converted is not None:
                     event = replace(event, value=converted)
-    return event if len(draft.problems) == before else None
+    return event if len(draft.found.problems) == before else None
 
 
 def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -> str:

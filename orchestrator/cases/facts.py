@@ -27,7 +27,6 @@ class Facts:
     voltages_pu: tuple[float, float]  # least and largest magnitude
 
     def sentence(self) -> str:
-        """The line that answers begin with."""
         units = [_counted(n, what) for n, what in ((self.machines, "machine"), (self.converters, "converter")) if n]
         slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
         parts = [
@@ -55,7 +54,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     wanted = table.power_flow.slack or prepared.source_slack or ""
     feeding = [name for name in units if flow.powers.get(name)]
     at_slack = [name for name in feeding if units[name] == units.get(wanted, wanted)]
-    machines = [n for n in feeding if any(v.startswith("machine.") for v in plans[n].description.variables)]
+    machines = [n for n in feeding if plans[n].kind == "machine"]
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
     loads = [(load, _power(load, grid)) for load in network.loads]
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []

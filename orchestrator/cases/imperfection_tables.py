@@ -46,9 +46,9 @@ def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, fl
     ``stop``: end of the run [s]; a delay that lasts beyond it is noted.
     """
     given: dict[str, float | bool] = {}
-    tables = {name: (table, draft.place(KEY, name)) for name, table in draft.case.imperfections.items()}
-    for name, table in draft.scenario.imperfections.items():
-        tables[name] = table, draft.place("scenarios", draft.name, KEY, name)
+    tables = {name: (table, draft.given.place(KEY, name)) for name, table in draft.given.case.imperfections.items()}
+    for name, table in draft.given.scenario.imperfections.items():
+        tables[name] = table, draft.given.place("scenarios", draft.given.name, KEY, name)
     for name, (table, where) in _overridden(draft, tables).items():
         if isinstance(table, DelayTable):
             note_long_delay(draft, table.delay, stop, where)
@@ -75,10 +75,10 @@ def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None
     if delay < stop:
         return
     text = f"delay = {delay:g} s, but the run ends at {stop:g} s: nothing that is sent in it arrives"
-    if stop == draft.case.solver.stop_time:
+    if stop == draft.given.case.solver.stop_time:
         draft.note(where, f"{text}; give a shorter delay, or the run a later solver.stop_time")
     else:
-        draft.questions.append(Problem(where, f"{text} (--stop)"))
+        draft.found.questions.append(Problem(where, f"{text} (--stop)"))
 
 
 def _overridden(
@@ -86,7 +86,7 @@ def _overridden(
 ) -> dict[str, tuple[ImperfectionTable, str]]:
     adapter: TypeAdapter[ImperfectionTable] = TypeAdapter(ImperfectionTable)
     found = dict(tables)
-    for layer in draft.layers:
+    for layer in draft.given.layers:
         for key, value in layer.values.items():
             if not sets_imperfection(key):
                 continue
@@ -189,7 +189,6 @@ def connections_meant(draft: Draft, text: str, where: str) -> list[Connection]:
 
 
 def matching(connections: Sequence[Connection], ends: Sequence[str]) -> Iterator[Connection]:
-    """Connections whose ends fit two patterns."""
     source, target = ends
     for connection in connections:
         if _fits(str(connection.source), source) and _fits(str(connection.target), target):

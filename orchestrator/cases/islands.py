@@ -18,7 +18,7 @@ _SHOWN = 5  # buses that a question names; the others are counted
 def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
     """Ask about every part of the network that an event leaves with loads and without a unit."""
     plan = draft.system.components.get(draft.grid or "")
-    if draft.network is None or draft.network_failed or plan is None or draft.grid is None:
+    if draft.network is None or draft.found.network_failed or plan is None or draft.grid is None:
         return
     values = {name: plan.value(name) for name in plan.description.parameters}
     units = {port.name: port.bus for port in draft.network.ports if port.name in draft.system.components}
@@ -36,7 +36,7 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
             if frozenset(part) not in asked:
                 asked.add(frozenset(part))
                 more = f" and {len(part) - _SHOWN} more" if len(part) > _SHOWN else ""
-                draft.questions.append(
+                draft.found.questions.append(
                     Problem(
                         where,
                         f"from t = {time:g} s on no unit is connected to {', '.join(part[:_SHOWN])}{more}: nothing "

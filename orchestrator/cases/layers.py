@@ -16,7 +16,6 @@ class OptionValues(ParameterFile):
 
     @classmethod
     def of(cls, values: Mapping[str, Value]) -> "OptionValues":
-        """The layer of values by ``component.variable``."""
         return cls(Path(COMMAND_LINE), "", dict(values))
 
     def place(self, key: str) -> str:
@@ -27,19 +26,19 @@ def value_layers(draft: Draft, parameters: Sequence[ParameterFile], overrides: M
     """All layers, weakest first: files of the scenario, the scenario, files of the command line, values of the command
     line.
     """
-    has_units = draft.case.units is not None
+    has_units = draft.given.case.units is not None
     layers: list[Layer] = []
 
     def add(given: Mapping[str, Value], place: Place) -> None:
         layers.append(layer_of(given, place, has_units=has_units))
 
-    for index, name in enumerate(draft.scenario.parameters):
-        file = draft.parameter_files[name]
+    for index, name in enumerate(draft.given.scenario.parameters):
+        file = draft.given.parameter_files[name]
         if isinstance(file, str):
-            draft.note(draft.place("scenarios", draft.name, "parameters", index), file)
+            draft.note(draft.given.place("scenarios", draft.given.name, "parameters", index), file)
         else:
             add(file.values, file.place)
-    add(draft.scenario.set, lambda key: draft.place("scenarios", draft.name, "set", key))
+    add(draft.given.scenario.set, lambda key: draft.given.place("scenarios", draft.given.name, "set", key))
     for file in parameters:
         add(file.values, file.place)
     add(overrides, lambda key: f"{COMMAND_LINE} {key}")

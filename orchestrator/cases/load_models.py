@@ -31,7 +31,6 @@ def as_powers(table: NetworkTable) -> NetworkTable:
 
 
 def open_question(table: NetworkTable | None, loads: Sequence[Load], place: str) -> list[Problem]:
-    """The question about the load model, where it is open and a load draws power."""
     return [Problem(place, _OPEN)] if is_open(table) and any(x.p_mw > 0 for x in loads) else []
 
 

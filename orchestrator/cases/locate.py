@@ -48,7 +48,6 @@ def _unquoted(text: str) -> str:
 
 
 def place_in(text: str, path: Sequence[str | int]) -> str:
-    """A key path as text, with its line in the file."""
     label = ".".join(_quoted(str(part)) for part in path)
     line = line_of(text, path)
     return f"line {line}, {label}" if line and label else label

@@ -26,7 +26,6 @@ class Named:
     homes: set[str] = field(default_factory=set)  # names that an area may contain: components and buses
 
     def add(self, draft: Draft) -> None:
-        """Add the names of one assembled scenario."""
         for name, plan in draft.system.components.items():
             fmu = plan.description
             self.components.add(name)
@@ -40,7 +39,6 @@ class Named:
 
 
 def unmatched(case: CaseTable, named: Named, place: Locate) -> list[Problem]:
-    """Every entry without a match, with its place."""
     return [
         *_states(case, named, place),
         *_areas(case, named, place),
@@ -81,7 +79,7 @@ def _areas(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
 def _records(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
     for pattern in case.solver.record:
         if pattern != "*" and not fnmatch.filter(named.outputs, pattern) and not _of_foreign(named, pattern):
-            hint = close_names(pattern, sorted(named.outputs), "`gfor info` lists the outputs of an FMU")
+            hint = close_names(pattern, sorted(named.outputs), "`gfor fmu info` lists the outputs of an FMU")
             yield Problem(place("solver", "record"), f"{pattern!r}: no scenario has such an output to record; {hint}")
 
 
@@ -107,5 +105,5 @@ def _signal(where: str, expression: str, named: Named) -> Iterator[Problem]:
         component = name.partition(".")[0]
         if name not in named.outputs and component not in named.foreign:
             own = sorted(output for output in named.outputs if output.startswith(f"{component}."))
-            hint = close_names(name, own or sorted(named.outputs), "`gfor info` lists the outputs of an FMU")
+            hint = close_names(name, own or sorted(named.outputs), "`gfor fmu info` lists the outputs of an FMU")
             yield Problem(where, f"no scenario has an output {name!r}; {hint}")

@@ -57,7 +57,6 @@ def _parts(name: str) -> list[str]:
 
 
 def variables_of(expression: str) -> list[str]:
-    """Names of the variables in a signal's expression."""
     names = [part.strip() for part in expression.split(" - ")]
     if not 1 <= len(names) <= 2 or not all(names):
         raise InputError(

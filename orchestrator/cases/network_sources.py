@@ -27,7 +27,6 @@ _COLUMNS = {"bus": 9, "branch": 11, "gen": 10}
 
 
 def read_matpower(path: Path) -> SourceTables:
-    """Read a MATPOWER case, ``.m`` or ``.mat``."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; give the path of a MATPOWER case (.m or .mat)")
     if path.suffix not in (".m", ".mat"):
@@ -57,7 +56,6 @@ def read_matpower(path: Path) -> SourceTables:
 
 
 def read_pandapower(name: str, directory: Path) -> SourceTables:
-    """Take a network of ``pandapower.networks`` by name, or one saved with ``pandapower.to_json``."""
     path = seen_from_here(directory / name)
     changed = path.stat().st_mtime_ns if name.endswith(".json") and path.is_file() else 0
     return _solved_pandapower(name, path, changed)

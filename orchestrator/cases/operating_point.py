@@ -17,27 +17,27 @@ _SHOWN = 5  # buses that a question names; the others are counted
 
 def power_flow_of(draft: Draft) -> PowerFlow | None:
     """The power flow with the values that are set; None without a network, or with a problem, which is noted."""
-    table = draft.case.power_flow
+    table = draft.given.case.power_flow
     if table is None or draft.network is None:
         return None
     units = {p.name: p.bus for p in draft.network.ports if p.name in draft.system.components}
     wanted = table.slack or (draft.data.slack if draft.data else None)
     if wanted is None:
-        raw = draft.case.network.raw if draft.case.network else None
+        raw = draft.given.case.network.raw if draft.given.case.network else None
         none = f"no bus of {raw} is the reference (IDE = 3), and " if raw is not None else ""
         text = f"{none}the key 'slack' is missing; name a unit or a bus with one that feeds what is left"
-        draft.note(draft.place("power_flow"), f'{text}, such as slack = "{next(iter(units.values()), "bus_1")}"')
+        draft.note(draft.given.place("power_flow"), f'{text}, such as slack = "{next(iter(units.values()), "bus_1")}"')
         return None
     slack = units.get(wanted, wanted)
     if slack not in units.values():
         known = close_names(wanted, dict.fromkeys(units.values()), f"units: {', '.join(units)}")
         draft.note(
-            draft.place("power_flow", "slack"),
+            draft.given.place("power_flow", "slack"),
             f"{wanted!r} is neither a unit of this scenario nor a bus with one; {known}",
         )
         return None
     note_contradictions(draft, units)
-    if draft.problems:
+    if draft.found.problems:
         return None
     if draft.dispatch is not None:
         slack = _reference(draft, units, slack, table.grid)
@@ -50,16 +50,16 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         )  # fmt: skip
     except InputError as error:
         kind = ErrorKind.VALUES if error.kind is ErrorKind.INPUT else error.kind
-        draft.note(draft.place("power_flow"), f"scenario {draft.name!r}: {error}", kind)
+        draft.note(draft.given.place("power_flow"), f"scenario {draft.given.name!r}: {error}", kind)
         return None
     question(draft, undecided)
-    draft.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
+    draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
     return flow
 
 
 def _returning(draft: Draft) -> set[str]:
     """Units that an event of the scenario connects."""
-    events = draft.case.events if draft.scenario.events is None else draft.scenario.events
+    events = draft.given.case.events if draft.given.scenario.events is None else draft.given.scenario.events
     return {event.unit for event in events if isinstance(event, UnitReconnectionTable)}
 
 
@@ -88,7 +88,7 @@ def _voltage_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
         return []
     return [
         Problem(
-            draft.place("power_flow"),
+            draft.given.place("power_flow"),
             f"the power flow gives voltages outside of {low:g} to {high:g} pu: {_first_few(unusual)}; check loads, "
             "shunts and stray_B there",
         )
@@ -102,8 +102,8 @@ def _reactive_limits(draft: Draft) -> dict[str, tuple[float, float]]:
 
 
 def _limit_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
-    kept = draft.case.power_flow.reactive_limits if draft.case.power_flow else None
-    where = draft.place("power_flow", *(["reactive_limits"] if kept is not None else []))
+    kept = draft.given.case.power_flow.reactive_limits if draft.given.case.power_flow else None
+    where = draft.given.place("power_flow", *(["reactive_limits"] if kept is not None else []))
     found = []
     if flow.at_limits:
         told = _first_few([excess.text(kept=True) for excess in flow.at_limits])

@@ -64,7 +64,6 @@ def read_parameter_file(path: Path) -> ParameterFile:
 
 
 def parameter_file_text(values: Mapping[str, Value], comments: Sequence[str]) -> str:
-    """The text of a parameter file, its origin in comments at the top."""
     lines = [f"# {line}".rstrip() for comment in comments for line in comment.splitlines()]
     lines += ["", f"[{_TABLE}]", *(f'"{key}" = {_toml(value)}' for key, value in values.items()), ""]
     return "\n".join(lines)

@@ -13,7 +13,7 @@ from orchestrator.cases.data_rules import RESISTANCES, RULES, Rule
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
 from orchestrator.cases.plausible_networks import network_doubts
-from orchestrator.cases.plausible_ranges import RANGES, SMALLEST_SHARE
+from orchestrator.cases.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of, unit_of, value_of
 from orchestrator.coupling.system import ComponentPlan
@@ -21,6 +21,9 @@ from orchestrator.errors import Problem
 from orchestrator.fmi.port import BoundDescription
 
 _FULL = 1.05  # apparent power [pu of the rating] above which a converter's operating point is questioned
+_OF_PARTS = ("machine", "exciter", "governor", "pss")
+"""Begins of a generator's variables; another scenario may choose a part that has one which this one's has not."""
+
 _SHOWN = 3  # largest number of components that a question names; the others are counted
 
 
@@ -36,31 +39,31 @@ def check_plausibility(draft: Draft) -> None:
 
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     """Add questions to the draft's, without those that the case answers; equal ones become one."""
-    draft.questions += _merged([d for d in doubts if not _is_meant(draft, d.name)])
+    draft.found.questions += _merged([d for d in doubts if not _is_meant(draft, d.name)])
 
 
 def _check_meant(draft: Draft) -> None:
     """Check the entries of ``meant``. A component may exist in another scenario, where its variable is checked."""
-    for pattern in draft.case.meant:
+    for pattern in draft.given.case.meant:
         component, _, variable = pattern.partition(".")
-        if draft.whole and not fnmatch.filter(draft.known, component):
+        if draft.given.whole and not fnmatch.filter(draft.known, component):
             hint = close_names(component, sorted(draft.known), "name it as [components] does")
-            draft.note(draft.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
+            draft.note(draft.given.place("meant"), f"{pattern!r}: there is no component {component!r}; {hint}")
         plans = [p for name, p in draft.system.components.items() if fnmatch.fnmatchcase(name, component)]
-        others = (*RANGES, *PARTS, SOLVED)  # of a part that another scenario has, or of no variable
-        elsewhere = any(fnmatch.fnmatchcase(known, variable) for known in others)
+        elsewhere = variable in (*PARTS, SOLVED) or variable.partition(".")[0] in _OF_PARTS
         here = (v for p in plans for v in p.description.variables)
         if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
             draft.note(
-                draft.place("meant"), f"{pattern!r}: {component} has no variable {variable!r}; `gfor info` lists them"
+                draft.given.place("meant"),
+                f"{pattern!r}: {component} has no variable {variable!r}; `gfor fmu info` lists them",
             )
 
 
 def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         for variable in plan.description.parameters:
-            wanted, value = RANGES.get(variable), value_of(plan, variable)
-            if wanted is not None and value is not None and unit_of(plan, variable) == wanted.unit:
+            wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
+            if wanted is not None and value is not None:
                 yield from outside(draft, name, variable, value, wanted, scale=_to_rating(plan, variable))
         for resistance, reactance in RESISTANCES:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
@@ -81,22 +84,27 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
             continue
         for rated, said in found.unlike_delivered().items():
             text = f"the binding has {said}: is the binding's rating that of one unit as delivered?"
-            yield UnusualValue(f"{name}.{rated}", draft.place("components", name, "binding"), text)
+            yield UnusualValue(f"{name}.{rated}", draft.given.place("components", name, "binding"), text)
 
 
 def question_loading(draft: Draft) -> None:
     """Ask about converters whose operating point exceeds their rating. The operating point is the power flow's if there
     is one.
     """
-    asked = {question.place for question in draft.questions}  # one question about a rating is enough
+    asked = {question.place for question in draft.found.questions}  # one question about a rating is enough
     question(draft, (d for d in _overloaded(draft) if d.place not in asked))
 
 
 def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
-        machine = any(variable.startswith("machine.") for variable in plan.description.variables)
-        if machine or P is None or Q is None or S_n is None or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0")):
+        if (
+            plan.kind == "machine"
+            or P is None
+            or Q is None
+            or S_n is None
+            or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0"))
+        ):
             continue
         apparent = math.hypot(P, Q)
         if apparent > _FULL:
@@ -111,7 +119,7 @@ def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
 
 
 def _to_rating(plan: ComponentPlan, variable: str) -> float:
-    """What carries a machine's value from the base of its data, ``machine.S_data``, to the rating; otherwise 1."""
+    """The factor from the base of a machine's data, ``machine.S_data``, to its rating; otherwise 1."""
     S_data, S_n = value_of(plan, "machine.S_data"), value_of(plan, "S_n")
     if not S_data or not S_n:
         return 1.0
@@ -145,7 +153,7 @@ def _check_frequencies(draft: Draft) -> None:
         common = known[grid] if grid else max(set(known.values()), key=list(known.values()).count)
         reference = grid or next(name for name, f in known.items() if f == common)
         for name, f in known.items():
-            if f != common and not any(p.place == _frequency_place(draft, name) for p in draft.problems):
+            if f != common and not any(p.place == _frequency_place(draft, name) for p in draft.found.problems):
                 draft.note(
                     _frequency_place(draft, name),
                     f"{name} is rated at {f:g} Hz and {reference} at {common:g} Hz; what is coupled has one rated "
@@ -161,7 +169,7 @@ def _frequency(plan: ComponentPlan) -> float | None:
 
 def _frequency_place(draft: Draft, name: str) -> str:
     if isinstance(draft.system.components[name].description, BoundDescription):
-        return draft.place("components", name, "binding")
+        return draft.given.place("components", name, "binding")
     return place_of(draft, name, "f_n")
 
 
@@ -195,7 +203,7 @@ def _small_units(draft: Draft) -> Iterator[UnusualValue]:
 
 
 def _is_meant(draft: Draft, name: str) -> bool:
-    return any(fnmatch.fnmatchcase(name, pattern) for pattern in draft.case.meant)
+    return any(fnmatch.fnmatchcase(name, pattern) for pattern in draft.given.case.meant)
 
 
 def _merged(doubts: list[UnusualValue]) -> list[Problem]:

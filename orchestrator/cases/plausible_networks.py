@@ -24,7 +24,7 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
     for transformer in draft.network.transformers:
         yield from _transformer(draft, draft.grid, grid, transformer)
     if (stray := value_of(grid, "stray_B")) is not None:
-        yield from outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.place("network", "stray_B"))
+        yield from outside(draft, draft.grid, "stray_B", stray, STRAY_B, draft.given.place("network", "stray_B"))
 
 
 def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualValue]:
@@ -38,7 +38,7 @@ def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualV
                 f"{len(found)} of {len(network.lines)} branches have a negative {what}: {shown}{more}; as equivalents "
                 "of a reduced network they are taken as admittances, which hold at rated frequency alone"
             )
-            yield UnusualValue(f"{name}.{found[0].variable(quantity)}", draft.place("network"), text)
+            yield UnusualValue(f"{name}.{found[0].variable(quantity)}", draft.given.place("network"), text)
 
 
 def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[UnusualValue]:
@@ -99,14 +99,16 @@ def _swapped(component: str, resistance: str, reactance: str, R: float, X: float
 
 
 def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> str:
-    """Place where a value of an element was set, or otherwise the place of the element."""
-    table = draft.case.network
+    table = draft.given.case.network
     for variable in variables:
         if set_at := draft.places.get(f"{draft.grid}.{variable}"):
             return set_at
     if table is not None and element in getattr(table, kind):
-        return draft.place("network", kind, element, key)
+        return draft.given.place("network", kind, element, key)
     in_file = draft.data.places.get(element) if draft.data else None
     source = next((key for key in ("pandapower", "matpower", "raw") if table is not None and getattr(table, key)), None)
     what = "line" if kind == "lines" else "transformer"
-    return in_file or f"{draft.place('network', source) if source else draft.place('network')}, {what} {element!r}"
+    return (
+        in_file
+        or f"{draft.given.place('network', source) if source else draft.given.place('network')}, {what} {element!r}"
+    )

@@ -15,7 +15,13 @@ _FAR = 20.0
 def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
     """Ask about loads below zero, capacitors, step-up transformers, saturation and a flat start."""
     grid = draft.system.components.get(draft.grid or "")
-    if grid is None or draft.network is None or draft.data is None or draft.grid is None or draft.case.network is None:
+    if (
+        grid is None
+        or draft.network is None
+        or draft.data is None
+        or draft.grid is None
+        or draft.given.case.network is None
+    ):
         return
     where = _place(draft)
     if not draft.data.solved:
@@ -31,13 +37,13 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
 
 
 def _place(draft: Draft) -> str:
-    table = draft.case.network
+    table = draft.given.case.network
     source = next((k for k in ("raw", "matpower", "pandapower", "cgmes") if table and getattr(table, k)), None)
-    return draft.place("network", source) if source else draft.place("network")
+    return draft.given.place("network", source) if source else draft.given.place("network")
 
 
 def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValue]:
-    table, found = draft.case.network, draft.data
+    table, found = draft.given.case.network, draft.data
     if table is None or found is None or table.generation_model.active is not None:
         return
     for bus, p_mw in found.feeding.items():
@@ -58,7 +64,7 @@ def _capacitors(grid: str, found: Mapping[str, float], where: str) -> Iterator[U
 
 def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterator[UnusualValue]:
     """A bus with machines and one branch without charging in a file: the branch is their step-up transformer."""
-    written = draft.case.network.lines if draft.case.network else {}
+    written = draft.given.case.network.lines if draft.given.case.network else {}
     if draft.network is None:
         return
     ratings: dict[str, float] = {}
@@ -102,5 +108,5 @@ def _saturation(draft: Draft) -> Iterator[UnusualValue]:
         f"the saturation is 0, where {len(known) - len(without)} of {len(known)} machines saturate; give S(1.0) and "
         "S(1.2)"
     )
-    where = draft.place("units")
+    where = draft.given.place("units")
     yield from (UnusualValue(f"{name}.machine.s_10", where, text) for name in without)

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fmus.toolchain.variables import Usual
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.plausible_ranges import Plausible
 from orchestrator.coupling.system import ComponentPlan
 
 _FAR = 3
@@ -23,7 +23,9 @@ class UnusualValue:
 def place_of(draft: Draft, name: str, *variables: str) -> str:
     """Place of the first of some variables of a component that was set, or otherwise the place of the component."""
     found = (draft.places.get(f"{name}.{variable}") for variable in variables)
-    return next((place for place in found if place), f"{draft.place('components', name)}, {variables[0]} (its default)")
+    return next(
+        (place for place in found if place), f"{draft.given.place('components', name)}, {variables[0]} (its default)"
+    )
 
 
 def value_of(plan: ComponentPlan, variable: str) -> float | None:
@@ -33,7 +35,6 @@ def value_of(plan: ComponentPlan, variable: str) -> float | None:
 
 
 def unit_of(plan: ComponentPlan, variable: str) -> str:
-    """The unit that the FMU declares."""
     return plan.description.variables[variable].unit
 
 
@@ -42,17 +43,17 @@ def outside(
     component: str,
     variable: str,
     value: float,
-    wanted: Plausible,
+    wanted: Usual,
     where: str | None = None,
     scale: float = 1.0,
 ) -> Iterator[UnusualValue]:
-    """Ask about a value that is not in its usual range."""
     given, value = value, value * scale
     if wanted.fits(value):
         return
-    unit = f" {wanted.unit}" if wanted.unit != "1" else ""
+    declared = unit_of(draft.system.components[component], variable)
+    unit = f" {declared}" if declared != "1" else ""
     slip = f"; is it {wanted.slip}?" if wanted.slip else ""
-    ratio = wanted.unit in ("pu", "1")
+    ratio = declared in ("pu", "1")
     for meant, text, far, cause in (
         (value / 100, f"{value / wanted.high:.3g} times too large", ratio and value > wanted.high, "in percent"),
         (1 / value if value else 0, "", ratio and 0 < value < wanted.low / _FAR, "the inverse"),

@@ -13,7 +13,7 @@ from orchestrator.cases.case_network import check_network_is_used, find_network,
 from orchestrator.cases.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.contradictions import doubts
 from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.draft import Draft
+from orchestrator.cases.draft import Draft, DraftInput
 from orchestrator.cases.event_tables import scenario_events
 from orchestrator.cases.idle_values import Idle, idle_values
 from orchestrator.cases.imperfection_tables import disturb_connections
@@ -42,8 +42,6 @@ from orchestrator.fmi.instance import is_ours
 
 @dataclass(frozen=True)
 class PreparedScenario:
-    """A scenario that is ready to run."""
-
     case: CaseDefinition
     name: str
     title: str
@@ -105,28 +103,31 @@ class Preparer:
         scenario = case.scenarios[name]
         self._case = case
         self._planned: dict[str, PlannedFmu] = {}
-        self.draft = draft = Draft(str(case.path), case.table, name, scenario, case.directory, case.place)
-        draft.parameter_files, draft.whole = case.parameter_files, case.numbered
-        draft.layers = value_layers(draft, parameters, overrides)
-        draft.injections = case.injections
-        draft.from_outside = frozenset(overrides).union(*(file.values for file in parameters)) - {MODELS}
+        outside = frozenset(overrides).union(*(file.values for file in parameters)) - {MODELS}
+        given = DraftInput(
+            str(case.path), case.table, name, scenario, case.directory, case.place, case.parameter_files, case.numbered,
+            case.injections, frozenset(case.exchanged), outside,
+        )  # fmt: skip
+        self.draft = draft = Draft(given)
+        given.layers = value_layers(draft, parameters, overrides)
         read_network(draft)
         self._everything = dict(case.table.components) | unit_components(draft)
         draft.known |= set(self._everything)
         draft.tables = {n: case.exchanged.get(n, t) for n, t in self._everything.items() if n not in scenario.remove}
-        draft.exchanged = frozenset(case.exchanged)
 
     @property
     def problems(self) -> list[Problem]:
-        """The mistakes found so far."""
-        return self.draft.problems
+        return self.draft.found.problems
 
     def assemble(self) -> System:
         """The scenario's components with their values; nothing is connected yet."""
         draft = self.draft
-        for name in draft.scenario.remove:
+        for name in draft.given.scenario.remove:
             if name not in draft.known:
-                draft.note(draft.place("scenarios", draft.name, "remove"), f"there is no component {name!r} to remove")
+                draft.note(
+                    draft.given.place("scenarios", draft.given.name, "remove"),
+                    f"there is no component {name!r} to remove",
+                )
         check_network_is_used(draft, self._everything)
         find_network(draft, self._everything)
         for name, table in draft.tables.items():
@@ -141,44 +142,44 @@ class Preparer:
         connect(draft)
         check_inputs(draft)
         check_plausibility(draft)
-        flow = None if draft.problems else power_flow_of(draft)
+        flow = None if draft.found.problems else power_flow_of(draft)
         question_loading(draft)
         clock = clock_of(draft, step_size)
         told: frozenset[str] = frozenset()
         if clock is not None:
-            second_order = draft.case.solver.schedule in SECOND_ORDER
+            second_order = draft.given.case.solver.schedule in SECOND_ORDER
             told = tell_step(draft.system, 0.0 if second_order else clock.step_size)
-        stop = stop_time if stop_time is not None else draft.case.solver.stop_time
+        stop = stop_time if stop_time is not None else draft.given.case.solver.stop_time
         check_length(draft, clock, stop)
         imperfections = disturb_connections(draft, clock, stop) if clock is not None else {}
         events = scenario_events(draft, clock, stop)
         schedule = checked_schedule(draft)
         references = references_of(draft, imperfections)
-        if draft.problems or clock is None:
+        if draft.found.problems or clock is None:
             return None
         self._build()
         every, about_rows = record_every(draft, clock, stop)
         record, left_out = recorded(draft)
         loads = draft.network.loads if draft.network else ()
-        draft.questions += open_question(draft.case.network, loads, draft.place("network"))
-        draft.questions += [*doubts(draft.case, draft.place), *self._area_questions()]
+        draft.found.questions += open_question(draft.given.case.network, loads, draft.given.place("network"))
+        draft.found.questions += [*doubts(draft.given.case, draft.given.place), *self._area_questions()]
         return PreparedScenario(
             case=self._case,
-            name=draft.name,
-            title=draft.scenario.title or draft.name,
+            name=draft.given.name,
+            title=draft.given.scenario.title or draft.given.name,
             system=draft.system,
             schedule=schedule,
             step_size=clock.step_size,
             stop_time=stop,
             record=record,
             record_every=every,
-            record_filtered=draft.case.solver.record_filter == "low-pass",
+            record_filtered=draft.given.case.solver.record_filter == "low-pass",
             events=events,
-            not_reached=tuple(sorted(draft.not_reached)),
+            not_reached=tuple(sorted(draft.found.not_reached)),
             power_flow=flow,
             values={f"{n}.{v}": x for n, p in draft.system.components.items() for v, x in p.parameters.items()}
             | imperfections,
-            questions=tuple(draft.questions),
+            questions=tuple(draft.found.questions),
             about_rows=(*about_rows, *left_out),
             references=references,
             places={name: draft.place_of_component(name) for name in draft.system.components},
@@ -186,13 +187,13 @@ class Preparer:
             told=told,
             network=draft.network,
             source_slack=draft.data.slack if draft.data else None,
-            idle=idle_values(draft.system, draft.from_outside, draft.places, events),
-            given={key: value for layer in draft.layers for key, value in layer.given.items()},
+            idle=idle_values(draft.system, draft.given.from_outside, draft.places, events),
+            given={key: value for layer in draft.given.layers for key, value in layer.given.items()},
         )
 
     def _add_component(self, name: str, table: ComponentTable) -> None:
-        where = self.draft.place("components", name)
-        if takes_network(table) and self.draft.network_failed:
+        where = self.draft.given.place("components", name)
+        if takes_network(table) and self.draft.found.network_failed:
             return
         if sum(given is not None for given in (table.model, table.fmu, table.dll)) != 1:
             self.draft.note(
@@ -219,14 +220,14 @@ class Preparer:
         text = f"there is no model {model!r}; {hint}" if hint and model not in model_names() else text
         origin = self.draft.origins.get(name)
         if origin is None:
-            self.draft.note(self.draft.place("components", name, "model"), text)
+            self.draft.note(self.draft.given.place("components", name, "model"), text)
         else:
-            self.draft.note_network(self.draft.place("units", origin.common.removesuffix("_parameters")), text)
+            self.draft.note_network(self.draft.given.place("units", origin.common.removesuffix("_parameters")), text)
 
     def _is_native(self, name: str, table: ComponentTable) -> bool:
         """The kind of FMU that a component of the catalogue gets; the strongest layer decides."""
         native = table.native
-        for choice in (choice for layer in self.draft.layers for choice in layer.natives if choice.fits(name)):
+        for choice in (choice for layer in self.draft.given.layers for choice in layer.natives if choice.fits(name)):
             try:
                 native = choice.native
             except ValueError as error:
@@ -237,19 +238,19 @@ class Preparer:
         """A file may come from anybody; only the user lets foreign code into this process."""
         if table.file is None or table.isolated is not False or self._case.trust_fmus:
             return
-        if not is_ours(self.draft.directory / table.file):
+        if not is_ours(self.draft.given.directory / table.file):
             self.draft.note(
-                self.draft.place("components", name, "isolated"),
+                self.draft.given.place("components", name, "isolated"),
                 f"this file wants {table.file} to run in gfor's own process, where it can do whatever you can; if you "
                 "trust the FMU, say so by --trust-fmus (in Python load(case, trust_fmus=True)), else remove "
                 "'isolated = false', and it runs in a process that is closed off",
             )
 
     def _parts(self, name: str, table: ComponentTable) -> tuple[tuple[str, str], ...]:
-        """What a component of the catalogue is made of; the strongest layer decides on each part."""
+        """The parts of a component of the catalogue; the strongest layer decides on each."""
         known = parts_of(table.model) if table.model in model_names() and not takes_network(table) else {}
         chosen = {part: found for part in PARTS if (found := getattr(table, part)) is not None}
-        choices = [choice for layer in self.draft.layers for choice in layer.parts]
+        choices = [choice for layer in self.draft.given.layers for choice in layer.parts]
         for choice in (c for c in choices if c.fits(name, has_part=c.part in known)):
             try:
                 chosen[choice.part] = choice.name
@@ -274,7 +275,7 @@ class Preparer:
         self, name: str, table: ComponentTable, native: bool, parts: tuple[tuple[str, str], ...]
     ) -> FmuDescription:
         if table.file is not None:
-            directory = self.draft.directory
+            directory = self.draft.given.directory
             return bound_fmu(directory / table.file, directory / table.binding if table.binding else None)
         own = takes_network(table)
         if not own and self.draft.network is not None and table is self.draft.tables.get(self.draft.grid or ""):
@@ -289,10 +290,10 @@ class Preparer:
         return planned.description
 
     def _area_questions(self) -> list[Problem]:
-        areas = self.draft.case.analysis.areas
+        areas = self.draft.given.case.analysis.areas
         return [
             Problem(
-                self.draft.place("analysis", "areas", found[1]),
+                self.draft.given.place("analysis", "areas", found[1]),
                 f"{name} is in {' and '.join(found)}; it counts to {found[0]}, the first",
             )
             for name, found in in_two_areas(areas, self.draft.system).items()

@@ -19,11 +19,11 @@ def record_every(draft: Draft, clock: Clock, stop_time: float) -> tuple[int, tup
 
     ``stop_time``: Of the run [s].
     """
-    solver = draft.case.solver
+    solver = draft.given.case.solver
     steps = solver.record_interval / clock.step_size
     every = max(1, round(steps))
     if "record_interval" in solver.model_fields_set:
-        place = draft.place("solver", "record_interval")
+        place = draft.given.place("solver", "record_interval")
         given = f"{solver.record_interval:g} s"
         if abs(steps - every) > _EQUAL:
             rule = f"{given} is no multiple of the communication step of {clock.step_size:g} s"
@@ -40,18 +40,18 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
     questions: list[Problem] = []
     plans = {name: plan.description for name, plan in draft.system.components.items()}
     outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
-    events = draft.case.events if draft.scenario.events is None else draft.scenario.events
+    events = draft.given.case.events if draft.given.scenario.events is None else draft.given.scenario.events
     forced = any(isinstance(event, ForcingTable) for event in events)
-    patterns = [*draft.case.solver.record, *(NEEDED_FOR_SOURCES if forced else ())]
+    patterns = [*draft.given.case.solver.record, *(NEEDED_FOR_SOURCES if forced else ())]
     wanted = {name for pattern in patterns for name in fnmatch.filter(outputs, pattern)}
-    if outputs and not wanted and draft.case.solver.record:
-        text = f"nothing is recorded in scenario {draft.name!r}: none of its outputs fits a pattern"
-        questions.append(Problem(draft.place("solver", "record"), text))
-    ring = draft.case.analysis.ring_down
-    shown = [(draft.place("analysis", "ring_down"), ring.signal)] if ring else []
+    if outputs and not wanted and draft.given.case.solver.record:
+        text = f"nothing is recorded in scenario {draft.given.name!r}: none of its outputs fits a pattern"
+        questions.append(Problem(draft.given.place("solver", "record"), text))
+    ring = draft.given.case.analysis.ring_down
+    shown = [(draft.given.place("analysis", "ring_down"), ring.signal)] if ring else []
     shown += [
-        (draft.place("plots", k, "panels", n, "signal"), signal)
-        for k, plot in enumerate(draft.case.plots)
+        (draft.given.place("plots", k, "panels", n, "signal"), signal)
+        for k, plot in enumerate(draft.given.case.plots)
         for n, panel in enumerate(plot.panels)
         for signal in (panel.signal, *panel.also)
     ]

@@ -18,20 +18,20 @@ def references_of(draft: Draft, imperfections: Mapping[str, float | bool]) -> di
     A condition is compared in the variable's own unit, with the value that is set, else with the default. A name that
     nothing has is noted as a problem.
     """
-    table = draft.case.reference
+    table = draft.given.case.reference
     if table is None:
         return {}
     held = [_holds(draft, key, wanted, imperfections) for key, wanted in table.when.items()]
-    return table.modes.get(draft.name, {}) if all(held) and draft.from_outside <= set(table.when) else {}
+    return table.modes.get(draft.given.name, {}) if all(held) and draft.given.from_outside <= set(table.when) else {}
 
 
 def _holds(draft: Draft, key: str, wanted: Value, imperfections: Mapping[str, float | bool]) -> bool:
-    place = draft.place("reference", "when", key)
+    place = draft.given.place("reference", "when", key)
     if sets_imperfection(key):
         return key in imperfections and _equal(imperfections[key], wanted)
     name, _, variable = key.partition(".")
-    if name not in draft.known and draft.whole:
-        hint = close_names(name, sorted(draft.known), f"the case has: {', '.join([*draft.case.components][:12])}")
+    if name not in draft.known and draft.given.whole:
+        hint = close_names(name, sorted(draft.known), f"the case has: {', '.join([*draft.given.case.components][:12])}")
         draft.note(place, f"there is no component {name!r}; {hint}")
         return False
     plan = draft.system.components.get(name)
@@ -40,7 +40,7 @@ def _holds(draft: Draft, key: str, wanted: Value, imperfections: Mapping[str, fl
     info = plan.description.variables.get(variable)
     if info is None:
         if draft.tables[name].file is None:
-            hint = close_names(variable, plan.description.parameters, "`gfor info` lists the variables")
+            hint = close_names(variable, plan.description.parameters, "`gfor fmu info` lists the variables")
             draft.note(place, f"component {name!r} has no variable {variable!r}; {hint}")
         return False  # the FMU of somebody else may lack what the catalogue's model has
     try:

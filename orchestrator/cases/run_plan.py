@@ -21,7 +21,7 @@ def clock_of(draft: Draft, step_size: float | None) -> Clock | None:
             raise InputError(
                 f"a communication step of {step_size:g} s is too long; it must be at most {LONGEST_STEP} s"
             )
-        return Clock(step_size if step_size is not None else draft.case.solver.step_size)
+        return Clock(step_size if step_size is not None else draft.given.case.solver.step_size)
     except InputError as error:
         draft.note("--step", str(error))
         return None
@@ -40,31 +40,30 @@ def check_length(draft: Draft, clock: Clock | None, stop: float) -> None:
 
 
 def checked_schedule(draft: Draft) -> Schedule:
-    """The case's schedule, checked against its components."""
-    schedule, solver = _chosen(draft), draft.case.solver
+    schedule, solver = _chosen(draft), draft.given.case.solver
     if solver.tolerance is not None and not schedule.is_second_order:
         draft.note(
-            draft.place("solver", "tolerance"),
+            draft.given.place("solver", "tolerance"),
             f'a tolerance goes with schedule = "midpoint" or "newton", not with {solver.schedule!r}',
         )
-    if draft.network_failed:
+    if draft.found.network_failed:
         return schedule
     try:
         schedule.check(set(draft.system.components))
     except InputError as error:
-        draft.note(draft.place("solver", "groups"), str(error))
+        draft.note(draft.given.place("solver", "groups"), str(error))
     return schedule
 
 
 def _chosen(draft: Draft) -> Schedule:
-    solver = draft.case.solver
+    solver = draft.given.case.solver
     if solver.schedule == "jacobi":
         _check_unused_groups(draft, solver.groups or [])
-    return schedule_of(solver.schedule, solver, draft.grid, draft.system, draft.scenario.remove)
+    return schedule_of(solver.schedule, solver, draft.grid, draft.system, draft.given.scenario.remove)
 
 
 def _check_unused_groups(draft: Draft, groups: Sequence[Sequence[str]]) -> None:
     """With Jacobi's schedule the groups are kept for later and do nothing; wrong names are wrong all the same."""
     for name in (name for group in groups for name in group if name not in draft.known):
         hint = close_names(name, sorted(draft.known), f"the case has: {', '.join(sorted(draft.known))}")
-        draft.note(draft.place("solver", "groups"), f"there is no component {name!r}; {hint}")
+        draft.note(draft.given.place("solver", "groups"), f"there is no component {name!r}; {hint}")

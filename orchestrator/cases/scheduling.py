@@ -43,7 +43,7 @@ def schedule_in(case: CaseDefinition, scenario: str, system: System, name: Sched
 
 
 def told_again(system: System, told: Collection[str], step_size: float) -> System:
-    """The same system, whose components that are told the communication step [s] are told another one."""
+    """The system with another communication step [s] in the components that take one."""
     other = copy.copy(system)
     other.components = {
         name: replace(plan, parameters=plan.parameters | {STEP_PARAMETER: step_size}) if name in told else plan

@@ -39,17 +39,17 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
 
     All names that any share can give are added to the draft's known names.
     """
-    table = draft.case.units
-    if table is None or (draft.network_failed and table.file is None):
+    table = draft.given.case.units
+    if table is None or (draft.found.network_failed and table.file is None):
         return {}
     generation = draft.data.generation if draft.data else {}
     try:
-        rows = unit_rows(table, draft.directory, generation) if table.dyr is None else _rows_of_dyr(draft, table)
+        rows = unit_rows(table, draft.given.directory, generation) if table.dyr is None else _rows_of_dyr(draft, table)
     except InputError as error:
-        if draft.network_failed:
+        if draft.found.network_failed:
             return {}  # figures that the source would have given are missing
         key = next((key for key in ("dyr", "file") if getattr(table, key) is not None), None)
-        draft.note_network(draft.place("units", key) if key else draft.place("units"), str(error))
+        draft.note_network(draft.given.place("units", key) if key else draft.given.place("units"), str(error))
         return {}
     draft.known |= {f"{kind}{row.label}" for row in rows for kind in UNIT_KINDS}
     draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
@@ -57,7 +57,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
         if draft.data is not None and draft.data.buses and row.bus not in draft.data.buses:
             hint = close_names(row.bus, draft.data.buses, f"there are: {', '.join(draft.data.buses[:8])}")
             draft.note_network(
-                row.place or draft.place("units"),
+                row.place or draft.given.place("units"),
                 f"the unit at bus {row.label}: the network has no bus {row.bus!r}; {hint}",
             )
     alphas = _alphas(draft, table, rows)
@@ -78,7 +78,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
                     values = {**row.parameters.get(kind, {}), **own}
                 components[name] = ComponentTable(model=row.converter or model, bus=row.bus, parameters=values, **parts)
                 of_row = frozenset((*row.parameters.get(kind, {}), *own))
-                draft.origins[name] = UnitOrigin(row.place or draft.place("units"), of_row, key, row.lines)
+                draft.origins[name] = UnitOrigin(row.place or draft.given.place("units"), of_row, key, row.lines)
                 draft.active_limits[name] = share * row.p_min_mw, share * row.p_max_mw
     return components
 
@@ -134,7 +134,6 @@ def _name_in(entry: Row) -> str:
 
 
 def _require_names(rows: Sequence[UnitRow], path: Path) -> None:
-    """Several units at a bus have names of their own."""
     at_bus = Counter(row.bus for row in rows)
     labels = Counter(row.label for row in rows)
     for row in rows:
@@ -169,11 +168,13 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     if table.file is not None:
         raise InputError("'dyr' and 'file' both say what the units are; remove one of them")
     machines = draft.data.machines if draft.data else ()
-    if not machines and draft.case.network is not None and draft.case.network.raw is not None:
-        raise InputError(f"{draft.case.network.raw}: no generator is in service (STAT = 0), so 'dyr' is of no machine")
+    if not machines and draft.given.case.network is not None and draft.given.case.network.raw is not None:
+        raise InputError(
+            f"{draft.given.case.network.raw}: no generator is in service (STAT = 0), so 'dyr' is of no machine"
+        )
     if not machines:
         raise InputError("'dyr' is for the machines of a network of PSS/E; give it as 'raw' in [network]")
-    path = seen_from_here(draft.directory / (table.dyr or ""))
+    path = seen_from_here(draft.given.directory / (table.dyr or ""))
     rows = rows_of_machines(machines, str(path))
     alphas = _alphas(draft, table, rows)
     replaced = [row.label for row in rows if alphas[row.label] == 1]
@@ -193,7 +194,7 @@ def _rows_of_dyr(draft: Draft, table: UnitsTable) -> list[UnitRow]:
     for row in rows:
         for line, text in row.replaced:
             changes.note(line, f"grid-following converter as {row.converter}: {text}")
-    draft.questions += changes.listed()
+    draft.found.questions += changes.listed()
     phasors = [row for row in rows if row.converter is not None]
     if phasors and not table.generator.endswith("_phasor"):
         raise InputError(
@@ -236,7 +237,7 @@ def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[st
     """
     alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
     converters = {row.label: row.converter for row in rows if row.converter is not None}
-    for choice in (choice for layer in draft.layers for choice in layer.shares):
+    for choice in (choice for layer in draft.given.layers for choice in layer.shares):
         label = choice.label
         if label and label not in alphas:
             hint = close_names(label, alphas, f"there are: {', '.join(alphas)}")

@@ -8,10 +8,10 @@ _PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a netw
 
 
 def connect(draft: Draft) -> None:
-    for index, wire in enumerate(draft.case.connections):
+    for index, wire in enumerate(draft.given.case.connections):
         ends = {wire.source.partition(".")[0], wire.target.partition(".")[0]}
-        if not ends & set(draft.scenario.remove):
-            _try_connect(draft, wire.source, wire.target, draft.place("connections", index))
+        if not ends & set(draft.given.scenario.remove):
+            _try_connect(draft, wire.source, wire.target, draft.given.place("connections", index))
     at_buses = [n for n, table in draft.tables.items() if table.bus is not None and n in draft.system.components]
     _check_forms(draft, at_buses)
     taken = _taken_by_port(draft)
@@ -33,7 +33,7 @@ def _check_forms(draft: Draft, names: list[str]) -> None:
     """Refuse EMT models in a network of phasors, and question phasor models in a network of the other kind; once for
     each model, whatever the number of its components.
     """
-    if draft.network_failed or draft.network is None or draft.grid not in draft.system.components:
+    if draft.found.network_failed or draft.network is None or draft.grid not in draft.system.components:
         return
     taken = draft.system.components[draft.grid].description.inputs
     phasors: dict[str, list[str]] = {}
@@ -41,11 +41,11 @@ def _check_forms(draft: Draft, names: list[str]) -> None:
         given = draft.system.components[name].description.outputs
         wanted = {v for v in _PHASOR_PORT if f"{name}.{v}" in taken}
         if wanted - {*given}:
-            draft.misfits[name] = draft.tables[name].model or draft.tables[name].file or ""
+            draft.found.misfits[name] = draft.tables[name].model or draft.tables[name].file or ""
         elif not wanted and f"{name}.i_re" in taken and {*_PHASOR_PORT} <= {*given}:
             phasors.setdefault(draft.tables[name].model or draft.tables[name].file or "", []).append(name)
-    for model in dict.fromkeys(draft.misfits.values()):
-        others = [name for name, its in draft.misfits.items() if its == model]
+    for model in dict.fromkeys(draft.found.misfits.values()):
+        others = [name for name, its in draft.found.misfits.items() if its == model]
         draft.note(
             _place_of_model(draft, others[0]),
             f"{_all(others)}: {model!r} is an EMT model, and the network {draft.grid!r} is one of phasors "
@@ -58,7 +58,7 @@ def _check_forms(draft: Draft, names: list[str]) -> None:
             f"({draft.tables[draft.grid].model}): its current would follow the voltage at once; take "
             f"{model.removesuffix('_phasor')!r}, or model = 'phasor_grid' for the network and phasor models for all"
         )
-        draft.questions.append(Problem(_place_of_model(draft, others[0]), text))
+        draft.found.questions.append(Problem(_place_of_model(draft, others[0]), text))
 
 
 def _remedy(model: str) -> str:
@@ -73,8 +73,8 @@ def _remedy(model: str) -> str:
 def _place_of_model(draft: Draft, name: str) -> str:
     origin = draft.origins.get(name)
     if origin is None:
-        return draft.place("components", name, "model" if draft.tables[name].model else "fmu")
-    return draft.place("units", origin.common.removesuffix("_parameters"))
+        return draft.given.place("components", name, "model" if draft.tables[name].model else "fmu")
+    return draft.given.place("units", origin.common.removesuffix("_parameters"))
 
 
 def _all(names: list[str]) -> str:
@@ -86,24 +86,24 @@ def check_inputs(draft: Draft) -> None:
     for wire in draft.system.connections:
         if wire.target.variable in draft.system.components[wire.target.component].inputs:
             draft.note(
-                draft.place("components", wire.target.component, "inputs"),
+                draft.given.place("components", wire.target.component, "inputs"),
                 f"{wire.target} is given a constant, but {wire.source} feeds it; remove the one or the other",
             )
     for endpoint in draft.system.unconnected_inputs():
-        if draft.network_failed and (draft.tables[endpoint.component].bus or endpoint.component == draft.grid):
+        if draft.found.network_failed and (draft.tables[endpoint.component].bus or endpoint.component == draft.grid):
             continue
-        if endpoint.component == draft.grid and endpoint.variable.rpartition(".")[0] in draft.misfits:
+        if endpoint.component == draft.grid and endpoint.variable.rpartition(".")[0] in draft.found.misfits:
             continue
         draft.note(
-            draft.place("components", endpoint.component),
-            f"scenario {draft.name!r}: nothing feeds the input {endpoint}; "
+            draft.given.place("components", endpoint.component),
+            f"scenario {draft.given.name!r}: nothing feeds the input {endpoint}; "
             "connect it, or give it a constant under 'inputs'",
         )
 
 
 def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None:
-    where = draft.place("components", name, "bus")
-    if draft.network_failed:
+    where = draft.given.place("components", name, "bus")
+    if draft.found.network_failed:
         return
     if draft.grid is None or draft.network is None:
         draft.note(
@@ -117,7 +117,7 @@ def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None
     if draft.grid in draft.system.components:
         for part in ("re", "im"):
             _try_connect(draft, f"{draft.grid}.{bus}.v_{part}", f"{name}.v_{part}", where)
-        for variable in taken if name not in draft.misfits else ():
+        for variable in taken if name not in draft.found.misfits else ():
             _try_connect(draft, f"{name}.{variable}", f"{draft.grid}.{name}.{variable}", where)
 
 

@@ -1,4 +1,4 @@
-"""The acceptance tests of the FMU that is certified: run, or read from a report of `gfor check --json`."""
+"""The acceptance tests of the FMU that is certified: run, or read from a report of `gfor fmu check --json`."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -15,8 +15,6 @@ KEPT = "check.json"  # name of the report's file in a certificate's folder
 
 @dataclass(frozen=True)
 class Acceptance:
-    """The result of the acceptance tests."""
-
     trusted: bool
     faults: tuple[str, ...]
     report: Mapping[str, Any] = field(repr=False)
@@ -47,12 +45,12 @@ def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
 
 
 def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
-    """Read a report of ``gfor check --json``.
+    """Read a report of ``gfor fmu check --json``.
 
     Raises `InputError` if the file is not a report, belongs to another FMU, binding or version, or does not hold all
     checks.
     """
-    remedy = "write it with `gfor check FILE.fmu --json`, or leave --check away to have the tests run"
+    remedy = "write it with `gfor fmu check FILE.fmu --json`, or leave --check away to have the tests run"
     try:
         report = json.loads(path.read_text(encoding="utf-8"))
         hashes = report["sha256"]["fmu"], report["sha256"]["binding"]
@@ -61,7 +59,7 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
     except OSError as error:
         raise InputError(f"--check {path}: it cannot be read: {error.strerror}; {remedy}") from error
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"--check {path}: it is no report of `gfor check --json`; {remedy}") from error
+        raise InputError(f"--check {path}: it is no report of `gfor fmu check --json`; {remedy}") from error
     if hashes != (file_hash(fmu), file_hash(binding)):
         raise InputError(f"--check {path}: it is of another FMU or binding than {fmu}; {remedy}")
     if tool != _tool():

@@ -67,7 +67,6 @@ class Certificate(ABC, Generic[Row_co]):
 
     @property
     def refused(self) -> bool:
-        """Whether an acceptance test failed."""
         return self.acceptance is not None and not self.acceptance.trusted
 
     @property

@@ -22,8 +22,6 @@ LEAST_AMPLITUDE = 0.01
 
 @dataclass(frozen=True, slots=True)
 class ModeVerdict:
-    """A mode with the converter, and the same mode without the converter."""
-
     eigenvalue: complex
     # eigenvalue of the same mode without the converter; None where the converter introduces the mode.
     before: complex | None
@@ -92,7 +90,6 @@ def neighbouring_modes(matched: Iterable[ModeVerdict]) -> list[ModeVerdict]:
 
 
 def matched_modes(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> Iterator[ModeVerdict]:
-    """Every mode with the converter, with the same mode without it."""
     alike = np.zeros((len(having.eigenvalues), len(lacking.eigenvalues)))
     if alike.size:
         alike = np.where(_comparable(having, lacking), similarities(having, lacking), 0.0)

@@ -67,7 +67,6 @@ def damping_controllers(description: FmuDescription, request: CertificationReque
 
 
 def variable(letter: str) -> str:
-    """Our name for the switch of a damping controller."""
     return f"pod_{letter}.enabled"
 
 

@@ -24,7 +24,7 @@ class Device:
 def devices_of(
     files: Sequence[str], bindings: Sequence[str] = (), settings: Sequence[tuple[str, Value]] = ()
 ) -> list[Device]:
-    """What a command line says of its devices.
+    """The devices of a command line.
 
     ``files``: ``FILE`` or ``NAME=FILE``. Without a name a device is called by its file, and where several files have
     one name by their folders as well.

@@ -24,7 +24,6 @@ from orchestrator.results.mode_json import eigenvalue_json
 
 
 def certification_json(c: Certification) -> dict[str, Any]:
-    """All verdicts with their figures, and the description of the test."""
     return {
         "format": NORM,
         "norm": "Norma técnica de supervisión 631 v2.0 (2020), section 5.10",
@@ -124,7 +123,6 @@ def _figures(value: complex) -> dict[str, float]:
 
 
 def time_json(time: TimeVerdict) -> dict[str, Any]:
-    """The time-domain criterion on one response."""
     modal = [_figures(m.eigenvalue) | {"amplitude": m.amplitude} for m in time.modal.modes]
     return {
         "signal": time.signal,

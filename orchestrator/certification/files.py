@@ -43,7 +43,6 @@ def _form_of(certificate: Certificate[Judged]) -> _Form:
 
 
 def figures_of(certificate: Certificate[Judged]) -> dict[str, Any]:
-    """All figures as JSON's types."""
     return _form_of(certificate).figures(certificate)
 
 

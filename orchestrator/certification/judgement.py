@@ -58,8 +58,6 @@ class TimeVerdict:
 
 @dataclass(frozen=True)
 class PointVerdict:
-    """The judgement of the norm on one reactance."""
-
     X_L: float
     modes: tuple[ModeVerdict, ...]
     time: TimeVerdict | None

@@ -32,7 +32,6 @@ READING = (
 
 
 def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Path) -> list[Path]:
-    """Write ``matrix.html`` and ``matrix.json``."""
     made = datetime.now(UTC).replace(microsecond=0)
     content = {"made": made.isoformat(), **matrix_json(matrix, devices)}
     write_text(folder / MATRIX_HTML, matrix_page(matrix, devices, made))
@@ -41,7 +40,6 @@ def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Pa
 
 
 def matrix_json(matrix: CertificateMatrix, devices: Sequence[Device]) -> dict[str, Any]:
-    """All figures as JSON's types."""
     return {
         "format": FORMAT, "sentence": matrix.sentence(), "exit_code": matrix.exit_code,
         "devices": [{"name": d.name, "file": d.file.name, "binding": d.binding.name if d.binding else None,

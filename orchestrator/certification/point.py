@@ -82,7 +82,6 @@ class PointResult:
         return cls(task.X_L, task.scenario, failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
         header = {name: value for name, value in vars(self).items() if name not in ("modes", "times", "signals")}
         modes = self.modes.arrays() if self.modes is not None else {}
         return header | {"names": self.modes and self.modes.names}, {**modes, **signal_arrays(self.times, self.signals)}

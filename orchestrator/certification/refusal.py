@@ -46,11 +46,10 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
         problems.append(Problem(place, text))
     if request.binding is None and any(p.place.startswith(f"components.{CONVERTER}") for p in problems):
         problems.append(
-            Problem("", f"if its port has other names, give --binding; `gfor bind {request.fmu}` drafts one")
+            Problem("", f"if its port has other names, give --binding; `gfor fmu bind {request.fmu}` drafts one")
         )
     return CaseError(f"{request.fmu}, {where}", tuple(dict.fromkeys(problems)))
 
 
 def _shown(value: Value) -> str:
-    """A value as the user wrote it."""
     return f"{value:.15g}" if isinstance(value, float) else shown(value)

@@ -47,7 +47,6 @@ def page(certification: Certification, hashes: Mapping[str, str | None], made: d
 
 
 def title(c: Certification) -> str:
-    """The page's heading."""
     word = _TITLES[c.verdict]
     if c.missing:
         word += f" ({texts.count(c.missing)})"
@@ -75,7 +74,6 @@ def _findings(c: Certification) -> str:
 
 
 def _remark(c: Certification) -> Iterator[str]:
-    """The remark that dampings are lowered, with the lowest of them."""
     lowered = [(m, v.X_L) for v in c.verdicts for m in v.lowered]
     if lowered:
         worst, X_L = min(lowered, key=lambda entry: entry[0].damping_percent)
@@ -94,8 +92,8 @@ def _where(bad: list[PointVerdict]) -> str:
 
 def _acceptance_line(c: Certification) -> str:
     if c.acceptance is None:
-        return "Acceptance tests of the FMU (gfor check): not run"
-    return f"Acceptance tests of the FMU (gfor check): {'no check failed' if c.acceptance.trusted else 'FAILED'}"
+        return "Acceptance tests of the FMU (gfor fmu check): not run"
+    return f"Acceptance tests of the FMU (gfor fmu check): {'no check failed' if c.acceptance.trusted else 'FAILED'}"
 
 
 def _least_and_growth(c: Certification) -> Iterator[str]:
@@ -124,7 +122,6 @@ def _overview(c: Certification) -> str:
 
 
 def _said(v: PointVerdict) -> str:
-    """The verdict of a point, with a remark if the norm does not require this point."""
     beyond = "" if len(missing_reactances([v.X_L])) < len(missing_reactances([])) else ", beyond the norm's"
     return (verdict(v.accepted) if v.judged else '<span class="bad">not judged</span>') + beyond
 

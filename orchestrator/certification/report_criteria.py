@@ -29,7 +29,6 @@ def verdict(accepted: bool) -> str:
 
 
 def eigenvalues(c: Certification, figures: Figures) -> str:
-    """Every mode, in one picture and in tables."""
     marks = []
     for k, scenario in enumerate((WITHOUT, WITH)):
         for (name, X_L), point in c.points.items():
@@ -88,7 +87,6 @@ def _base_modes(c: Certification, v: PointVerdict) -> str:
 
 
 def responses(c: Certification, figures: Figures) -> str:
-    """Every response with the norm's construction."""
     return "".join(part for v in c.verdicts for part in _response(c, v, figures))
 
 

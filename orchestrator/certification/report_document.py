@@ -78,7 +78,6 @@ def _voltage(c: Certification) -> str:
 
 
 def parameters(c: Certification) -> str:
-    """All parameters of the FMU, with the changed ones marked."""
     rows = [
         [escape(r.name), _text(r.start), f"<b>{_text(r.used)}</b>" if r.changed_by else _text(r.used),
          escape(r.unit), escape(r.changed_by or "–"), escape(r.description)] for r in parameter_rows(c)
@@ -102,7 +101,7 @@ def binding(c: Certification, hashes: Hashes) -> str:
 
 
 def acceptance(c: Certification) -> str:
-    """The results of `gfor check`."""
+    """The results of `gfor fmu check`."""
     if c.acceptance is None:
         return "<p>They were not run (--no-check).</p>"
     marks = {"fail": "bad", "pass": "good"}
@@ -112,7 +111,7 @@ def acceptance(c: Certification) -> str:
     ]  # fmt: skip
     said = "No check failed." if c.acceptance.trusted else f"FAILED: {', '.join(c.acceptance.faults)}."
     style = "good" if c.acceptance.trusted else "bad"
-    listed = table("gfor check", ["Check", "Verdict", "What was seen"], rows, left=3)
+    listed = table("gfor fmu check", ["Check", "Verdict", "What was seen"], rows, left=3)
     return f'<p class="{style}">{escape(said)}</p>{listed}'
 
 

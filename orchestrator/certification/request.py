@@ -17,8 +17,6 @@ GIVEN = ("S_n", "S_base", "f_n", "P_0", "Q_0", "v_0", "theta_0", "connected")
 
 @dataclass(frozen=True)
 class CertificationRequest:
-    """The request for a certificate."""
-
     fmu: Path
     binding: Path | None = None
     values: Mapping[str, Value] = field(default_factory=dict)
@@ -56,11 +54,9 @@ def same_reactance(one: float, other: float) -> bool:
 
 
 def missing_reactances(done: Iterable[float]) -> tuple[float, ...]:
-    """Reactances of the norm that are missing among the given ones."""
     values = list(done)
     return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in values))
 
 
 def shown(value: Value) -> str:
-    """A value as the command line takes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

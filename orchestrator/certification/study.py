@@ -33,7 +33,6 @@ class Certification(Certificate[PointVerdict]):
 
     @property
     def pod(self) -> str:
-        """Active damping controllers, as one of `PODS`."""
         return self.controllers.pod
 
     @property
@@ -91,7 +90,6 @@ class Certification(Certificate[PointVerdict]):
 def certify(
     request: CertificationRequest, executor: Executor, folder: Path, report: CountReport = lambda done, total: None
 ) -> Certification:
-    """Compute all points and judge them."""
     request.check()
     description = bound_fmu(request.fmu, request.binding)
     controllers = damping_controllers(description, request)

@@ -58,8 +58,6 @@ class RecordedSwing:
 
 @dataclass(frozen=True)
 class SwingTest:
-    """The criterion applied to one signal."""
-
     dropped: Extremum | None
     swings: tuple[RecordedSwing, ...]
     # ΔP5M5/ΔP1M1. It is 0 if the oscillation has died out before, and None if the record is too short.

@@ -20,12 +20,7 @@ _ESCAPE = "gfor_escape"
 COMMANDS = {
     "new": "write a case file from a network's files, such as RAW and DYR",
     "run": "steady state, modes and time response of a case's scenarios",
-    "federate": "one component of a case as a federate at HELICS, for a run elsewhere",
     "modes": "steady state and eigenvalues of a case's scenarios",
-    "linearize": "write a scenario's linear model A, B, C, D for other tools",
-    "export-ssp": "write a case's scenarios as SSP archives for other tools",
-    "export-comtrade": "write a run's signals as a COMTRADE recording for other tools",
-    "export-dll": "write a converter's control as IEEE/CIGRE DLL for EMT programs",
     "steps": "the largest communication step within a given error, for each schedule",
     "scr": "short-circuit power of every bus, and SCR of the converters",
     "sweep": "modes over a grid of parameters, followed from point to point",
@@ -33,99 +28,82 @@ COMMANDS = {
     "interactions": "modes that several vendors' converters share, and the pair that does not agree",
     "site": "where a converter helps: the shift of each mode by support at each bus",
     "screen": "critical modes of many operating points and outages",
-    "compare": "two recorded runs: differences, and what each rings with",
-    "source": "where the oscillations of a run or recording come from: which unit drives them",
-    "identify": "the modes in a recorded signal (matrix pencil)",
-    "report": "one self-contained HTML page from results of any study",
     "design": "design a POD controller by eigenvalue sensitivity",
-    "admittance": "measure a device's admittance, and fit a model to it",
-    "nyquist": "whether a device is stable at a network, from scans, FMUs and cases",
-    "black-box": "modes of a case with a component known by its port alone",
     "certify": "the grid code's damping test on a converter FMU",
     "verify": "whether a certificate still holds: hashes, verdict, points computed anew",
-    "build": "build FMUs of the catalogue's models",
-    "which-master": "which schedule another tool runs, shown by a pair of probe FMUs",
-    "bind": "draft a binding: what a foreign FMU's variables mean at our port",
-    "check": "acceptance tests of an FMU: can it be trusted in a co-simulation?",
-    "info": "show what an FMU declares",
+    "report": "one self-contained HTML page from results of any study",
+    "fmu info": "show what an FMU declares",
+    "fmu bind": "draft a binding: what a foreign FMU's variables mean at our port",
+    "fmu check": "acceptance tests of an FMU: can it be trusted in a co-simulation?",
+    "fmu build": "build FMUs of the catalogue's models",
+    "fmu admittance": "measure a device's admittance, and fit a model to it",
+    "fmu nyquist": "whether a device is stable at a network, from scans, FMUs and cases",
+    "signal identify": "the modes in a recorded signal (matrix pencil)",
+    "signal compare": "two recorded runs: differences, and what each rings with",
+    "signal source": "where the oscillations of a run or recording come from: which unit drives them",
+    "export linear": "write a scenario's linear model A, B, C, D for other tools",
+    "export ssp": "write a case's scenarios as SSP archives for other tools",
+    "export comtrade": "write a run's signals as a COMTRADE recording for other tools",
+    "export dll": "write a converter's control as IEEE/CIGRE DLL for EMT programs",
+    "master which": "which schedule another tool runs, shown by a pair of probe FMUs",
+    "master federate": "one component of a case as a federate at HELICS, for a run elsewhere",
 }
-"""Subcommands, each with a module of its name."""
+"""Commands; those of a group follow its name."""
 
-EXAMPLES = """\
-examples:
-  gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml
-  gfor run two_area                              the paper's first case study, into results/two_area
-  gfor run two_area --scenario pod_p --stop 5    one scenario, five seconds
-  gfor modes two_area --set grid.X_L=0.3         eigenvalues on a longer line
-  gfor modes my_case.toml --json                 a case file of your own, for a program to read
-  gfor linearize two_area --scenario gfor        A, B, C, D with names, for MATLAB and others
-  gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
-  gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
-  gfor sweep two_area --vary grid.X_L=0.1:3 --until unstable   how far it may grow
-  gfor scr my_case.toml                          how weak the grid is at each bus
-  gfor sensitivities two_area --scenario pod_p   which parameters move the mode, and how far
-  gfor screen ieee39 --points year.csv --outages lines   critical modes hour by hour, outage by outage
-  gfor site ieee39 --device pod_p --outages lines        at which bus a converter helps most
-  gfor interactions my_case.toml                 which vendors' converters do not agree with each other
-  gfor design two_area --controller pod_p        POD-P for its electromechanical mode
-  gfor steps two_area --error 0.001:0.1          the largest step for 1 mHz and 0.1 points of damping
-  gfor compare results/two_area/gfor results/two_area/pod_p
-  gfor identify results/two_area/gfor "sg1.omega - sg2.omega"
-  gfor identify recorder.cfg "F NORTH" --start 12     the modes in a measured recording
-  gfor run two_area --like fmpy_ssp              what another master would give, to its last digits
-  gfor run two_area --engine helics --federate gfor   the converter in a process of its own, over HELICS
-  gfor federate two_area --component gfor --broker tcp://host:23405
-  gfor which-master --build probes               two FMUs that tell which schedule a tool runs
-  gfor admittance vendor.fmu                     its admittance, 0.05 Hz to 1 kHz
-  gfor nyquist plant.txt network.txt --compensation "32 %"    is a scanned plant stable there?
-  gfor black-box two_area --scenario gfor --component gfor
-  gfor certify vendor.fmu --binding vendor.toml  the grid code's damping test
-  gfor certify one.fmu two.fmu --code all        several converters under all codes, as one matrix
-  gfor verify results/certify_vendor             whether a certificate still holds
-  gfor build gfor --dest fmus                    the converter as an FMU for any FMI tool
-  gfor export-dll gfor --dest dlls                its control as IEEE/CIGRE DLL for EMT programs
-  gfor info fmus/gfor.fmu                        what an FMU declares
-  gfor bind vendor.fmu                           draft of a binding: what its variables mean at our port
-  gfor check vendor.fmu --binding vendor.toml    whether it can be trusted in a co-simulation
-"""
+GROUPS = {
+    "fmu": "An FMU, DLL or device by itself",
+    "signal": "What a run or a recording says",
+    "export": "Models and signals for other tools",
+    "master": "Other masters, and runs with them",
+}
+
+OLD = {
+    **{name.partition(" ")[2]: name for name in COMMANDS if name.startswith(("fmu ", "signal "))},
+    **{f"export-{kind}": f"export {kind}" for kind in ("ssp", "comtrade", "dll")},
+    "linearize": "export linear",
+    "which-master": "master which",
+    "federate": "master federate",
+    "black-box": "modes --black-box",
+}
+"""Spellings before 0.3, which work until 1.0, with today's."""
+
+_MODULES = {new: old for old, new in OLD.items()}  # a command in a group has the module of its old name
 
 QUESTIONS = """\
 gfor: co-simulation of grid-forming converters, from FMUs and a case file
 
 Is the network stable, and which swing is damped least?
-  gfor modes two_area                                 modes of each scenario of a built-in case
-  gfor modes two_area --scenario pod_p --set grid.X_L=0.3       with another value
-  gfor run two_area --scenario pod_p --stop 5         after a fault or a step: signals and plots, in results/two_area
+  gfor new own.raw own.dyr --out case.toml            a case of your own, for the place of two_area
+  gfor modes two_area --set grid.X_L=0.3              modes of each scenario, with another value
+  gfor run two_area --stop 5                          after a fault or a step: signals and plots
   gfor report results/two_area                        all that as one page for a browser
-
 What makes it better or worse?
-  gfor design two_area --controller pod_p             settings of a damping controller
   gfor sensitivities two_area --scenario pod_p        which parameter moves the mode, and how far
-  gfor sweep two_area --vary grid.X_L=0.1:0.5:9       modes along a parameter
+  gfor sweep two_area --vary grid.X_L=0.1:0.5:9       modes along a parameter (or --until unstable)
   gfor screen ieee39 --points year.csv --outages n-1  hour by hour, outage by outage
-  gfor site ieee39 --device pod_p                     where to put a converter
-
-Can this converter's FMU be trusted, and does it meet the grid code?
-  gfor info vendor.fmu                                what it declares
-  gfor bind vendor.fmu                                draft of its binding: what its variables mean
-  gfor check vendor.fmu --binding vendor.toml         acceptance tests
-  gfor certify vendor.fmu --binding vendor.toml       the damping test of a grid code
+  gfor design two_area --controller pod_p             settings of a damping controller
+  gfor site ieee39 --device pod_p                     where a converter helps most
+  gfor interactions my_case.toml                      which vendors' converters do not agree
+  gfor scr my_case.toml                               how weak the grid is at each bus
+May this converter's FMU be trusted, and does it meet the grid code?
+  gfor fmu info vendor.fmu                            what it declares (also: admittance, nyquist)
+  gfor fmu bind vendor.fmu                            draft of its binding: what its variables mean
+  gfor fmu check vendor.fmu --binding vendor.toml     acceptance tests
+  gfor certify vendor.fmu --binding vendor.toml       the tests of a grid code (--code all)
   gfor verify results/certify_vendor                  whether a certificate still holds
-
 What does a recording say?
-  gfor identify results/two_area/gfor "sg1.omega - sg2.omega"   the modes in a signal
-  gfor compare results/two_area/gfor results/two_area/pod_p     two runs beside each other
-  gfor source results/two_area/gfor                   which unit drives an oscillation
+  gfor signal identify results/two_area/gfor "sg1.omega - sg2.omega"   the modes in a signal
+  gfor signal compare results/two_area/gfor results/two_area/pod_p     two runs beside each other
+  gfor signal source results/two_area/gfor            which unit drives an oscillation
+How do the models get into another tool, and does it compute alike?
+  gfor fmu build gfor --dest fmus                     an FMU for any FMI tool
+  gfor export linear two_area --scenario gfor         A, B, C, D (also: ssp, comtrade, dll)
+  gfor master which --build probes                    which schedule a tool runs (also: federate)
+  gfor steps two_area --error 0.001:0.1               how long a step may be
 
-How do I take the models elsewhere?
-  gfor build gfor --dest fmus                         an FMU for any FMI tool
-  gfor export-dll gfor --dest dlls                    a DLL for EMT programs
-  gfor linearize two_area --scenario gfor             A, B, C, D
-
-A case of your own: `gfor new own.raw own.dyr --out case.toml` writes one, for the place of two_area; also from CGMES.
 `gfor COMMAND --help` has a command's options, `gfor --help` all commands.
 """
-"""What ``gfor`` alone prints."""
+"""The page that ``gfor`` alone prints."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -156,8 +134,9 @@ def _run(words: Sequence[str]) -> int:
 
 def _done(words: Sequence[str]) -> int:
     try:
+        words = _spelt_today(words)
         with calls:  # libraries take an interrupt in their import for an error of their own
-            parser = _parser(next((word for word in words if not word.startswith("-")), None))
+            parser = _parser(_command_in(words))
         options = parser.parse_args(words)
         origin.said[:] = [lambda: _origin(words)]
         return int(options.command(options))
@@ -165,6 +144,21 @@ def _done(words: Sequence[str]) -> int:
         if is_interrupt(error):
             raise
         return _failed(error)
+
+
+def _spelt_today(words: Sequence[str]) -> list[str]:
+    """The words with today's name of the command; says so where it was another."""
+    place = next((k for k, word in enumerate(words) if not word.startswith("-")), 0)
+    today = OLD.get(words[place]) if words else None
+    if today is None:
+        return list(words)
+    print(f"note: gfor {words[place]} is now gfor {today}; the old spelling works until 1.0", file=sys.stderr)
+    return [*words[:place], *today.split(), *words[place + 1 :]]
+
+
+def _command_in(words: Sequence[str]) -> str | None:
+    named = [word for word in words if not word.startswith("-")][:2]
+    return next((name for name in (" ".join(named), *named[:1]) if name in COMMANDS), None)
 
 
 def _origin(words: Sequence[str]) -> dict[str, str]:
@@ -218,8 +212,8 @@ def _print_error(text: str) -> None:
     console.print(f"[bold red]error:[/bold red] {escape(text)}")
 
 
-def _first_page() -> int:
-    print(QUESTIONS, end="")
+def _print(text: str) -> int:
+    print(text, end="")
     return 0
 
 
@@ -246,10 +240,10 @@ class _Once(argparse._StoreAction):
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose help opens with the examples."""
+    """A parser whose help opens with the newcomer's page."""
 
     def format_help(self) -> str:
-        return f"{EXAMPLES}\n{super().format_help()}"
+        return f"{QUESTIONS}\n{super().format_help()}"
 
 
 class _Command(argparse.ArgumentParser):
@@ -266,18 +260,28 @@ class _Command(argparse.ArgumentParser):
             raise
 
 
+def module_of(command: str) -> Any:
+    """The module with a command's ``add_arguments`` and ``run``."""
+    return import_module(f"orchestrator.cli.{_MODULES.get(command, command).replace('-', '_')}")
+
+
 def _parser(chosen: str | None) -> argparse.ArgumentParser:
     """The parser, with the arguments of the one command that was chosen: the others' imports would take seconds."""
     parser = _Parser(prog="gfor", description="Co-simulation of grid-forming converters: run, linearise, build FMUs.")
-    parser.set_defaults(command=lambda _: _first_page())
+    parser.set_defaults(command=lambda _: _print(QUESTIONS))
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
-    commands = parser.add_subparsers(metavar="COMMAND", parser_class=_Command)
+    lists = {"": parser.add_subparsers(metavar="COMMAND", parser_class=_Command)}
     for name, words in COMMANDS.items():
-        command = commands.add_parser(name, help=words)
+        group, _, last = name.rpartition(" ")
+        if group not in lists:
+            whole = lists[""].add_parser(group, help=GROUPS[group], description=GROUPS[group])
+            whole.set_defaults(command=lambda _, whole=whole: _print(whole.format_help()))
+            lists[group] = whole.add_subparsers(metavar="COMMAND", parser_class=_Command)
+        command = lists[group].add_parser(last, help=words)
         if name == chosen:
             for kind in (None, "store"):
                 command.register("action", kind, _Once)
-            module = import_module(f"orchestrator.cli.{name.replace('-', '_')}")
+            module = module_of(name)
             module.add_arguments(command)
             command.set_defaults(command=module.run)
     return parser

@@ -1,23 +1,15 @@
-"""``gfor admittance``: a device known only through FMI, measured at its port."""
+"""``gfor fmu admittance``: a device known only through FMI, measured at its port."""
 
 import argparse
-import cmath
 import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Group
 from rich.markup import escape
 
 from orchestrator.analysis.modes import damping_percent
-from orchestrator.binding.binding import bound_fmu
-from orchestrator.black_box.bench import Bench
-from orchestrator.black_box.files import identification_json, save_identification
-from orchestrator.black_box.fitting import fit, require_fitting
-from orchestrator.black_box.frequency_response import measure
-from orchestrator.black_box.passivity import passivity
-from orchestrator.black_box.port import check_port, start_of, values_for
+from orchestrator.api.admittance import admittance
 from orchestrator.cli.arguments import option, quantity, repeatable, seconds, setting, switch
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, print_json, said_stages
@@ -25,7 +17,6 @@ from orchestrator.errors import InputError
 from orchestrator.immittance.measured import as_scan
 from orchestrator.immittance.ztool import write_ztool
 from orchestrator.report.tables import make_table
-from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 
 
@@ -36,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                "(repeatable)", read=setting)  # fmt: skip
     option(parser, "--step", "H", "communication step [s] (100 us)", read=seconds, default=1e-4)
     option(parser, "--out", "DIR", "folder (default: results/admittance_<file>)", read=Path)
-    option(parser, "--scan", "FILE.txt", "write Z-tool's form too, for `gfor nyquist`", read=Path)
+    option(parser, "--scan", "FILE.txt", "write Z-tool's form too, for `gfor fmu nyquist`", read=Path)
     option(parser, "--voltage", "V", "rated voltage for --scan", read=quantity("kV"))
     add_excitation_arguments(parser)
     switch(parser, "--json", "print JSON")
@@ -44,29 +35,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure, fit, write, and say what was found."""
-    require_fitting()
     if options.scan and not options.voltage:
         raise InputError("--scan: a scan is in siemens; give the rated voltage as well, as in --voltage '230 kV'")
-    console = make_console(stderr=options.json)
-    description = bound_fmu(options.fmu, options.binding)
-    values = values_for(description, dict(options.set))
-    magnitude, angle = (float(values.get(name, start_of(description, name))) for name in ("v_0", "theta_0"))
-    rest = cmath.rect(magnitude, angle)
-    bench = Bench(
-        description, values, np.array([rest.real, rest.imag]), step_size=options.step,
-        restore=False if options.no_state else None,
-    )  # fmt: skip
-    check_port(description, bench)
+    console, how = make_console(stderr=options.json), excitation_of(options)
     with said_stages() as report:
-        response = measure(bench, excitation_of(options), report)
-        model, passive = fit(response), passivity(response)
+        found = admittance(
+            options.fmu, binding=options.binding, values=dict(options.set), step=options.step, method=how.method,
+            amplitude=how.amplitude, frequencies=(how.lowest_hz, how.highest_hz), use_state=not options.no_state,
+            report=report,
+        )  # fmt: skip
     folder = made_folder(options.out or Path("results") / f"admittance_{options.fmu.stem}", "--out")
-    with staged(folder, new_run_id()) as staging:
-        files = save_identification(response, model, passive, staging)
+    files = found.save(folder)
     if options.scan:
-        scan = as_scan(options.scan.stem, response, rest, options.voltage)
+        scan = as_scan(options.scan.stem, found.response, found.rest, options.voltage)
         write_ztool(scan.in_siemens(options.voltage), options.scan)
-    content = identification_json(response, model, passive)
+    content, passive = found.as_json(), found.passivity
     if options.json:
         print_json(content)
         return 0

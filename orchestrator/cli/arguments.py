@@ -1,4 +1,4 @@
-"""What the words behind options mean; argparse prints what is wrong with one."""
+"""Readers of options' values; argparse prints what is wrong with one."""
 
 import argparse
 import math
@@ -109,7 +109,7 @@ def quantity(unit: str) -> Callable[[str], float]:
 
 
 def tolerance(text: str) -> float:
-    """Of the error of a step, such as 1e-4."""
+    """A largest error of a step, such as 1e-4."""
     value = as_number(text)
     check_tolerance(value)
     return value

@@ -1,15 +1,14 @@
-"""``gfor bind``: a draft of what a foreign FMU's variables mean at our port."""
+"""``gfor fmu bind``: a draft of what a foreign FMU's variables mean at our port."""
 
 import argparse
 from pathlib import Path
 
-from orchestrator.binding.draft import draft_binding
+from orchestrator.api.binding import bind
 from orchestrator.binding.tables import REQUIRED
 from orchestrator.cli.arguments import option, switch
-from orchestrator.errors import InputError, ResultsError
+from orchestrator.errors import InputError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.devices import NO_BUS, is_controller_alone
-from orchestrator.safe_files import write_text
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,11 +23,7 @@ def run(options: argparse.Namespace) -> int:
     out = options.out or Path(f"{options.file.stem}.toml")
     if out.exists() and not options.force:
         raise InputError(f"{out}: the file is there already, perhaps filled in; choose another with --out, or --force")
-    text = draft_binding(description, out.parent)
-    try:
-        write_text(out, text)
-    except ResultsError as error:
-        raise InputError(f"--out {error}") from error
+    text = bind(options.file, out)
     marked = [line.strip() for line in text.splitlines() if REQUIRED in line and not line.startswith("#")]
     if is_controller_alone(description):
         print(f"{options.file}: {NO_BUS}; a binding makes a device of it only where its DLL is a whole converter")

@@ -1,4 +1,4 @@
-"""``gfor black-box``: modes of a system with a device that is known only through FMI."""
+"""``gfor modes --black-box --component``: modes of a system with a device that is known only through FMI."""
 
 import argparse
 from pathlib import Path
@@ -12,26 +12,16 @@ from orchestrator.analysis.stability import Stability, judge
 from orchestrator.black_box.coupled_modes import BoxedSystem, component_participation, is_black_box, linearize_with_box
 from orchestrator.black_box.files import identification_json, save_identification
 from orchestrator.black_box.passivity import passivity
-from orchestrator.cli.arguments import option, switch
-from orchestrator.cli.case_arguments import add_case_arguments, prepare
-from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
+from orchestrator.cli.case_arguments import prepare
+from orchestrator.cli.excitation import excitation_of
 from orchestrator.cli.terminal import make_console, print_json, said_stages, warn
-from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
+from orchestrator.cli.verdict import exit_code, print_stability
 from orchestrator.errors import InputError
 from orchestrator.report.tables import make_table
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 from orchestrator.study.modes import modes_of, running
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_case_arguments(parser)
-    parser.add_argument("--component", required=True, metavar="NAME", help="the component to take for a black box")
-    option(parser, "--out", "DIR", "folder (default: results/<case>_black_box)", read=Path)
-    add_excitation_arguments(parser)
-    switch(parser, "--json", "print JSON")
-    add_verdict_argument(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""``gfor build``: FMUs of the catalogue's models."""
+"""``gfor fmu build``: FMUs of the catalogue's models."""
 
 import argparse
 from pathlib import Path
@@ -22,12 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--dest", "DIR", "folder (default: here)", read=Path, default=Path())
     switch(parser, "--native", "compiled FMUs with no Python in them")
     parser.add_argument("--fmi", choices=("2.0", "3.0"), default="2.0", help="version of FMI (3.0: native only)")
-    parser.add_argument(
-        "--platform",
-        action="append",
-        choices=sorted(TARGETS),
-        help="compile for this platform (repeatable; default: this machine's, for native FMUs all)",
-    )
+    parser.add_argument("--platform", action="append", choices=sorted(TARGETS), help="compile for this platform "
+                        "(repeatable; default: this machine's, for native FMUs all)")  # fmt: skip
     for part in PARTS:
         parser.add_argument(
             f"--{part}", metavar="PART", help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}"

@@ -25,12 +25,8 @@ def add_case_arguments(
     """The case, which may be left out where ``optional``, ``several`` scenarios or one, what is changed; its schedule
     where asked for.
     """
-    parser.add_argument(
-        "case",
-        metavar="CASE",
-        nargs="?" if optional else None,
-        help="a built-in case (two_area), or the path of a case file or an .ssp",
-    )
+    parser.add_argument("case", metavar="CASE", nargs="?" if optional else None, help="a built-in case (two_area), or "
+                        "the path of a case file or an .ssp")  # fmt: skip
     text = f"only this scenario{' (repeatable)' if several else ''}"
     repeatable(parser, "--scenario", "NAME", text)
     repeatable(parser, "--set", "COMPONENT.PARAMETER=VALUE", "override a value (repeatable)", read=assignment)
@@ -40,19 +36,12 @@ def add_case_arguments(
     option(parser, "--step", "H", "communication step [s], e.g. 1e-4 or '200 us'", read=seconds)
     if schedule:
         add_schedule_argument(parser)
-        parser.add_argument(
-            "--sharing",
-            choices=[str(rule) for rule in SharingRule],
-            help="how the other units feed what units fed that --set takes out of service (default: as the case says, "
-            "which is by droop)",
-        )
-    parser.add_argument(
-        "--native",
-        dest="set",
-        action="append_const",
-        const=("*.native", True),
-        help="run native FMUs instead of Python-backed ones; short for --set '*.native=true'",
-    )
+        parser.add_argument("--sharing", choices=[str(rule) for rule in SharingRule], help="how the other units feed "
+                            "what units fed that --set takes out of service (default: as the case says, which is by "
+                            "droop)")  # fmt: skip
+    parser.add_argument("--native", dest="set", action="append_const", const=("*.native", True),
+                        help="run native FMUs instead of Python-backed ones; short for --set "
+                        "'*.native=true'")  # fmt: skip
 
 
 def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies [Hz] (0.1:2)") -> None:
@@ -60,13 +49,9 @@ def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies
 
 
 def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
-    """In which order components step."""
-    parser.add_argument(
-        "--schedule",
-        choices=SCHEDULES,
-        help="in which order components step, and what their inputs do meanwhile: midpoint and newton are of second "
-        "order in the step (default: the case's)",
-    )
+    parser.add_argument("--schedule", choices=SCHEDULES, help="in which order components step, and what their inputs "
+                        "do meanwhile: midpoint and newton are of second order in the step (default: the "
+                        "case's)")  # fmt: skip
 
 
 def add_trust_argument(parser: argparse.ArgumentParser) -> None:

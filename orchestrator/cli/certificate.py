@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,8 @@ from rich.markup import escape
 
 from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.certificate import Certificate, Judged
-from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_case import rated_frequency
-from orchestrator.certification.codes.certificate import CodeCertificate, certify_code
+from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.declared import checked
 from orchestrator.certification.codes.frequency_domain import (
     figures_of_stiffness,
@@ -24,8 +23,8 @@ from orchestrator.certification.codes.frequency_domain import (
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.devices import Device
 from orchestrator.certification.files import JSON, save
-from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
-from orchestrator.certification.study import certify
+from orchestrator.certification.issue import NTS631, WITH_VERDICT, bench_request, issue_of
+from orchestrator.certification.request import REACTANCES, STUDY
 from orchestrator.certification.verdict import exit_code
 from orchestrator.cli.certificate_screen import show
 from orchestrator.cli.certify_sensitivities import find_needs
@@ -34,19 +33,15 @@ from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console, make_errors, print_json, said_stages
 from orchestrator.errors import InputError
-from orchestrator.fmi.devices import as_device
-from orchestrator.points.executor import Executor
-from orchestrator.points.points import CountReport
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
-NTS631, GB, ALL = "nts631", "gb", "all"
-CODE_NAMES = (NTS631, *CODES, *BY_DECLARATION, GB, ALL)  # what ``--code`` takes
+GB, ALL = "gb", "all"
+CODE_NAMES = (*WITH_VERDICT, GB, ALL)  # what ``--code`` takes
 
 
 def codes_of(asked: str) -> tuple[str, ...]:
-    """The codes with a verdict that an option ``--code`` asks for."""
-    return (NTS631, *CODES, *BY_DECLARATION) if asked == ALL else (asked,)
+    return WITH_VERDICT if asked == ALL else (asked,)
 
 
 def run_one(options: argparse.Namespace, device: Device) -> int:
@@ -54,9 +49,6 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
     key = options.code
     if key != NTS631:
         check_code_options(options, [device])
-    elif options.declare:
-        raise InputError(f"--declare {options.declare[0][0]}: the damping test takes no declared value; leave it out, "
-                         f"or choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
     folder = options.out or Path("results") / f"certify_{device.name}{'' if key == NTS631 else f'_{key}'}"
     console = make_console(stderr=options.json)
     found, files = certified(options, device, key, folder, console)
@@ -83,42 +75,23 @@ def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -
         raise InputError(f"--set {study[0]}: the test bench has no such component; give values of the converter only")
 
 
-def bench_request(device: Device) -> CertificationRequest:
-    """A checked request for a device on the test bench."""
-    request = CertificationRequest(as_device(device.file, device.binding), device.binding, device.values)
-    request.check()
-    return request
-
-
-def _norm_request(options: argparse.Namespace, device: Device) -> CertificationRequest:
-    study = {name: value for name, value in device.values.items() if name.split(".")[0] in STUDY}
-    own = {name: value for name, value in device.values.items() if name not in study}
-    fmu = as_device(device.file, device.binding)
-    request = CertificationRequest(fmu, device.binding, own, options.pod, options.reactances, study, options.black_box)
-    request.check()
-    return request
-
-
 def certified(
     options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
 ) -> tuple[Certificate[Judged], list[Path]]:
     """Compute a certificate with its acceptance tests, and write its files; points are kept as they come."""
-    study: Callable[[Executor, CountReport], Certificate[Judged]]
-    if key == NTS631:
-        request, module, what = _norm_request(options, device), "point", "points"
-        study = lambda executor, report: certify(request, executor, folder, report)  # noqa: E731
-    else:
-        code = code_for(key, dict(options.declare))
-        request, module, what = bench_request(device), "codes.bench_point", "rows"
-        study = lambda executor, report: certify_code(request, code, executor, folder, report=report)  # noqa: E731
+    issue = issue_of(
+        key, device.file, device.binding, device.values, declared=dict(options.declare), pod=options.pod,
+        reactances=options.reactances, black_box=options.black_box,
+    )  # fmt: skip
+    request = issue.request
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     made_folder(folder, "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        executor = choose_executor(options, [f"orchestrator.certification.{module}"])
-        told = (f"{device.name}, {key}: computing", what)
-        found = progress.compute(lambda report: study(executor, report), executor, console, told)
+        executor = choose_executor(options, [issue.worker])
+        told = (f"{device.name}, {key}: computing", issue.rows)
+        found = progress.compute(lambda report: issue.compute(executor, folder, report), executor, console, told)
         if acceptance is not None:
             acceptance.keep(folder)
         elif not options.no_check:
@@ -154,7 +127,7 @@ def run_stiffness(options: argparse.Namespace, device: Device) -> int:
 
 def measured_figures(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
     """Measure a converter and write its files; says on standard error what is being done."""
-    request = bench_request(device)
+    request = bench_request(device.file, device.binding, device.values)
     made_folder(folder, "--out")
     with said_stages() as report:
         f_n = rated_frequency(request, 50.0)

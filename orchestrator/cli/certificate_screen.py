@@ -56,7 +56,7 @@ def _verdicts(found: CodeCertificate) -> PlainTable:
 
 
 def _remarks(found: CodeCertificate) -> list[str]:
-    """Of the device, of its acceptance tests, and of what was not tested, each once."""
+    """Remarks on the device, its acceptance tests and parts not tested, each once."""
     said = _misfits(r.findings for r in found.results.values())
     if isinstance(found.description, BoundDescription):
         said += [f"the binding has {text}" for text in found.description.unlike_delivered().values()]

@@ -14,9 +14,10 @@ from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.declared import checked
 from orchestrator.certification.codes.frequency_domain import stiffness_in_words
 from orchestrator.certification.devices import Device
+from orchestrator.certification.issue import NTS631
 from orchestrator.certification.matrix import FIGURES, NOT_TESTED, CertificateMatrix, MatrixCell
 from orchestrator.certification.matrix_record import READING, in_words, matrix_json, save_matrix
-from orchestrator.cli.certificate import ALL, GB, NTS631, certified, check_code_options, codes_of, measured_figures
+from orchestrator.cli.certificate import ALL, GB, certified, check_code_options, codes_of, measured_figures
 from orchestrator.cli.certificate_screen import show
 from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.terminal import make_console, make_errors, print_json
@@ -41,8 +42,8 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
         check_code_options(options, devices)
     if several and options.check:
         raise InputError(
-            f"--check {options.check}: a report of `gfor check` is of one FMU, and there are {len(devices)}; leave it "
-            "out to have the tests run, or give --no-check"
+            f"--check {options.check}: a report of `gfor fmu check` is of one FMU, and there are {len(devices)}; leave "
+            "it out to have the tests run, or give --no-check"
         )
     folder = options.out or Path("results") / f"certify_{'matrix' if several else devices[0].name}"
     made_folder(folder, "--out")
@@ -104,7 +105,7 @@ def _tested(
 def _take_needs(
     options: argparse.Namespace, found: CodeCertificate, cell: MatrixCell, folder: Path, console: Console
 ) -> None:
-    """What the failed criteria would take; where that cannot be found, the certificate stands."""
+    """Find the needs of failed criteria; where that fails, the certificate stands."""
     if not options.json:
         console.print(escape(f"{cell.device}, {cell.code}:"), highlight=False)
     note = _Note()

@@ -33,17 +33,15 @@ def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--sensitivities", action="store_true",
                        help="run every failed row again with each tunable parameter changed to either side, and say "
                        "how each moves the margin of each failed criterion")  # fmt: skip
-    group.add_argument(
-        "--parameter", action="append", default=[], metavar="PARAMETER",
-        help="only this one, tunable or fixed; also a pattern (repeatable; default: all tunable ones)",
-    )  # fmt: skip
+    group.add_argument("--parameter", action="append", default=[], metavar="PARAMETER", help="only this one, tunable "
+                       "or fixed; also a pattern (repeatable; default: all tunable ones)")  # fmt: skip
     group.add_argument("--fixed", action="store_true", help="fixed parameters too")
     group.add_argument(
         "--change", type=relative_change, metavar="PERCENT",
         help=f"by so much of itself a parameter is changed to either side (default: {100 * CHANGE:g} percent)",
     )  # fmt: skip
     group.add_argument("--confirm", action="store_true",
-                       help="run the one change that a straight line lets expect most of")  # fmt: skip
+                       help="run the single change predicted to help most")  # fmt: skip
 
 
 def relative_change(text: str) -> float:

@@ -1,4 +1,4 @@
-"""``gfor check``: acceptance tests of an FMU."""
+"""``gfor fmu check``: acceptance tests of an FMU."""
 
 import argparse
 import json
@@ -29,7 +29,7 @@ NOT_SUPPORTED = 2  # exit code where nothing failed, but the FMU could not be ru
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    option(parser, "--binding", "FILE.toml", "what its variables mean (`gfor bind`)", read=Path)
+    option(parser, "--binding", "FILE.toml", "what its variables mean (`gfor fmu bind`)", read=Path)
     option(parser, "--step", "H", "communication step of use [s]", read=read_positive)
     option(parser, "--case", "CASE", "with a case's step, operating point, values and binding")
     option(parser, "--component", "NAME", "which of the case's components it is")
@@ -40,13 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--json", "print JSON")
     option(parser, "--junit", "FILE.xml", "write the results for a CI server", read=Path)
     option(parser, "--time-limit", "S", "for one call [s] (default: 30)", read=read_positive, default=30.0)
-    parser.add_argument(
-        "--memory-limit",
-        type=read_value,
-        default=4096.0,
-        metavar="MB",
-        help="of the FMU's process [MB], or with a unit such as '4 GB' (default: 4096)",
-    )
+    parser.add_argument("--memory-limit", type=read_value, default=4096.0, metavar="MB", help="of the FMU's process "
+                        "[MB], or with a unit such as '4 GB' (default: 4096)")  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:
@@ -78,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _each_once(results: list[CheckResult]) -> list[CheckResult]:
-    """What was not asked for one and the same reason goes into one line."""
+    """Join checks that were left out for the same reason in one line."""
     lines: list[CheckResult] = []
     for result in results:
         if result.verdict is Verdict.NOT_APPLICABLE and lines and lines[-1].evidence == result.evidence:

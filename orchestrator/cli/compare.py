@@ -1,4 +1,4 @@
-"""``gfor compare``: two recorded runs side by side."""
+"""``gfor signal compare``: two recorded runs side by side."""
 
 import argparse
 from pathlib import Path

@@ -24,24 +24,16 @@ from orchestrator.points.store import PointStore, any_kept
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, several=False)
-    parser.add_argument(
-        "--controller",
-        action="append",
-        required=True,
-        choices=DAMPING_CONTROLLERS,
-        help="the controller to design (with --points repeatable)",
-    )
+    parser.add_argument("--controller", action="append", required=True, choices=DAMPING_CONTROLLERS,
+                        help="the controller to design (with --points repeatable)")  # fmt: skip
     repeatable(parser, "--component", "NAME", "the converter, or a pattern such as 'gfor*' for several with one "
                "setting (default: all with this POD); with --points repeatable: each gets a setting of "
                "its own")  # fmt: skip
     repeatable(parser, "--mode", "NAME", "the case's mode to damp (default: its first); with --points repeatable, all "
                "from 0.1 to 2 Hz by default")  # fmt: skip
-    parser.add_argument(
-        "--gain-from",
-        choices=("non-compensated", "compensated"),
-        default="non-compensated",
-        help="sensitivity that the gain is computed from, without or with the lead/lag (default: non-compensated)",
-    )
+    parser.add_argument("--gain-from", choices=("non-compensated", "compensated"), default="non-compensated",
+                        help="sensitivity that the gain is computed from, without or with the lead/lag (default: "
+                        "non-compensated)")  # fmt: skip
     add_request_arguments(parser, DesignRequest)
     switch(parser, "--no-margins", "leave out the margins, which take longest")
     switch(parser, "--json", "print JSON")
@@ -113,7 +105,7 @@ def _check_over_points(options: argparse.Namespace) -> None:
 
 
 def _how_it_goes_on(folder: Path) -> str:
-    """What an interrupt leaves; "" where that is nothing, and no empty folder either."""
+    """How to go on after an interrupt; "" and no empty folder where nothing is kept."""
     if any_kept(folder):
         return f"what was computed is in {folder}; the same command continues from there"
     with suppress(OSError):
@@ -130,7 +122,6 @@ def _request(options: argparse.Namespace) -> DesignRequest:
 
 
 def _command_line(options: argparse.Namespace, request: DesignRequest) -> str:
-    """The command that was given, with all that is not left to its default."""
     words = ["gfor", "design", str(options.case), "--controller", *options.controller]
     single = {"--component": request.component, "--mode": request.mode, "--damping": _in_percent(request.damping),
               "--damping-increment": _in_percent(options.damping_increment), "--stages": request.stages,
@@ -165,5 +156,4 @@ def _writable(path: Path) -> Path:
 
 
 def _in_percent(ratio: float | None) -> str | None:
-    """A damping ratio as the options take it."""
     return None if ratio is None else f"{100 * ratio:g}%"

@@ -77,7 +77,6 @@ def _exit_code(verdict: PointsVerdict, *, fail_unstable: bool) -> int:
 
 
 def _command_line(options: argparse.Namespace, request: PointsDesignRequest) -> str:
-    """The command that was given, with all that is not left to its default."""
     chosen = ["gfor", "design", str(options.case), "--points", str(options.points)]
     several = {"--controller": options.controller, "--component": options.component, "--mode": options.mode,
                "--scenario": options.scenario, "--parameters": options.parameters}  # fmt: skip

@@ -22,6 +22,14 @@ def add_excitation_arguments(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--no-state", "never save or restore the FMU's state")
 
 
+def excitation_given(options: argparse.Namespace) -> list[str]:
+    """Options of the excitation that are not left to their defaults."""
+    said = {"--method": options.method != _DEFAULTS.method, "--amplitude": options.amplitude != _DEFAULTS.amplitude,
+            "--from-hz": options.from_hz != _DEFAULTS.lowest_hz, "--to-hz": options.to_hz != _DEFAULTS.highest_hz,
+            "--no-state": options.no_state}  # fmt: skip
+    return [name for name, is_said in said.items() if is_said]
+
+
 def excitation_of(options: argparse.Namespace) -> Excitation:
     if not options.from_hz < options.to_hz:
         raise InputError(f"--from-hz {options.from_hz:g} must be below --to-hz {options.to_hz:g}")

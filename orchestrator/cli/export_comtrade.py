@@ -1,4 +1,4 @@
-"""``gfor export-comtrade``: recorded signals as a COMTRADE recording for other tools."""
+"""``gfor export comtrade``: recorded signals as a COMTRADE recording for other tools."""
 
 import argparse
 from pathlib import Path

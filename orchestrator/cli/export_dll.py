@@ -1,4 +1,4 @@
-"""``gfor export-dll``: a converter's control part as IEEE/CIGRE DLL for EMT programs."""
+"""``gfor export dll``: a converter's control part as IEEE/CIGRE DLL for EMT programs."""
 
 import argparse
 from pathlib import Path

@@ -1,25 +1,12 @@
-"""``gfor export-ssp``: scenarios of a case as SSP archives."""
+"""``gfor export ssp``: scenarios of a case as SSP archives."""
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-from fmus.toolchain.archive import write_archive
-from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.api.export import write_ssp
 from orchestrator.cli.arguments import option, seconds
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.errors import InputError
-from orchestrator.ssp.study import study_of
-from orchestrator.ssp.writing import ssp_members
-
-_TABLES: dict[str, Any] = {
-    "source": True,
-    "analysis": True,
-    "plots": True,
-    "reference": True,
-    "solver": {"record_interval", "record", "record_filter"},
-}
-"""What of a case file SSP has no place for and no structure of our annotation holds."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,24 +28,6 @@ def run(options: argparse.Namespace) -> int:
         )
     for prepared in scenarios:
         target = out if out is not None and single else (out or Path()) / f"{prepared.case.name}_{prepared.name}.ssp"
-        try:
-            _write(prepared, target)
-        except OSError as error:
-            raise InputError(f"--out {target}: it cannot be written: {error.strerror}; choose another place") from error
+        write_ssp(prepared, target)
         print(target)
     return 0
-
-
-def _write(prepared: PreparedScenario, target: Path) -> None:
-    case = prepared.case
-    tables: dict[str, Any] = case.table.model_dump(
-        mode="json", by_alias=True, exclude_none=True, exclude_unset=True, include=_TABLES
-    )
-    study = study_of(
-        prepared.name, prepared.title, prepared.step_size, prepared.schedule, prepared.events, _filled(tables)
-    )
-    write_archive(target, ssp_members(case.name, case.table.title, prepared.system, prepared.stop_time, study))
-
-
-def _filled(tables: dict[str, Any]) -> dict[str, Any]:
-    return {name: table for name, table in tables.items() if table}

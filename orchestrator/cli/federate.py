@@ -1,4 +1,4 @@
-"""``gfor federate``: one component of a case as a federate, for a run that goes on elsewhere."""
+"""``gfor master federate``: one component of a case as a federate, for a run that goes on elsewhere."""
 
 import argparse
 import os

@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(group, "--federate", "NAME,NAME", "components that become federates on this machine (default: all but the "
            "grid)", read=names, default=())  # fmt: skip
     group.add_argument("--external", type=names, default=(), metavar="NAME,NAME",
-                       help="components whose federates others start: `gfor federate`, or a program")  # fmt: skip
+                       help="components whose federates others start: `gfor master federate` or a program")  # fmt: skip
     option(group, "--broker", "ADDRESS", "a broker that runs, such as tcp://host:23405 (default: gfor starts one for "
            "this machine alone)")  # fmt: skip
     option(group, "--broker-port", "PORT",

@@ -1,4 +1,4 @@
-"""``gfor identify``: the modes in a recorded signal."""
+"""``gfor signal identify``: the modes in a recorded signal."""
 
 import argparse
 from pathlib import Path

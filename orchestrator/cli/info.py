@@ -1,4 +1,4 @@
-"""``gfor info``: what an FMU declares."""
+"""``gfor fmu info``: what an FMU declares."""
 
 import argparse
 from pathlib import Path

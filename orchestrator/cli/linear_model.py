@@ -1,4 +1,4 @@
-"""``gfor build --with-linear-model``: which component of which case the model inside the FMU is of."""
+"""``gfor fmu build --with-linear-model``: which component of which case the model inside the FMU is of."""
 
 import argparse
 
@@ -13,13 +13,9 @@ OPTION = "--with-linear-model"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of ``gfor build``."""
-    parser.add_argument(
-        OPTION,
-        dest="linear_case",
-        metavar="CASE",
-        help="pack the model's linear model at the steady state of this case into the FMU",
-    )
+    """Options of ``gfor fmu build``."""
+    parser.add_argument(OPTION, dest="linear_case", metavar="CASE", help="pack the model's linear model at the steady "
+                        "state of this case into the FMU")  # fmt: skip
     option(parser, "--scenario", "NAME", "scenario of that case (default: its only one)")
     option(parser, "--component", "NAME", "component of that case (default: the only one of this model)")
 
@@ -52,7 +48,6 @@ def _component(wanted: str | None, model: str, prepared: PreparedScenario) -> st
 
 
 def _one(option: str, what: str, wanted: str | None, known: list[str], where: str) -> str:
-    """The one that is wanted, or the only one there is."""
     if wanted is None and len(known) == 1:
         return known[0]
     if wanted not in known:

@@ -1,4 +1,4 @@
-"""``gfor linearize``: a scenario's A, B, C, D for other tools."""
+"""``gfor export linear``: a scenario's A, B, C, D for other tools."""
 
 import argparse
 from pathlib import Path
@@ -16,18 +16,10 @@ from orchestrator.study.linear_model_files import save_linear_model
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
-    parser.add_argument(
-        "--input",
-        action="append",
-        metavar="COMPONENT.VARIABLE",
-        help="tunable parameter or open input (repeatable; default: what the scenario's events change)",
-    )
-    parser.add_argument(
-        "--output",
-        action="append",
-        metavar="COMPONENT.VARIABLE",
-        help="observed output (repeatable; default: what the case plots)",
-    )
+    parser.add_argument("--input", action="append", metavar="COMPONENT.VARIABLE", help="tunable parameter or open "
+                        "input (repeatable; default: what the scenario's events change)")  # fmt: skip
+    parser.add_argument("--output", action="append", metavar="COMPONENT.VARIABLE", help="observed output (repeatable; "
+                        "default: what the case plots)")  # fmt: skip
     switch(parser, "--continuous", "ẋ = A·x + B·u instead of the step map")
     option(parser, "--out", "DIR", "folder (default: results/<case>_linear)", read=Path)
     add_verdict_argument(parser)

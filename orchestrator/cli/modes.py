@@ -7,10 +7,12 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.scenario import Scenario
 from orchestrator.asked import read_percent
 from orchestrator.cli.arguments import option, switch
 from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, chosen
+from orchestrator.cli.excitation import add_excitation_arguments, excitation_given
 from orchestrator.cli.terminal import (
     make_console,
     print_json,
@@ -34,17 +36,15 @@ from orchestrator.study.modes import modes_json
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
     add_range_argument(parser, "frequencies shown [Hz] (default: 0.1:2)")
-    parser.add_argument(
-        "--critical",
-        type=read_percent,
-        nargs="?",
-        const=0.2,
-        metavar="PERCENT",
-        help="only modes with less damping than this (20 by default), by sparse search instead of the full spectrum",
-    )
+    parser.add_argument("--critical", type=read_percent, nargs="?", const=0.2, metavar="PERCENT",
+                        help="only modes with less damping than this (20 by default), by sparse search instead of the "
+                        "full spectrum")  # fmt: skip
     switch(parser, "--directional", "linearise with the FMUs' own directional derivatives instead of by perturbation "
            "(with --native)")  # fmt: skip
     switch(parser, "--black-box", "identify the components that hide their states from their inputs and outputs")
+    option(parser, "--component", "NAME", "with --black-box: take this one for a black box, beside the modes from its "
+           "states; its admittance and model go to --out (default: results/<case>_black_box)")  # fmt: skip
+    add_excitation_arguments(parser)
     option(parser, "--out", "DIR", "write modes, participation, shapes and plots there", read=Path)
     switch(parser, "--json", "print JSON")
     add_verdict_argument(parser)
@@ -53,6 +53,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compute, print, and write what is asked for, while no other command works in the folder of the results."""
+    if options.component is not None:
+        return _with_a_black_box(options)
+    if excited := excitation_given(options):
+        raise InputError(f"{excited[0]} is for a black box of its own: give --black-box --component NAME as well")
     scenarios = chosen(options)
     if options.critical is not None and not options.range[0] > 0:
         raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
@@ -63,8 +67,21 @@ def run(options: argparse.Namespace) -> int:
         return _compute(scenarios, options, folder)
 
 
+def _with_a_black_box(options: argparse.Namespace) -> int:
+    from orchestrator.cli import black_box  # noqa: PLC0415 - only here
+
+    if not options.black_box:
+        raise InputError("--component names what is taken for a black box: give --black-box as well")
+    others = {"--critical": options.critical is not None, "--directional": options.directional,
+              "--range": options.range != ELECTROMECHANICAL_HZ, "--details": options.details}  # fmt: skip
+    if given := [name for name, is_given in others.items() if is_given]:
+        raise InputError(
+            f"{given[0]} does not go with --component, which shows all modes of one black box; leave it out"
+        )
+    return black_box.run(options)
+
+
 def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
-    """See `run`."""
     if options.black_box:
         with said_stages() as report:
             results = [

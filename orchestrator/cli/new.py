@@ -16,15 +16,15 @@ _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "files", nargs="*", type=Path, metavar="FILE",
-        help="the network: .raw (with .dyr), .m, .mat, pandapower's .json, a CGMES model; without any, gfor asks",
-    )  # fmt: skip
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="the network: .raw (with .dyr), .m, .mat, "
+                        "pandapower's .json, a CGMES model; without any, gfor asks")  # fmt: skip
     parser.add_argument("--converter", metavar="TEXT", help="'bus 9, 300 MVA, 200 MW, less sg3'")
     device = parser.add_mutually_exclusive_group()
     device.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="a vendor's FMU in place of our converter")
     device.add_argument("--dll", type=Path, metavar="FILE", help="a vendor's DLL, or the file of a device around one")
-    parser.add_argument("--binding", type=Path, metavar="FILE.toml", help="what the FMU's variables mean (`gfor bind`)")
+    parser.add_argument(
+        "--binding", type=Path, metavar="FILE.toml", help="what the FMU's variables mean (`gfor fmu bind`)"
+    )
     parser.add_argument("--models", choices=("emt", "phasor"), help="default: phasor, with a vendor's file EMT")
     parser.add_argument("--frequency", metavar="HZ", help="'60 Hz', where the network's file does not say it")
     parser.add_argument("--leave-out", action="append", default=[], metavar="KIND", help="elements of the network that "
@@ -104,7 +104,7 @@ def _ask(options: argparse.Namespace) -> None:
         device = line("A vendor's FMU [our converter]")
         if device:
             options.fmu = Path(device)
-            binding = line("Its binding, as `gfor bind` drafts it [none]")
+            binding = line("Its binding, as `gfor fmu bind` drafts it [none]")
             options.binding = Path(binding) if binding else None
     default = f"{options.files[0].stem}.toml"
     options.out = options.out or Path(line(f"Case file [{default}]") or default)

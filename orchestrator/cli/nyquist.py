@@ -1,4 +1,4 @@
-"""``gfor nyquist``: whether a device is stable at a network, from scans, FMUs and cases."""
+"""``gfor fmu nyquist``: whether a device is stable at a network, from scans, FMUs and cases."""
 
 import argparse
 import json

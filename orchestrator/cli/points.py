@@ -59,7 +59,7 @@ class Progressing:
                 executor.close()
 
     def how_it_goes_on(self) -> str:
-        """What an interrupt leaves; "" where that is nothing."""
+        """How to go on after an interrupt; "" where nothing is kept."""
         if not any_kept(self._folder / POINTS) or (self._total and not self._done):
             return ""
         counted = f"{self._done} of {self._total} points" if self._total else "points"

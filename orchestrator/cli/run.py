@@ -151,8 +151,8 @@ def _say_unfinished(folder: Path) -> None:
     begun = [path.name for path in unfinished(folder)]
     if begun:
         text = (
-            f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; `gfor identify` "
-            "and `gfor compare` read them, and you may delete those that you do not need"
+            f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; "
+            "`gfor signal identify` and `compare` read them, and you may delete those that you do not need"
         )
         say("warning", [text])
 
@@ -182,7 +182,6 @@ def _run_into(
 def _early_end(
     name: str, error: BaseException, scenarios: Sequence[Scenario], results: Sequence[RunResult]
 ) -> EarlyEnd:
-    """Where a study ended, and what never began."""
     titles = {scenario.name: scenario.title for scenario in scenarios}
     names = list(titles)
     never = {later: titles[later] for later in names[names.index(name) + 1 :]}

@@ -1,4 +1,4 @@
-"""What a run was asked for, kept beside its checkpoints: ``gfor run --resume`` asks it again."""
+"""The request of a run, kept beside its checkpoints for ``gfor run --resume``."""
 
 import argparse
 import json

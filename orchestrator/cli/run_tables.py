@@ -1,4 +1,4 @@
-"""What ``gfor run`` prints of its results, the worst first."""
+"""Tables of ``gfor run``, the worst result first."""
 
 from collections.abc import Sequence
 

@@ -30,19 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, several=False)
     option(parser, "--points", "FILE",
            "operating points: a CSV file, a row each (default: the case as it is)", read=Path)  # fmt: skip
-    parser.add_argument(
-        "--outages", action=Joined, metavar="WHICH",
-        help="n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--sharing", choices=[str(rule) for rule in SharingRule],
-        help="who feeds what an outage takes: units by droop and rating (default), by rating, or the slack alone",
-    )  # fmt: skip
+    parser.add_argument("--outages", action=Joined, metavar="WHICH", help="n-1, lines, units, or names such as "
+                        "line_1_2,sg3 or line_1_2+sg3 (repeatable)")  # fmt: skip
+    parser.add_argument("--sharing", choices=[str(rule) for rule in SharingRule], help="who feeds what an outage "
+                        "takes: units by droop and rating (default), by rating, or the slack alone")  # fmt: skip
     add_range_argument(parser)
-    parser.add_argument(
-        "--damping", type=partial(read_percent, most=100 * MOST_DAMPING), default=0.2, metavar="PERCENT",
-        help="damping below which a mode is critical, at most 60 (default: 20)",
-    )  # fmt: skip
+    parser.add_argument("--damping", type=partial(read_percent, most=100 * MOST_DAMPING), default=0.2,
+                        metavar="PERCENT", help="damping below which a mode is critical, at most 60 (default: "
+                        "20)")  # fmt: skip
     switch(parser, "--whole", "count growing modes of all frequencies at every point; takes longer")
     option(parser, "--shard", "I/N", "compute the part I of N only, and keep its points", read=Shard.parse)
     repeatable(parser, "--merge", "DIR", "take the points that a part kept there", read=Path)

@@ -47,7 +47,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
-    """See `run`."""
     found = []
     for scenario in scenarios:
         with shown_progress("Parameters", shown=not options.json) as report:

@@ -1,4 +1,4 @@
-"""``gfor source``: where the oscillations of a run or a recording come from."""
+"""``gfor signal source``: where the oscillations of a run or a recording come from."""
 
 import argparse
 from pathlib import Path

@@ -17,21 +17,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
     option(parser, "--error", "HZ:POINTS", "accepted error of a critical mode's frequency [Hz] and damping [points] "
            "(default: 0.001:0.1)", read=_error, default=Allowed())  # fmt: skip
-    parser.add_argument(
-        "--try",
-        dest="tried",
-        type=_steps,
-        default=[],
-        metavar="H,H,...",
-        help="communication steps to try, such as '100 us,500 us' (default: 0.5 to 50 times the case's own)",
-    )
-    parser.add_argument(
-        "--schedule",
-        action="append",
-        choices=SCHEDULES,
-        default=None,
-        help=f"schedule to try (repeatable; default: {', '.join(TRIED)})",
-    )
+    parser.add_argument("--try", dest="tried", type=_steps, default=[], metavar="H,H,...", help="communication steps "
+                        "to try, such as '100 us,500 us' (default: 0.5 to 50 times the case's own)")  # fmt: skip
+    parser.add_argument("--schedule", action="append", choices=SCHEDULES, default=None,
+                        help=f"schedule to try (repeatable; default: {', '.join(TRIED)})")  # fmt: skip
     add_range_argument(parser, "frequencies of the critical modes [Hz] (default: 0.1:2)")
     switch(parser, "--json", "print JSON")
 

@@ -1,4 +1,4 @@
-"""What the commands on many points have in common: options, the folder, what is printed, and the last line."""
+"""Parts that the commands on many points share: options, the folder, what is printed, and the last line."""
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,7 +28,6 @@ class Counted(Protocol):
 
 
 def add_study_arguments(parser: argparse.ArgumentParser, study: str, what: str = "points") -> None:
-    """Where ``what`` is computed and kept, and what is printed of it."""
     add_executor_arguments(parser)
     where = f"folder for results (default: results/<case>_{study}); {what} that are there are not computed again"
     option(parser, "--out", "DIR", where, read=Path)

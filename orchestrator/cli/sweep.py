@@ -28,12 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scr", action="append", dest="vary", type=_scr, metavar="BUS=START:STOP:COUNT", help="SCR of "
                         "the converters at a bus, or its short-circuit power ('bus_9=3000 MVA:800 MVA:5'): R and X of "
                         "all branches that end there are multiplied")  # fmt: skip
-    parser.add_argument(
-        "--until",
-        metavar="unstable|PERCENT",
-        help="how far the range START:STOP may go before the system is unstable, or a mode of --range is damped less "
-        "than so many percent: coarse grid (COUNT, 9), then bisection",
-    )
+    parser.add_argument("--until", metavar="unstable|PERCENT", help="how far the range START:STOP may go before the "
+                        "system is unstable, or a mode of --range is damped less than so many percent: coarse grid "
+                        "(COUNT, 9), then bisection")  # fmt: skip
     add_range_argument(parser)
     add_study_arguments(parser, "sweep")
 

@@ -1,4 +1,4 @@
-"""What all commands print, and where to."""
+"""Printing that all commands share: consoles, JSON, progress, warnings."""
 
 from __future__ import annotations
 

@@ -31,7 +31,6 @@ def print_stability(
 
 
 def stability_lines(verdicts: Mapping[str, Stability], outside: Mapping[str, str]) -> list[str]:
-    """The lines that `print_stability` prints, as rich markup."""
     lines = [_headline(verdicts)] if len(verdicts) != 1 else []
     for title, verdict in verdicts.items():
         head = "" if len(verdicts) == 1 else "  "

@@ -7,15 +7,14 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.certification.codes.rows_anew import chosen_rows, verify_rows
-from orchestrator.certification.form import NORM
-from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED, chosen_points, verify_points
+from orchestrator.api.certification import chosen_anew, is_of_norm, verify_anew, worker_of
+from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verification, read_certificate, verify_files
 from orchestrator.cli.arguments import reactances
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.terminal import make_console, print_json
-from orchestrator.errors import INTERRUPTED, InputError
+from orchestrator.errors import INTERRUPTED
 from orchestrator.report.progress import progress_bar
 
 
@@ -46,9 +45,10 @@ def run(options: argparse.Namespace) -> int:
     The exit code of the certificate's verdict where it holds, else 5.
     """
     folder, content = read_certificate(options.certificate)
-    norm = content["format"] == NORM
+    norm = is_of_norm(content)
     console = make_console(stderr=options.json)
-    chosen = _chosen(options, folder, content, norm=norm)
+    wanted = options.points or options.rows or ()
+    chosen = [] if options.files_only else chosen_anew(folder, content, wanted, every=options.all)
     found = verify_files(folder, content)
     computed = bool(chosen) and found.holds
     if computed:
@@ -64,31 +64,15 @@ def run(options: argparse.Namespace) -> int:
     return exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
 
 
-def _chosen(options: argparse.Namespace, folder: Path, content: dict[str, Any], *, norm: bool) -> list[Any]:
-    """Line reactances, or names of rows, that are computed anew."""
-    if norm and options.rows:
-        raise InputError(f"--rows: {folder} is the certificate of a damping test, which has points; give --points, "
-                         "with line reactances")  # fmt: skip
-    if options.points and not norm:
-        raise InputError(f"--points: {folder} is the certificate of a grid code, which has rows; give --rows, with "
-                         "their names")  # fmt: skip
-    if options.files_only:
-        return []
-    if norm:
-        return chosen_points(content, options.points or (), every=options.all)
-    return chosen_rows(content, options.rows or (), every=options.all)
-
-
 def _anew(
     options: argparse.Namespace, folder: Path, content: dict[str, Any], chosen: list[Any], console: Console, *,
     norm: bool,
 ) -> Verification:  # fmt: skip
-    verify, module = (verify_points, "point") if norm else (verify_rows, "codes.bench_point")
-    executor = choose_executor(options, [f"orchestrator.certification.{module}"])
+    executor = choose_executor(options, [worker_of(content)])
     with progress_bar(console) as bar:
         task = bar.add_task("Points" if norm else "Rows", total=len(chosen) * (2 if norm else 1))
         try:
-            return verify(folder, content, chosen, executor, lambda done, _: bar.update(task, completed=done))
+            return verify_anew(folder, content, chosen, executor, lambda done, _: bar.update(task, completed=done))
         finally:
             executor.close()
 

@@ -1,4 +1,4 @@
-"""``gfor which-master``: which schedule another tool runs."""
+"""``gfor master which``: which schedule another tool runs."""
 
 import argparse
 from dataclasses import asdict

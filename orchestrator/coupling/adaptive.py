@@ -74,7 +74,6 @@ class AdaptiveLoop:
 
     @property
     def before(self) -> Values | None:
-        """See `orchestrator.coupling.turns.Loop.before`."""
         return self._inner.before
 
     @before.setter
@@ -87,7 +86,6 @@ class AdaptiveLoop:
         self._until_proof = 0
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        """See `orchestrator.coupling.turns.Loop.advance`."""
         self.completed, end = 0, index + count
         while index < end:
             # The longest stretch that begins at a whole number of its lengths: then its halves do so too.
@@ -154,7 +152,6 @@ class AdaptiveLoop:
 
     @staticmethod
     def _go_back_after(error: CosimError, start: "_Start") -> None:
-        """Go back, and say the first error where a component does not."""
         try:
             start.go_back(start.last)
         except ComponentError:
@@ -169,7 +166,7 @@ class AdaptiveLoop:
         raise _NotTakenBackError(
             f"tolerance = {self._tolerance:g}: at {time:.6g} s the same step was done twice from the same saved state, "
             f"and {turn.component.name}.{variable} differs by {apart.max():.3g}; some FMU does not restore all of its "
-            "state (`gfor check`): leave the tolerance out"
+            "state (`gfor fmu check`): leave the tolerance out"
         )
 
     def _too_coarse(self, worst: int, error: float, time: float, step: float) -> CouplingError:
@@ -194,16 +191,13 @@ class AdaptiveLoop:
                 turn.component.free_state(state)
 
     def seconds(self) -> list[float]:
-        """See `orchestrator.coupling.turns.Loop.seconds`."""
         return self._inner.seconds()
 
     @property
     def threads(self) -> int:
-        """See `orchestrator.coupling.turns.Loop.threads`."""
         return self._inner.threads
 
     def close(self) -> None:
-        """See `orchestrator.coupling.turns.Loop.close`."""
         self._inner.close()
 
 

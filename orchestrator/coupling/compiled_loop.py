@@ -32,8 +32,6 @@ _BALANCED_AT = (100, 1000, 10_000, 100_000)  # communication steps after which t
 
 
 class _Call(ctypes.Structure):
-    """``struct call``."""
-
     _fields_ = (
         ("component", ctypes.c_void_p),
         ("set_real", ctypes.c_void_p),
@@ -56,8 +54,6 @@ class _Call(ctypes.Structure):
 
 
 class _Group(ctypes.Structure):
-    """``struct group``."""
-
     _fields_ = (
         ("first", ctypes.c_int64),
         ("last", ctypes.c_int64),
@@ -70,7 +66,6 @@ class _Group(ctypes.Structure):
 
 @cache
 def loop_library() -> Any | None:
-    """The compiled loop; None where none can be compiled."""
     try:
         # PyDLL keeps Python's lock: Python-backed FMUs would only take it back at every call.
         library = ctypes.PyDLL(str(compile_here(*(Path(__file__).with_name(name) for name in SOURCES))))
@@ -154,7 +149,6 @@ class CompiledLoop:
         call.tracks = self._tracks.address(exchange.window.start or 0)
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        """See `Loop.advance`."""
         status, self.completed = 0, 0
         with calls:
             while self.completed < count and not status:
@@ -177,7 +171,6 @@ class CompiledLoop:
         self._judge(status, step_size)
 
     def _judge(self, status: int, step_size: float) -> None:
-        """Raise what a status means."""
         if status == _NOT_FINITE:
             outputs = self._exchanges[self._failure[1]].outputs
             raise not_finite(outputs, self._failure[2], (self._failure[0] + 1) * step_size)
@@ -246,16 +239,13 @@ class CompiledLoop:
                 place += 8 * self._calls[call].n_outputs
 
     def seconds(self) -> list[float]:
-        """See `Loop.seconds`."""
         seconds: list[float] = self._spent.tolist()
         return seconds
 
     @property
     def threads(self) -> int:
-        """See `Loop.threads`."""
         return 1 if self._team is None or 2 * self._together < self._done else self._team.members
 
     def close(self) -> None:
-        """See `Loop.close`."""
         if self._team is not None:
             self._team.dismiss()

@@ -163,11 +163,9 @@ class Fault(Event):
     """An event that sets no variable: nothing that looks at `Event.changes` alone knows of it."""
 
     def settings(self) -> Mapping[str, float | bool]:
-        """No variable is set."""
         return {}
 
     def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
-        """No variable is set."""
         return {}
 
 

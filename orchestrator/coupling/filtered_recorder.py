@@ -45,7 +45,6 @@ class FilteredRecorder(Recorder):
         self._pending_times: dict[int, float] = {}
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
-        """See `Observer.begin`."""
         resumed = self._position
         super().begin(run, stop_index)
         from scipy.signal import firwin  # noqa: PLC0415 - a quarter of a second that few need
@@ -64,7 +63,6 @@ class FilteredRecorder(Recorder):
             self._restore(resumed)
 
     def observe(self, run: ObservedRun) -> None:
-        """See `Observer.observe`."""
         if run.index == self._last_index:
             return  # taken up again where this step was read already
         self._last_index = run.index

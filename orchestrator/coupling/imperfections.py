@@ -97,7 +97,6 @@ class WirePlan:
 
     @property
     def is_cut(self) -> bool:
-        """Whether nothing of the signal arrives."""
         return DropOut in self.permanent
 
     @property
@@ -112,5 +111,4 @@ class WirePlan:
 
 
 def described(plans: Mapping[Any, WirePlan]) -> list[str]:
-    """The permanent imperfections of some connections, in words."""
     return [f"{plan.name}: {imperfection}" for plan in plans.values() for imperfection in plan.permanent.values()]

@@ -38,7 +38,6 @@ class PythonLoop:
         self.completed = 0
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        """See `Loop.advance`."""
         self.completed = 0
         for k in range(index, index + count):
             with calls:
@@ -84,12 +83,10 @@ class PythonLoop:
         return known
 
     def seconds(self) -> list[float]:
-        """See `Loop.seconds`."""
         return [seconds for group in self._spent for seconds in group]
 
     @property
     def threads(self) -> int:
-        """See `Loop.threads`."""
         return 1
 
     def close(self) -> None:

@@ -14,13 +14,10 @@ class Progress:
         self._total = 0
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
-        """See `Observer.begin`."""
         self._total = stop_index
 
     def observe(self, run: ObservedRun) -> None:
-        """See `Observer.observe`."""
         self._report(run.index, self._total)
 
     def end(self, run: ObservedRun) -> None:
-        """See `Observer.end`."""
         self._report(run.index, self._total)

@@ -74,12 +74,11 @@ class Recorder:
         return self._first + self._filled
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
-        """See `Observer.begin`."""
         by_component: dict[str, list[tuple[int, str]]] = {}
         for column, name in enumerate(self.names):
             component, _, variable = name.partition(".")
             if component not in run.components or variable not in run.components[component].description.variables:
-                raise InputError(f"cannot record {name!r}: there is no such variable; `gfor info` lists them")
+                raise InputError(f"cannot record {name!r}: there is no such variable; `gfor fmu info` lists them")
             by_component.setdefault(component, []).append((column, variable))
         self._batches = [
             (RealBatch(run.components[component], [v for _, v in entries]), np.array([c for c, _ in entries]))
@@ -103,7 +102,6 @@ class Recorder:
         self._times, self._block = np.empty(rows), np.empty((rows, len(self.names)))
 
     def observe(self, run: ObservedRun) -> None:
-        """See `Observer.observe`."""
         if run.index == self._last_index:
             return  # taken up again where this row was recorded already
         if self.after_exchange:

@@ -11,8 +11,6 @@ Block = tuple[int, NDArray[np.float64], NDArray[np.float64]]
 
 
 class RowSink(Protocol):
-    """Takes the rows of a `Recorder` block by block."""
-
     def begin(self, names: Sequence[str]) -> None:
         """Called once before the first block, with the names of the columns."""
 

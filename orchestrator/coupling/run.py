@@ -20,15 +20,12 @@ _LONGEST_STRETCH = 1000  # communication steps done at a stretch, so that an int
 
 
 class Run:
-    """One run, as `orchestrator.coupling.master.Master.run` makes it."""
-
     def __init__(self, stepper: Stepper, observers: Sequence[Observer], keeper: Keeper) -> None:
         self._stepper, self._observers, self._keeper = stepper, observers, keeper
         self._whole = False  # whether every observer has looked at this communication point
         self._applied = -1  # the last communication point whose events have happened
 
     def until(self, stop: int, due: Mapping[int, Sequence[Event]]) -> StepStatistics:
-        """Run to a communication point."""
         stepper, keeper = self._stepper, self._keeper
         kept = keeper.latest()
         first, start, before = stepper.index, perf_counter(), np.array(stepper.seconds())

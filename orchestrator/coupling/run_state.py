@@ -64,8 +64,6 @@ class RunState:
 
     @classmethod
     def of_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
-        """From what `arrays` gave."""
-
         def beginning(head: str) -> dict[str, NDArray[Any]]:
             return {name.removeprefix(head): values for name, values in arrays.items() if name.startswith(head)}
 
@@ -115,13 +113,10 @@ class Keeper(Protocol):
 
 
 class _NotKept:
-    """Keeps nothing."""
-
     def latest(self) -> None:
         """See `Keeper.latest`."""
 
     def is_due(self) -> bool:
-        """See `Keeper.is_due`."""
         return False
 
     def keep(self, state: Callable[[], RunState]) -> None:
@@ -150,7 +145,6 @@ def state_as_bytes(component: Component) -> bytes:
 
 
 def set_state(component: Component, content: bytes) -> None:
-    """Bring a component to where another instance of it was."""
     state = component.deserialize_state(content)
     try:
         component.restore_state(state)

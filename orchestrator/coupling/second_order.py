@@ -43,7 +43,6 @@ class _LineLoop:
         self.completed = 0
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        """See `orchestrator.coupling.loop.Loop.advance`."""
         self.completed = 0
         for k in range(index, index + count):
             with calls:
@@ -114,12 +113,10 @@ class _LineLoop:
         )
 
     def seconds(self) -> list[float]:
-        """See `orchestrator.coupling.loop.Loop.seconds`."""
         return list(self._spent.values())
 
     @property
     def threads(self) -> int:
-        """See `orchestrator.coupling.turns.Loop.threads`."""
         return 1
 
     def close(self) -> None:
@@ -159,7 +156,6 @@ class CompiledMidpointLoop(CompiledLoop):
         self._end = np.empty_like(y)
 
     def advance(self, index: int, count: int, step_size: float) -> None:
-        """See `orchestrator.coupling.turns.Loop.advance`."""
         self.before = np.array(self._y if self.before is None else self.before, dtype=float)
         with calls:
             status: int = self._library.advance_lines(
@@ -186,7 +182,6 @@ class CompiledMidpointLoop(CompiledLoop):
         super()._judge(status, step_size)
 
     def settle(self) -> None:
-        """See `MidpointLoop.settle`."""
         self._lines.settle()
 
 
@@ -282,7 +277,6 @@ class NewtonLoop(_LineLoop):
 def line_loop(
     groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule
 ) -> MidpointLoop | CompiledMidpointLoop | NewtonLoop:
-    """The loop of a schedule of second order."""
     if schedule.coupling == "newton":
         return NewtonLoop(groups, y, tracks, schedule)
     library = compiled_loop.loop_library()

@@ -12,8 +12,6 @@ HANDOVER = 2e-6
 
 @dataclass(frozen=True)
 class Shares:
-    """Who does the calls of one group."""
-
     own: tuple[int, ...]  # calls that the calling thread alone may do
     # calls of each thread, the calling one first; any of them may do those of another that has not begun them
     of: tuple[tuple[int, ...], ...]

@@ -20,8 +20,6 @@ class Endpoint:
 
 @dataclass(frozen=True, slots=True)
 class Connection:
-    """An output that feeds an input."""
-
     source: Endpoint
     target: Endpoint
 
@@ -38,8 +36,18 @@ class ComponentPlan:
     inputs: dict[str, float] = field(default_factory=dict)
     isolated: bool | None = None
 
+    @property
+    def has_port(self) -> bool:
+        """Whether it takes the voltage of its bus and gives its current."""
+        return {"v_re", "v_im"} <= {*self.description.inputs} and {"i_re", "i_im"} <= {*self.description.outputs}
+
+    @property
+    def kind(self) -> str:
+        """The model's declaration; a device's port without one is a converter's."""
+        return self.description.kind or ("converter" if self.has_port else "")
+
     def value(self, name: str) -> Scalar | None:
-        """What a parameter or an input is set to, else its start value; None where there is neither."""
+        """The value of a parameter or an input, else its start value; None without both."""
         info = self.description.variables[name]
         return self.parameters.get(name, self.inputs.get(name, info.start))
 
@@ -104,7 +112,7 @@ class System:
         self._feeding[end] = start
 
     def _sources(self) -> dict[Endpoint, Endpoint]:
-        """What feeds each connected input; collected anew where the list of connections was changed from outside."""
+        """The source of each connected input; collected anew where the list of connections was changed from outside."""
         if self._counted is not self.connections or len(self._feeding) != len(self.connections):
             self._counted = self.connections
             self._feeding = {c.target: c.source for c in reversed(self.connections)}
@@ -115,7 +123,6 @@ class System:
         self._wire(connection).disturb(imperfection)
 
     def foresee(self, connection: Connection, imperfection: Imperfection) -> None:
-        """Let an event give a connection an imperfection later."""
         later = self._wire(connection).later
         if imperfection not in later:
             later.append(imperfection)
@@ -132,7 +139,9 @@ class System:
             raise InputError(f"{label}: there is no component {component!r}; components: {known}")
         info = self.components[component].description.variables.get(variable)
         if info is None:
-            raise InputError(f"{label}: component {component!r} has no variable {variable!r}; `gfor info` lists them")
+            raise InputError(
+                f"{label}: component {component!r} has no variable {variable!r}; `gfor fmu info` lists them"
+            )
         return Endpoint(component, variable), info
 
     def unconnected_inputs(self) -> Iterator[Endpoint]:

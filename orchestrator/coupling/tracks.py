@@ -44,7 +44,6 @@ class Tracks:
         return self._table.copy()
 
     def restore(self, saved: NDArray[np.float64]) -> None:
-        """Go on from what `saved` gave."""
         self._table[:] = saved
 
     def follow(self, window: slice, values: NDArray[np.float64]) -> int | None:

@@ -34,66 +34,52 @@ class Exchange:
 
 class Stepped(Protocol):
     @property
-    def name(self) -> str:
-        """For errors."""
+    def name(self) -> str: ...
 
     @property
-    def one_thread(self) -> str | None:
-        """As `Component` has it."""
+    def one_thread(self) -> str | None: ...
 
     @property
-    def pointer(self) -> Any:
-        """As `Component` has it."""
+    def pointer(self) -> Any: ...
 
     @property
-    def set_real(self) -> Any:
-        """As `Component` has it."""
+    def set_real(self) -> Any: ...
 
     @property
-    def get_real(self) -> Any:
-        """As `Component` has it."""
+    def get_real(self) -> Any: ...
 
     @property
-    def do_step(self) -> Any:
-        """As `Component` has it."""
+    def do_step(self) -> Any: ...
 
-    def check(self, status: int, call: str, time: float | None = None) -> None:
-        """As `Component` has it."""
+    def check(self, status: int, call: str, time: float | None = None) -> None: ...
 
-    def step(self, time: float, step_size: float) -> None:
-        """As `Component` has it."""
+    def step(self, time: float, step_size: float) -> None: ...
 
 
 class Batch(Protocol):
     @property
-    def names(self) -> tuple[str, ...]:
-        """Of the variables."""
+    def names(self) -> tuple[str, ...]: ...
 
     @property
     def values(self) -> NDArray[np.float64]:
         """The values, shape (n,)."""
 
     @property
-    def arguments(self) -> tuple[Any, ...]:
-        """Of the functions that set and get them."""
+    def arguments(self) -> tuple[Any, ...]: ...
 
     @property
-    def component(self) -> Stepped:
-        """Whose they are."""
+    def component(self) -> Stepped: ...
 
 
 class Turn(Protocol):
     @property
-    def component(self) -> Stepped:
-        """What is stepped."""
+    def component(self) -> Stepped: ...
 
     @property
-    def inputs(self) -> Batch:
-        """What it takes."""
+    def inputs(self) -> Batch: ...
 
     @property
-    def outputs(self) -> Batch:
-        """What it gives."""
+    def outputs(self) -> Batch: ...
 
     @property
     def window(self) -> slice:
@@ -105,8 +91,6 @@ class Turn(Protocol):
 
 
 class Loop(Protocol):
-    """Steps a system."""
-
     def advance(self, index: int, count: int, step_size: float) -> None:
         """Do communication steps.
 

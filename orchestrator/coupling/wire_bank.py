@@ -126,7 +126,6 @@ class WireBank:
         """Nothing in a bank can fail."""
 
     def step(self, time: float, step_size: float) -> None:
-        """One communication step, in Python."""
         self._do_step(self.pointer, time, step_size, 1)
 
     # -- settings --------------------------------------------------------------------------------
@@ -168,7 +167,6 @@ class WireBank:
 
     @property
     def quiet(self) -> bool:
-        """Whether noise and quantisation are left out."""
         return bool(self._bank.quiet)
 
     @quiet.setter

@@ -63,7 +63,6 @@ class Wires:
         return [bank for bank in self.banks if bank is not None]
 
     def settle(self, *, first: bool = False) -> None:
-        """As `WireBank.settle`, of all connections."""
         for bank in self._present:
             bank.settle(self._y, first=first)
 

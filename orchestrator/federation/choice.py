@@ -21,7 +21,7 @@ DEFAULT_PORT = 23405  # of a HELICS broker whose address names none
 class Federates:
     # components that gfor starts as federates on this machine, each in a process of its own
     names: tuple[str, ...] = ()
-    # components that somebody else starts as federates: `gfor federate`, or a HELICS program of their own
+    # components that somebody else starts as federates: `gfor master federate`, or a HELICS program of their own
     external: tuple[str, ...] = ()
     # address of a broker that runs already, such as ``tcp://host:23405``; None has gfor start one
     broker: str | None = None

@@ -1,4 +1,4 @@
-"""A component of ours as a federate: the process that `federation` starts, and that `gfor federate` is.
+"""A component of ours as a federate: the process that `federation` starts, and that `gfor master federate` is.
 
 It steps one FMU, which runs in a process of its own: the libraries of HELICS and those of an FMU that share a process
 can stop each other, as a Python-backed FMU showed that was loaded after them. Numbers come and go as values of HELICS.
@@ -159,7 +159,6 @@ class OwnFederate:
         self._setting = setting
 
     def do_begin(self) -> None:
-        """Ask for the first time."""
         self._configured.set()
 
     def do_end(self) -> None:

@@ -149,7 +149,6 @@ class Federation:
     # -- conversation ----------------------------------------------------------------------------
 
     def _receive(self, kind: bytes, seconds: float) -> bytes:
-        """The hub's answer."""
         assert self._hub is not None
         deadline, asked = time.monotonic() + seconds, None
         interrupted = c_int.from_address(calls.asked_address)
@@ -194,7 +193,6 @@ class Federation:
                 self._look(time.monotonic() + _LOOK)
 
     def command(self, name: str, command: str, *arguments: Any) -> Any:
-        """See `Exchanges.command`."""
         assert self._hub is not None
         self._asked += 1
         text = json.dumps({"number": self._asked, "command": command, "arguments": arguments})
@@ -205,7 +203,6 @@ class Federation:
         return answer["result"]
 
     def begin_step(self, name: str, time: float, inputs: Sequence[float]) -> None:
-        """See `Exchanges.begin_step`."""
         if self._under_way is not None:
             self._finish_step()
         slot = self._parts[name].slot
@@ -220,7 +217,6 @@ class Federation:
             self._under_way = slot
 
     def outputs(self, name: str) -> Sequence[float]:
-        """See `Exchanges.outputs`."""
         if self._under_way is not None:
             self._finish_step()
         return self._values[name]
@@ -294,7 +290,6 @@ class Federation:
         return replace(self.prepared, system=system, record=record)
 
     def open(self, name: str, plan: ComponentPlan, directory: Path) -> Component:
-        """A component for the master, a federate or not."""
         if name in self._foreign:
             own: FederatedComponent = FederatedComponent(
                 self._parts[name], plan.description, None, self, self._published[name]

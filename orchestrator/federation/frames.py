@@ -73,7 +73,6 @@ class Door:
 
 
 def call(port: int, word: str) -> Frames:
-    """The hub's end."""
     frames = Frames(socket.create_connection(("127.0.0.1", port), timeout=10.0))
     frames.send(JOIN, word.encode())
     return frames

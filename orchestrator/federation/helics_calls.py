@@ -46,7 +46,6 @@ def text_of(error: Exception) -> str:
 
 
 def ask(federate: Any, target: str, query: str) -> Any:
-    """The answer to a query, with its JSON read where it is JSON."""
     helics = library()
     answer = helics.helicsQueryExecute(helics.helicsCreateQuery(target, query), federate)
     if isinstance(answer, str):

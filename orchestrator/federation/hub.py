@@ -56,7 +56,6 @@ class Hub:
         self.ended = False
 
     def serve(self) -> None:
-        """Answer until the end."""
         threading.Thread(target=self._watch, daemon=True).start()
         try:
             self._begin()
@@ -197,7 +196,6 @@ class Hub:
     # -- steps -----------------------------------------------------------------------------------
 
     def _first(self, foreign: list[str]) -> bytes:
-        """Outputs of foreign federates before the first step."""
         self._request_time(FIRST_NS, None)
         return json.dumps({p["name"]: self._values(p) for p in self._parts if p["name"] in foreign}).encode()
 

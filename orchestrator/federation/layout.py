@@ -20,8 +20,6 @@ class Slot:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One component that is a federate."""
-
     name: str
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]

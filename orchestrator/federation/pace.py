@@ -19,11 +19,9 @@ class Pace:
         self._start = 0.0
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
-        """See `Observer.begin`."""
         self._first, self._stop, self._start = run.index, stop_index, perf_counter()
 
     def observe(self, run: ObservedRun) -> None:
-        """See `Observer.observe`."""
         spent, done = perf_counter() - self._start, run.index - self._first
         if self._announce is None or spent < _LOOK or not done:
             return

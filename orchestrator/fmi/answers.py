@@ -19,7 +19,6 @@ class NotAnAnswerError(ValueError):
 
 
 def content_of(answer: Any, component: str) -> Any:
-    """The result that an answer brings."""
     if not isinstance(answer, dict) or len(answer) != 1:
         raise _not("an answer", answer)
     ((kind, content),) = answer.items()

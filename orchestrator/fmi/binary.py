@@ -31,7 +31,6 @@ _UNDEFINED = re.compile(r"undefined symbol: (\w+)")
 
 
 def binary_path(description: FmuDescription, directory: Path) -> Path:
-    """Where an extracted FMU has its binary for this platform."""
     newer, ending = description.fmi_version == "3.0", fmpy.sharedLibraryExtension
     if runs_under_wine(description):
         library: Path = directory.resolve() / "binaries" / PLATFORM / f"{description.model_identifier}.dll"

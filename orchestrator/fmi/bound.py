@@ -59,7 +59,6 @@ class _Adapter(ctypes.Structure):
 
 @cache
 def compiled_adapter() -> Any:
-    """The library of port_adapter.c."""
     try:
         return ctypes.PyDLL(str(compile_here(_SOURCE)))
     except (OSError, RuntimeError) as error:
@@ -67,8 +66,6 @@ def compiled_adapter() -> Any:
 
 
 class BoundComponent(Derived):
-    """An instance behind a binding."""
-
     def __init__(self, inner: Component, description: BoundDescription) -> None:
         self.name, self.description, self.inner = inner.name, description, inner
         self._port, self._inner_names = description.port, description.inner_names
@@ -174,7 +171,7 @@ class BoundComponent(Derived):
                 scaled = signal is not None and self.description.variables[name].type == "Real"
                 self.inner.set({target: (value - signal.offset) / signal.factor if signal and scaled else value})
             else:
-                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor info` lists them")
+                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor fmu info` lists them")
         self._scale()
 
     def read(self, batch: RealBatch) -> None:

@@ -25,7 +25,6 @@ class FmiClock:
 
     @property
     def periodic(self) -> bool:
-        """Whether it ticks at a fixed interval."""
         return self.variability in ("constant", "fixed", "tunable")
 
     @property

@@ -71,7 +71,7 @@ class Component(Protocol):
         """Set variables of any numeric type by name."""
 
     def read(self, batch: "RealBatch") -> None:
-        """Read a batch, and take the FMU at its log's word: after new parameters it may have to refuse."""
+        """Read a batch; raise if the FMU logged an error, as it may after new parameters."""
 
     def get(self, names: Iterable[str]) -> dict[str, float]:
         """Read Real variables by name."""
@@ -139,7 +139,8 @@ class RealBatch:
         unknown = [name for name in self.names if name not in variables]
         if unknown:
             raise InputError(
-                f"component {component.name!r} has no variable {', '.join(map(repr, unknown))}; `gfor info` lists them"
+                f"component {component.name!r} has no variable {', '.join(map(repr, unknown))}; `gfor fmu info` lists "
+                "them"
             )
         self.values = np.zeros(len(self.names)) if values is None else values
         self._references = (ctypes.c_uint * len(self.names))(*[variables[n].reference for n in self.names])
@@ -152,14 +153,12 @@ class RealBatch:
         self.component = component
 
     def read(self) -> NDArray[np.float64]:
-        """Fetch the values from the FMU."""
         if self.names:
             with calls:
                 self.component.check(self.component.get_real(*self.arguments), "fmi2GetReal")
         return self.values
 
     def write(self) -> None:
-        """Send the values to the FMU."""
         if self.names:
             with calls:
                 self.component.check(self.component.set_real(*self.arguments), "fmi2SetReal")

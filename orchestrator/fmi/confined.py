@@ -102,7 +102,6 @@ class ConfinedProcess:
         return fault_of_exit(self._process.returncode, self._limits)
 
     def last_words(self) -> str:
-        """The end of what it wrote to its output."""
         return last_line(self.folder / "output")
 
     def end(self) -> None:

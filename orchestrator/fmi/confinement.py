@@ -119,7 +119,6 @@ def python_folders() -> list[Path]:
 
 
 def protections(means: Means, lacking: Iterable[str]) -> tuple[Protection, ...]:
-    """What the means come to, one `Protection` for each name."""
     spaces, filtered, linux = not means.namespaces, not means.seccomp, sys.platform == "linux"
     landlock, files = means.landlock or "", "read-only mounts"
     no_spaces = f"no namespaces: {means.namespaces}"

@@ -70,7 +70,6 @@ class Deferral:
         _thread.start_new_thread(self._ask_again, (self._number,))
 
     def drop(self) -> None:
-        """Nothing waits any more."""
         frame, self._frame = self._frame, None
         if frame is not None:
             del frame.f_trace

@@ -1,8 +1,9 @@
-"""What an FMU's file declares, read and checked before anything is loaded."""
+"""An FMU's declarations, read and checked before anything is loaded."""
 
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from io import BytesIO
@@ -13,6 +14,8 @@ from xml.etree import ElementTree
 import fmpy
 from fmpy.model_description import ModelDescription
 
+from fmus.toolchain.port_variables import RATED
+from fmus.toolchain.variables import Usual
 from orchestrator.errors import FmuFileError, UnsupportedFmuError
 from orchestrator.fmi import wine
 from orchestrator.fmi.archive import MODEL_DESCRIPTION, names_in, read_model_description_text, told
@@ -39,6 +42,10 @@ _CAUSALITIES = {
 }
 """That FMI 2.0 allows with each variability."""
 
+_OURS = f"VendorAnnotations/Tool[@name='{TOOL}']"
+_RATED = {variable.name: variable for variable in RATED}
+_LONGEST_WHY = 200  # characters of a range's reason that are taken from a file
+
 _SCALARS = "ModelVariables/ScalarVariable"  # where FMI 2.0 has its variables
 _OTHER_KINDS = {"ModelExchange": "for Model Exchange", "ScheduledExecution": "for Scheduled Execution"}
 
@@ -57,6 +64,7 @@ class VariableInfo:
     maximum: float | None
     description: str
     declared_type: str = ""  # as the file has it, such as ``Float64``
+    usual: Usual | None = None  # its usual range, where the model declares one
 
     @property
     def start_number(self) -> float:
@@ -113,6 +121,7 @@ class FmuDescription:
     # where a DLL keeps its state: ``arrays``, ``library``, ``hidden`` or ``not tried``; empty where it is no DLL.
     kept_in: str = ""
     kept_why: str = ""  # why that was not tried, or is hidden, in words
+    kind: str = ""  # what it is in a power system, as in `fmus.toolchain.variables.Kind`; empty where it does not say
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
@@ -148,7 +157,7 @@ def read_description(path: Path | str) -> FmuDescription:
 
 
 def missing_binary(described: FmuDescription) -> tuple[str, str] | None:
-    """What an FMU lacks that it could run on this platform, and the remedy."""
+    """The reason why an FMU cannot run on this platform, and the remedy; None where it can."""
     if fmpy.platform in described.platforms or runs_under_wine(described):
         return None
     has = ", ".join(described.platforms) or "none"
@@ -159,7 +168,7 @@ def missing_binary(described: FmuDescription) -> tuple[str, str] | None:
 
 
 def _or_wine(described: FmuDescription) -> str:
-    """What else would help, to the end of a sentence."""
+    """Another remedy, as the end of a sentence."""
     if wine.PLATFORM not in described.platforms or not described.fmi_version.startswith("2"):
         return ""
     try:
@@ -175,7 +184,7 @@ def runs_under_wine(described: FmuDescription) -> bool:
 
 
 def read_declared(path: Path | str) -> FmuDescription:
-    """As `read_description`, also where the FMU has no binary for this platform and cannot run here."""
+    """The same as `read_description`, also where the FMU has no binary for this platform and cannot run here."""
     path = as_fmu(Path(path))
     return parse_description(path, read_model_description_text(path), names_in(path))
 
@@ -244,7 +253,7 @@ def _lacks_initial(variable: ElementTree.Element) -> bool:
 
 
 def _root(path: Path, text: bytes) -> ElementTree.Element:
-    """What the file says, parsed once: in a large network that takes longer than all else."""
+    """The file parsed, once: in a large network that takes longer than all else."""
     try:
         return ElementTree.fromstring(text)
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two of its encoding
@@ -259,7 +268,8 @@ def _fmi_version(root: ElementTree.Element) -> str:
 def _describe(
     path: Path, md: ModelDescription, root: ElementTree.Element, platforms: tuple[str, ...], version: str
 ) -> FmuDescription:
-    variables = {v.name: _variable(path, v) for v in md.modelVariables}
+    kind, usual = _component(root, version)
+    variables = {v.name: _variable(path, v, usual) for v in md.modelVariables}
     _check_names(path, md)
     dependencies = {
         unknown.variable.name: None if unknown.dependencies is None else tuple(d.name for d in unknown.dependencies)
@@ -288,14 +298,15 @@ def _describe(
         stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
         fmi_version=version,
         rates=tuple(unknown.variable.name for unknown in md.derivatives),
+        kind=kind,
         **_sampling(path, root, variables),
         **_events(root, version),
     )
 
 
 def _sampling(path: Path, root: ElementTree.Element, variables: Mapping[str, VariableInfo]) -> dict[str, Any]:
-    """What a sampled controller says of its sample time, and of the frequency at which it repeats."""
-    listed = root.find(f"VendorAnnotations/Tool[@name='{TOOL}']/DiscreteStates")
+    """A sampled controller's sample time, and the frequency at which it repeats."""
+    listed = root.find(f"{_OURS}/DiscreteStates")
     if listed is None:
         return {}
     frequency, told = listed.get("frequency", ""), listed.get("sampleTime")
@@ -323,7 +334,7 @@ def _states(path: Path, md: ModelDescription) -> list[str]:
 
 
 def _events(root: ElementTree.Element, version: str) -> dict[str, Any]:
-    """What an FMU of FMI 3.0 says of events, early returns and clocks."""
+    """Declarations of FMI 3.0 on events, early returns and clocks."""
     interface = root.find("CoSimulation")
     if version != "3.0" or interface is None:
         return {}
@@ -344,7 +355,7 @@ def _gives_directional_derivatives(root: ElementTree.Element) -> bool:
 
 def _discrete_states(path: Path, root: ElementTree.Element, md: ModelDescription) -> tuple[str, ...]:
     """Names of the states of a sampled controller, which FMI for co-simulation has no list for: our annotation."""
-    listed = root.find(f"VendorAnnotations/Tool[@name='{TOOL}']/DiscreteStates")
+    listed = root.find(f"{_OURS}/DiscreteStates")
     if listed is None or listed.get("settable") != "true":
         return ()
     names = {str(v.valueReference): v.name for v in reversed(md.modelVariables) if v.type == "Real"}
@@ -361,7 +372,7 @@ def _settable(root: ElementTree.Element, version: str) -> bool:
     if version == "3.0":
         annotation = root.find(f"Annotations/Annotation[@type='{TOOL}.ContinuousStates']")
         return annotation is not None and (annotation.text or "").strip() == "settable"
-    tool = root.find(f"VendorAnnotations/Tool[@name='{TOOL}']/ContinuousStates")
+    tool = root.find(f"{_OURS}/ContinuousStates")
     return tool is not None and tool.get("settable") == "true"
 
 
@@ -394,7 +405,23 @@ def _units(root: ElementTree.Element) -> dict[str, dict[str, str]]:
     return {unit.get("name", ""): {} if base is None else dict(base.attrib) for unit, base in bases}
 
 
-def _variable(path: Path, v: Any) -> VariableInfo:
+def _component(root: ElementTree.Element, version: str) -> tuple[str, dict[str, Usual]]:
+    """Our annotation: what the component is, and usual ranges of parameters by name. What is no number is left out."""
+    where = "Annotations/Annotation[@type" if version == "3.0" else "VendorAnnotations/Tool[@name"
+    found = root.find(f"{where}='{TOOL}.Component']/Component")
+    if found is None:
+        return "", {}
+    usual = {}
+    for one in found.findall("Usual"):
+        with suppress(ValueError):
+            low, high = (float(one.get(side, "")) for side in ("low", "high"))
+            usual[one.get("name", "")] = Usual(
+                low, high, one.get("why", "")[:_LONGEST_WHY], one.get("orZero") == "true"
+            )
+    return found.get("kind", ""), usual
+
+
+def _variable(path: Path, v: Any, usual: Mapping[str, Usual]) -> VariableInfo:
     unit = v.unit or (v.declaredType.unit if v.declaredType is not None else None) or ""
     fmi_type = "Array" if v.dimensions else _TYPES_OF_3.get(v.type, v.type)
     return VariableInfo(
@@ -409,6 +436,7 @@ def _variable(path: Path, v: Any) -> VariableInfo:
         maximum=None if v.max is None else float(v.max),
         description=v.description or "",
         declared_type=v.type,
+        usual=usual.get(v.name) or (rated.usual if (rated := _RATED.get(v.name)) and rated.unit == unit else None),
     )
 
 

@@ -48,7 +48,6 @@ class Worker:
         return read_description(self._request["fmu"])
 
     def serve(self) -> None:
-        """Answer the mailbox."""
         box = self._box
         pointers: tuple[Any, ...] = (None, None, None, None)
         while box.library.mailbox_serve(box.address, self._parent, *pointers):
@@ -143,5 +142,4 @@ class Worker:
 
 
 def main(request: dict[str, Any]) -> None:
-    """Answer for one instance."""
     Worker(request).serve()

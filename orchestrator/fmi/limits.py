@@ -31,8 +31,6 @@ def crowded() -> float:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits of a foreign FMU."""
-
     seconds: float = 30.0  # wall-clock time for one call; in acceptance tests times `crowded`
     # address space of one process beyond what it has before the FMU is loaded, and memory that all its processes
     # together have in use [bytes]

@@ -66,7 +66,7 @@ def read_embedded_model(path: Path) -> EmbeddedModel | None:
     except (KeyError, TypeError, ValueError) as error:
         raise FmuFileError(
             f"{path}: the linear model inside ({member}) cannot be read: {error}; build the FMU again with "
-            "`gfor build --with-linear-model`"
+            "`gfor fmu build --with-linear-model`"
         ) from error
 
 

@@ -155,7 +155,6 @@ class LoadedComponent(Derived):
         return ended, number.value if reached and isfinite(number.value) else None
 
     def _asked(self, function: str, kind: int, answer: Any) -> bool:
-        """Whether an FMU answers a question after its status."""
         try:
             with calls:
                 getattr(self._fmu, function)(self._fmu.component, kind, ctypes.byref(answer))
@@ -164,7 +163,7 @@ class LoadedComponent(Derived):
         return True
 
     def _call(self, call: str, function: Any, *arguments: Any) -> Any:
-        """Call through fmpy; an FMU that returns OK but logs an error is taken at its log's word."""
+        """Call through fmpy; raise if the FMU logs an error, even where it returns OK."""
         self._messages.clear()
         try:
             with calls:
@@ -215,7 +214,7 @@ class LoadedComponent(Derived):
         for name, value in values.items():
             variable = self.description.variables.get(name)
             if variable is None:
-                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor info` lists them")
+                raise InputError(f"component {self.name!r} has no variable {name!r}; `gfor fmu info` lists them")
             setters = {
                 "Real": (self._fmu.setReal, float),
                 "Integer": (self._fmu.setInteger, int),

@@ -154,7 +154,6 @@ class Mailbox:
         return np.frombuffer(self._memory, kind, count, self._arrays[which])
 
     def write_text(self, value: Any) -> None:
-        """Leave a JSON value for the other side."""
         content = json.dumps(value).encode()
         if len(content) > _TEXT:
             raise ValueError(f"{len(content)} bytes do not fit into the mailbox of {_TEXT} bytes")
@@ -184,7 +183,6 @@ class Mailbox:
             return []
 
     def clear_log(self) -> None:
-        """Forget what the FMU has logged."""
         self._memory[self._log] = 0
 
     def question(self) -> int:
@@ -192,7 +190,6 @@ class Mailbox:
         return int(self.library.mailbox_talk(ctypes.addressof(self.client)))
 
     def function(self, name: str, *arguments: Any) -> Any:
-        """A pointer to one of its functions, of FMI's form."""
         return ctypes.PYFUNCTYPE(ctypes.c_int, ctypes.c_void_p, *arguments)((name, self.library))
 
 

@@ -1,4 +1,4 @@
-"""What a foreign FMU looks like once its variables are mapped to our port, in plain numbers.
+"""A foreign FMU whose variables are mapped to our port, in plain numbers.
 
 The port of a device: inputs ``v_re``, ``v_im`` [pu of the bus] and outputs ``i_re``, ``i_im`` [pu, 100 MVA] in the
 network's frame, ``p`` and ``q`` at the bus [pu, S_n]; parameters ``S_n`` [MVA] and the power flow's ``P_0``, ``Q_0``
@@ -14,7 +14,7 @@ from math import pi
 from typing import Any, Self
 
 from fmus.toolchain.port_variables import INPUTS, OUTPUTS, S_N, START_VALUES
-from fmus.toolchain.variables import Variable
+from fmus.toolchain.variables import Parameter, Variable
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.units import to_unit
 
@@ -35,7 +35,7 @@ Matrix2 = tuple[float, float, float, float]  # A real 2×2 matrix, by rows
 
 
 class Form(IntEnum):
-    """What the variables of a port are; the numbers are those of port_adapter.c."""
+    """The form of a port's variables; numbers as in port_adapter.c."""
 
     RECTANGULAR = 0
     POLAR = 1
@@ -79,8 +79,6 @@ class SignalMap:
 
 @dataclass(frozen=True)
 class PortMap:
-    """All of a binding, in numbers."""
-
     rating: float  # S_n of the FMU as delivered [MVA]
     f_n: float
     voltage: PhasorMap
@@ -169,7 +167,7 @@ class BoundDescription(FmuDescription):
                         yield name, said
 
     def likely_cause(self) -> str:
-        """What of the ratings does not fit, as the end of a sentence on something that went wrong; "" for nothing."""
+        """Ratings that do not fit, as the end of a sentence; "" without any."""
         unlike = self.unlike_delivered()
         return f"likely cause: the binding has {'; and '.join(unlike.values())}: check [rating]" if unlike else ""
 
@@ -201,7 +199,7 @@ def _passed(inner: FmuDescription, port: PortMap, name: str, own: str, reference
     if signal is None or info.type == "Boolean":
         return replace(info, name=name, reference=reference if info.type == "Real" else info.reference)
     return replace(info, name=name, reference=reference, causality="output", unit=signal.unit, start=None,
-                   minimum=None, maximum=None)  # fmt: skip
+                   minimum=None, maximum=None, usual=None)  # fmt: skip
 
 
 def _port_variables(port: PortMap) -> dict[str, VariableInfo]:
@@ -229,13 +227,14 @@ def _info(
         minimum=minimum,
         maximum=maximum,
         description=variable.text,
+        usual=variable.usual if isinstance(variable, Parameter) else None,
     )
 
 
 def _dependencies(
     inner: FmuDescription, port: PortMap, renamed: Mapping[str, str]
 ) -> dict[str, tuple[str, ...] | None]:
-    """What the outputs depend on directly, in the new names; None where the FMU does not say."""
+    """Direct dependencies of the outputs, in the new names; None where the FMU does not say."""
 
     def translated(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
         if names is None:

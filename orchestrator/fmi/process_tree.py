@@ -125,7 +125,6 @@ def size_of_removed(processes: list[int], enough: int) -> int:
 
 
 def _removed(process: str) -> list[os.stat_result]:
-    """The removed files that a process holds open."""
     found = []
     with contextlib.suppress(OSError):
         for descriptor in os.listdir(_PROC / process / "fd"):

@@ -34,5 +34,4 @@ def in_order(protections: Iterable[Protection]) -> tuple[Protection, ...]:
 
 
 def missing(protections: Iterable[Protection]) -> list[str]:
-    """Those that are not in force, with the reason."""
     return [f"{p.name} ({p.how})" for p in protections if not p.in_force]

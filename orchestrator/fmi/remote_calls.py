@@ -17,15 +17,12 @@ class RemoteCalls(ABC):
         self._remote("fmi2SetupExperiment", "setup", start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
-        """Begin the initialisation."""
         self._remote("fmi2EnterInitializationMode", "enter_initialization_mode")
 
     def exit_initialization_mode(self) -> None:
-        """End the initialisation."""
         self._remote("fmi2ExitInitializationMode", "exit_initialization_mode")
 
     def reset(self) -> None:
-        """Make the instance like new."""
         self._remote("fmi2Reset", "reset")
 
     def set(self, values: Mapping[str, float | bool]) -> None:

@@ -35,5 +35,4 @@ def _whole(text: str) -> int:
 
 
 def as_text(value: Scalar) -> str:
-    """The value as a model description writes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

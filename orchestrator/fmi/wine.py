@@ -58,7 +58,6 @@ class Wine:
 
 @cache
 def find_wine() -> Wine:
-    """The installation of this machine."""
     if sys.platform != "linux" or platform.machine() != "x86_64":
         raise NoWineError(
             f"Windows libraries run on Windows, or on Linux for x86_64 under Wine; this is {sys.platform}"
@@ -200,7 +199,6 @@ class Server:
         return self.shared.pop()
 
     def start(self, program: Path, *words: str) -> "subprocess.Popen[bytes]":
-        """Start a program, once for each `next_shared`."""
         with self._connections.pop() as connection:
             return subprocess.Popen(
                 [find_wine().loader, str(program), *words],

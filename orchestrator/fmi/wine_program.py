@@ -55,7 +55,6 @@ def proxy_path() -> Path:
 
 @cache
 def host_path() -> Path:
-    """The compiled program for Windows."""
     source = "#define UNDER_WINE\n" + joined_source(*_BOTH, _HERE / "wine_host.c")
     return compile_for(source, TARGETS[wine.PLATFORM][0], ".exe")
 
@@ -72,7 +71,6 @@ def compile_programs() -> list[Path]:
 
 @cache
 def proxy() -> Any:
-    """The loaded functions, to ask for what is no function of FMI."""
     library = ctypes.CDLL(str(proxy_path()))
     library.wine_attach.argtypes = [ctypes.c_void_p, ctypes.c_int64]
     library.wine_attach.restype = None
@@ -105,7 +103,6 @@ class WineProgram:
             raise
 
     def _begin(self, patience: float) -> None:
-        """Take a program that has nothing to do, or start one."""
         if _idle:
             self._path, self._process = _idle.pop()
         else:
@@ -235,7 +232,6 @@ class WineLibrary:
         return found
 
     def read(self, address: int, size: int) -> bytes:
-        """A stretch of memory."""
         return self._ask(READ, address, size, answer=size)[1]
 
     def text(self, address: int | None) -> bytes:
@@ -247,7 +243,6 @@ class WineLibrary:
         return found.split(b"\0")[0]
 
     def write(self, address: int, content: bytes) -> None:
-        """Change a stretch of memory."""
         self._ask(WRITE, address, len(content), data=content)
 
     def allocate(self, size: int) -> int:

@@ -37,7 +37,6 @@ class Cut:
 
 
 def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) -> Cut:
-    """Cut a scenario at a bus, at some components, or at all its devices."""
     with running(prepared) as master:
         said = sentences(misfits_of(master))
         devices = _devices(master, bus, names)

@@ -1,4 +1,4 @@
-"""A scan of a running FMU or DLL, on the test bench of `gfor admittance`."""
+"""A scan of a running FMU or DLL, on the test bench of `gfor fmu admittance`."""
 
 import cmath
 from collections.abc import Callable, Mapping

@@ -13,11 +13,7 @@ GENERATORS, GRID, OTHERS = "generators", "grid", "others"
 
 NOT_VENDORS = (GENERATORS, GRID, OTHERS)
 
-_IN, _OUT = ("v_re", "v_im"), ("i_re", "i_im")  # A device takes the voltage of its bus and gives its current
-
-_OF_MACHINES = "machine."  # begin of a generator's variables
-_OF_THE_GRID = ("external_grid", "static_generation")
-"""Begins of models with a port that stand for a part of the network."""
+_CURRENT = {"i_re", "i_im"}  # what a network takes at each port
 
 
 @dataclass(frozen=True)
@@ -35,7 +31,7 @@ def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], gr
     """
     found = {}
     for name, (table, plan) in components.items():
-        if name == grid or not _is_converter(table, plan):
+        if name == grid or not plan.has_port or (table.vendor is None and plan.kind != "converter"):
             continue
         vendor = table.vendor or (Path(table.file).stem if table.file is not None else table.model or "")
         if vendor in NOT_VENDORS:
@@ -47,25 +43,6 @@ def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], gr
     return found
 
 
-def _is_converter(table: ComponentTable, plan: ComponentPlan) -> bool:
-    if not _has_port(plan):
-        return False
-    if table.vendor is not None:
-        return True
-    if table.model is not None and table.model.startswith(_OF_THE_GRID):
-        return False
-    return not _is_machine(plan)
-
-
-def _has_port(plan: ComponentPlan) -> bool:
-    description = plan.description
-    return {*_IN} <= {*description.inputs} and {*_OUT} <= {*description.outputs}
-
-
-def _is_machine(plan: ComponentPlan) -> bool:
-    return any(name.startswith(_OF_MACHINES) for name in plan.description.variables)
-
-
 def groups_of(
     components: Mapping[str, tuple[ComponentTable, ComponentPlan]], places: Mapping[str, Place], grid: str | None
 ) -> dict[str, str]:
@@ -74,11 +51,10 @@ def groups_of(
     def group(name: str, table: ComponentTable, plan: ComponentPlan) -> str:
         if name in places:
             return places[name].vendor
-        if _has_port(plan) and _is_machine(plan):
+        if plan.kind == "machine":
             return GENERATORS
-        gives_voltage = {*_OUT} <= {*plan.description.inputs}
-        of_grid = table.model is not None and table.model.startswith(_OF_THE_GRID)
-        return GRID if name == grid or of_grid or gives_voltage else OTHERS
+        gives_voltage = {*plan.description.inputs} >= _CURRENT
+        return GRID if name == grid or plan.kind in ("network", "load") or gives_voltage else OTHERS
 
     return {name: group(name, table, plan) for name, (table, plan) in components.items()}
 

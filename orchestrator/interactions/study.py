@@ -104,7 +104,7 @@ def plan_interactions(
     if not places:
         raise InputError(
             f"{case.path}: scenario {name!r} has no converter: no component with the inputs v_re, v_im and the outputs "
-            "i_re, i_im that is no generator; a converter of a make of its own is told by the key 'vendor' of its table"
+            "i_re, i_im that is no generator; to mark a component as a converter, set 'vendor' in its table"
         )
     stand_in = request.stand_in or (f"{STAND_IN}_phasor" if _of_phasors(prepared, places) else STAND_IN)
     systems, swapped = systems_of_vendors(places, stand_in), tuple[str, ...]()

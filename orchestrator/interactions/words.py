@@ -1,4 +1,4 @@
-"""What a study of interactions says, in sentences."""
+"""Sentences of a study of interactions."""
 
 from orchestrator.interactions.judgement import JudgedInteractions, JudgedSystem, place_of, plan_text
 from orchestrator.report.verdict import VerdictSentence
@@ -90,9 +90,8 @@ def swap_sentence(judgement: JudgedInteractions) -> str:
 def stand_in_sentence(judgement: JudgedInteractions) -> str:
     plan = judgement.result.plan
     return (
-        f"at the places of the vendors that a system does without stands {plan.stand_in}, at the same power flow; of "
-        f"each system those modes count in which its vendors have {100 * plan.request.threshold:g} % together, and "
-        "what grows"
+        f"{plan.stand_in} stands in for the vendors that a system does without, at the same power flow; a mode counts "
+        f"if vendors' converters hold {100 * plan.request.threshold:g} % of it, or if it grows"
     )
 
 

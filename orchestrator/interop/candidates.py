@@ -33,7 +33,6 @@ class Candidate:
 
 
 def probe_system() -> System:
-    """The probe pair in its loop."""
     system = System()
     system.add("a", catalogue_fmu("probe_a"))
     system.add("b", catalogue_fmu("probe_b"))
@@ -75,7 +74,6 @@ def _candidate(schedule: Schedule, early_label: int, *, after_exchange: bool) ->
 
 
 def _trajectories(schedule: Schedule, step_size: float, steps: int) -> list[NDArray[np.float64]]:
-    """Read with the inputs of the step, and after the exchange."""
     recorders = [Recorder(SIGNALS, 1), Recorder(SIGNALS, 1, after_exchange=True)]
     with Master(probe_system(), schedule, step_size) as master:
         master.run(Clock(step_size).time(steps), observers=recorders)

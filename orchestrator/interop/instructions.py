@@ -18,7 +18,7 @@ recorded, and by what time a row is given.
    `a.y` and `b.y` are what is needed; the others settle what those two leave open.
 5. Export as CSV with a heading, with as many digits as the tool gives, and:
 
-       gfor which-master RESULT.csv{options}
+       gfor master which RESULT.csv{options}
 
 Columns are told by the end of their headings (`a.y`, `probe_a::y`, `system/a/y [1]`). For other headings add
 `--column a.y=HEADING`. Rows between communication points are left out. If the tool cannot take this step or duration,

@@ -18,8 +18,6 @@ _NEEDED = ("a.y", "b.y")
 
 @dataclass(frozen=True)
 class ProbeResult:
-    """The recorded signals of the probe pair."""
-
     times: NDArray[np.float64]  # labels [s], shape (n,), rising
     values: NDArray[np.float64]  # shape (n, number of `SIGNALS`); NaN where a signal was not recorded
     columns: dict[str, str]  # signal → heading of the column it was read from

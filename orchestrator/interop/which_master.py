@@ -23,8 +23,6 @@ signals are near 1."""
 
 @dataclass(frozen=True)
 class Identified:
-    """The schedules that fit a record."""
-
     fits: tuple[Candidate, ...]  # every schedule that gives the recorded values; empty if none does
     nearest: Candidate
     difference: float

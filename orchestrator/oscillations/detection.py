@@ -26,8 +26,6 @@ class Signals:
 
 @dataclass(frozen=True)
 class SpectralLine:
-    """One line of the spectrum."""
-
     frequency: float
     begin: float | None  # [s]; None where it was there before the record
     # first, last: the part of the record in which it is analysed, as indices.

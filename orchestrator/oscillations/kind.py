@@ -43,7 +43,6 @@ class Evidence:
 
 
 def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
-    """Judge the signals that show the oscillation best."""
     f, step = found.frequency, float(signals.times[1] - signals.times[0])
     settle = 0 if found.begin is None else round(2 / (f * step))
     used = slice(min(found.first + settle, found.last - 2), found.last)

@@ -37,8 +37,6 @@ _SMALL = 0.02  # part of the largest mean power below which its sign says nothin
 
 @dataclass(frozen=True)
 class Opinion:
-    """What one method says."""
-
     method: str
     place: str | None  # the place that it names, or None
     applies: bool  # whether it is known to hold for this oscillation

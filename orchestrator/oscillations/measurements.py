@@ -74,7 +74,6 @@ def made_ready(label: str, times: Numbers, places: Sequence[Site], remarks: Sequ
 
 
 def _each(place: Site, change: Callable[[Numbers], Numbers]) -> Site:
-    """A place with its four signals changed alike."""
     return replace(place, v=change(place.v), angle=change(place.angle), p=change(place.p), q=change(place.q))
 
 

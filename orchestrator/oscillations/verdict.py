@@ -39,7 +39,6 @@ class Located:
 
 
 def locate(measured: Measurements) -> list[Located]:
-    """Find the oscillations of a record and where they come from."""
     signals = signals_of(measured)
     found = [one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_PERIODS]
     answers = []

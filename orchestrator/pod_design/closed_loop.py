@@ -37,8 +37,6 @@ class PodSetting:
 
 @dataclass(frozen=True)
 class Placed:
-    """A setting, and the target mode with this setting."""
-
     setting: PodSetting
     pair: Eigenpair
 

@@ -134,17 +134,14 @@ class PodDesign:
 
     @property
     def stability_before(self) -> Stability:
-        """The verdict without the controller."""
         return self.examined_before.stability
 
     @property
     def stability(self) -> Stability:
-        """The verdict with the final setting."""
         return self.examined.stability
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings that belong to the verdicts, each once."""
         return tuple(dict.fromkeys([*self.examined_before.warnings, *self.examined.warnings]))
 
     @property

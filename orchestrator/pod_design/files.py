@@ -62,7 +62,6 @@ def design_json(d: PodDesign) -> dict[str, Any]:
 
 
 def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
-    """The final setting as values of a parameter file."""
     setting, values = d.final.setting, {}
     for component in d.target.key:
         own: Mapping[str, bool | float | str] = {

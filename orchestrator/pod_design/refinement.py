@@ -71,8 +71,6 @@ class GainSweep:
 
 @dataclass
 class Refinement:
-    """The settings that the refinement tried, and its result."""
-
     sweeps: list[GainSweep] = field(default_factory=list)
     # the best setting within the bounds that has no prohibited effect on other modes; None if no such setting exists
     chosen: Placed | None = None

@@ -88,7 +88,6 @@ class _Ground:
         return lead_lag_turning(turn, math.exp(place[1]) * self._initial.imag, self._stages)
 
     def over_gains(self, place: Sequence[float], gains: Sequence[float]) -> list[float]:
-        """The worth of one lead/lag with some gains."""
         what = {"place": list(place), "gains": list(gains), "bounds": self._bounds, "stages": self._stages,
                 "initial": digest(np.array(self._initial)), "others": digest(self._others)}  # fmt: skip
         worths: list[float] = self._loop.figures("worth", what, lambda: self._worths(place, gains))["worths"].tolist()

@@ -90,7 +90,6 @@ def _components(
 def check_range(
     plan: Mapping[str, ComponentPlan], components: Sequence[str], variable: str, value: float, option: str
 ) -> None:
-    """A value must be one that every component's FMU takes."""
     for name in components:
         info = plan[name].description.variables[variable]
         low = info.minimum if info.minimum is not None else -math.inf

@@ -43,12 +43,10 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays) -> N
 
 
 def previous(path: Path) -> Path:
-    """Where the checkpoint before the newest lies."""
     return path.with_suffix(PREVIOUS)
 
 
 def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Header and arrays."""
     content = path.read_bytes()
     body = content[len(_MARK) + _DIGEST :]
     if not content.startswith(_MARK):

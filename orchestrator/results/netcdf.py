@@ -29,7 +29,6 @@ def stored_name(name: str) -> str:
 
 
 def name_of(stored: str) -> str:
-    """The name of a column whose name in a file is this."""
     return stored.replace("%2F", "/").replace("%25", "%")
 
 

@@ -47,7 +47,6 @@ class RecordingFolder:
         self._rows: int | None = None  # until a run begins: then what lies there is of an earlier one
 
     def begin(self, names: Sequence[str]) -> None:
-        """See `RowSink.begin`."""
         self._names, self._chunk, self._rows = tuple(names), 0, 0
         try:
             rmtree(self.folder, ignore_errors=True)
@@ -56,7 +55,6 @@ class RecordingFolder:
             raise not_written(self.folder, error) from error
 
     def keep(self, first: int, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-        """See `RowSink.keep`."""
         self._chunk = max(self._chunk, len(times))
         image = netcdf_image(self._names, times, values, self._units, self._attributes, max(1, len(times)))
         if not self.folder.is_dir():
@@ -65,7 +63,6 @@ class RecordingFolder:
         self._rows = first + len(times)
 
     def resume(self, names: Sequence[str], rows: int) -> Iterator[Block]:
-        """See `RowSink.resume`."""
         self._names = tuple(names)
         for part in parts_of(self.folder):
             first = int(part.stem)
@@ -112,7 +109,6 @@ def temporary_recording(prepared: PreparedScenario) -> RecordingFolder:
 
 
 def parts_of(folder: Path) -> list[Path]:
-    """Files of an unfinished recording, in their order."""
     return sorted(path for path in folder.glob("*.nc") if path.stem.isdigit())
 
 

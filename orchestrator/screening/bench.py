@@ -10,6 +10,7 @@ from orchestrator.analysis.state_access import StateAccess
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.step_awareness import other_step
+from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.instance import is_ours
@@ -63,7 +64,7 @@ class ScreeningBench:
         if key not in self._models:
             if len(self._models) >= _KEPT:
                 self._models.clear()
-            driven, observed = (DRIVEN, OBSERVED) if is_converter(plan.description.variables) else ((), ())
+            driven, observed = (DRIVEN, OBSERVED) if is_converter(plan) else ((), ())
             with other_step(master, name, 0.0):
                 found = linearize_slopes(
                     exchange, master.time, master.clock.step_size, driven, observed, self._like.get(path)
@@ -92,11 +93,9 @@ class ScreeningBench:
         self.close()
 
 
-def is_converter(variables: Any) -> bool:
-    """Whether a component has references that a damping controller acts on, and a frequency of its own."""
-    return all(name in variables for name in (*DRIVEN, *OBSERVED)) and not any(
-        name.startswith("machine.") for name in variables
-    )
+def is_converter(plan: ComponentPlan) -> bool:
+    """Whether a component is a converter with references that a damping controller acts on, and a frequency."""
+    return plan.kind == "converter" and all(name in plan.description.variables for name in (*DRIVEN, *OBSERVED))
 
 
 def _same_fmus(master: Master, prepared: PreparedScenario) -> bool:

@@ -155,7 +155,7 @@ def _variable(column: str, prepared: PreparedScenario) -> Reading:
     infos = {n: found for n, p in plans.items() if (found := p.description.variables.get(variable)) is not None}
     if not infos:
         known = next(iter(plans.values())).description.parameters
-        raise InputError(f"{pattern} has no parameter {variable!r}; {close_names(variable, known, '`gfor info`')}")
+        raise InputError(f"{pattern} has no parameter {variable!r}; {close_names(variable, known, '`gfor fmu info`')}")
     # Each component by its own name: other columns look up what they share with this one.
     return lambda text: Setting({f"{n}.{variable}": convert(info, read_value(text)) for n, info in infos.items()})
 

@@ -25,7 +25,6 @@ class Parameter:
 
     @property
     def name(self) -> str:
-        """``component.variable``."""
         return f"{self.component}.{self.variable}"
 
     @property
@@ -92,7 +91,7 @@ def _check_fits(
                 f"--parameter {pattern}: {name} is of type {info.type}, by which nothing can be differentiated; "
                 "name a Real parameter"
             )
-    hint = close_names(pattern, real, "`gfor info` lists the parameters of an FMU")
+    hint = close_names(pattern, real, "`gfor fmu info` lists the parameters of an FMU")
     raise InputError(f"--parameter {pattern}: no component of the scenario has such a parameter; {hint}")
 
 

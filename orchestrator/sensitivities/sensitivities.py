@@ -353,7 +353,6 @@ def _limited(row: Sensitivity, acting: Mapping[str, Sequence[str]]) -> Sensitivi
 
 
 def _doubted(row: Sensitivity, warnings: tuple[str, ...]) -> Sensitivity:
-    """A row that shares the doubts that concern all."""
     if not warnings or not row.derivative:
         return row
     return Sensitivity(row.parameter, row.eigenvalue, row.derivative, row.continuous, row.operating_point,

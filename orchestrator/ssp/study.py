@@ -56,7 +56,6 @@ def study_of(
 
 
 def write_study(annotations: Element, study: SspStudy) -> None:
-    """Write our annotation."""
     annotation = SubElement(annotations, tag("ssc:Annotation"), type=STUDY_TYPE)
     root = SubElement(annotation, tag("gfor:Study"), scenario=study.scenario, title=study.title)
     SubElement(root, tag("gfor:CommunicationStep"), seconds=repr(study.step_size))

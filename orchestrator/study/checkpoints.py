@@ -115,11 +115,9 @@ class Checkpoints:
     # -- what the master asks --------------------------------------------------------------------
 
     def latest(self) -> RunState | None:
-        """See `Keeper.latest`."""
         return self._kept
 
     def is_due(self) -> bool:
-        """See `Keeper.is_due`."""
         return perf_counter() >= self._due
 
     def keep(self, state: Callable[[], RunState]) -> None:

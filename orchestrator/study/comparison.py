@@ -108,7 +108,6 @@ def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
 
 
 def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
-    """A signal of a run."""
     found = signal(dataset, expression)
     if found is None:
         known = list(map(str, dataset.data_vars))

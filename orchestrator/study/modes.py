@@ -87,7 +87,6 @@ class ModesResult:
 
     @property
     def electromechanical(self) -> Mode | None:
-        """The first of the named modes."""
         return next(iter(self.named.values()), None)
 
     @property
@@ -209,7 +208,6 @@ class Linearised:
         self.named: NamedSystem | None = None
 
     def begin(self, pool: Executor) -> None:
-        """Submit the eigenvalues."""
         if self._system is not None and len(self._model.names) <= ALL_VECTORS:
             # SciPy's `eig` lets no other thread of Python run in a small system, so that the other spectrum must be on
             # its way, in NumPy's `eigvals`, before that begins.

@@ -95,7 +95,6 @@ class RunResult:
 
     @property
     def before_its_events(self) -> bool:
-        """Whether it ended before the first of its events."""
         return bool(self.modes.prepared.not_reached) and not self.modes.prepared.events
 
     @property
@@ -157,7 +156,6 @@ def _run(
     threads: int | None,
     federation: Federation | None = None,
 ) -> RunResult:
-    """See `run_scenario`."""
     watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None

@@ -80,7 +80,6 @@ class StepChoice:
         return tuple(dict.fromkeys(trial.schedule for trial in self.trials))
 
     def of(self, schedule: ScheduleName) -> list[TriedStep]:
-        """The trials of a schedule, shortest step first."""
         return [trial for trial in self.trials if trial.schedule == schedule]
 
     def largest(self, schedule: ScheduleName) -> TriedStep | None:

@@ -14,7 +14,7 @@ from orchestrator.watch.seen import Seen
 _CYCLE, _LASTS = 0.02, 0.08
 """Time [s] over which a current is averaged, and for which it is above its limit; what is shorter, a limit may need."""
 
-_ABOVE = 1.05  # part of the declared current from which one is above it, as in `gfor check`
+_ABOVE = 1.05  # part of the declared current from which one is above it, as in `gfor fmu check`
 
 
 def above_declared(seen: Seen, system: System) -> Iterator[Finding]:

@@ -133,7 +133,6 @@ def _speeds(seen: Seen, system: System, settings: Settings) -> Iterator[_Course]
 
 
 def _voltages(seen: Seen) -> Iterator[_Course]:
-    """Magnitudes of all voltages that are coupled."""
     for name, real in seen.last.items():
         imaginary = seen.last.get(f"{name[:-3]}_im")
         if name.endswith("v_re") and imaginary is not None:

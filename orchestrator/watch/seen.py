@@ -29,8 +29,6 @@ _SETTLED = 1e-4  # distance of omega from its rest [pu] at which a meter has set
 
 @dataclass(frozen=True)
 class Seen:
-    """Signals of a run."""
-
     times: Numbers  # of the looks [s], shape (n,)
     # signals by ``component.variable``, each of shape (n,): the recorded signals, and those that the watch reads in
     # addition.
@@ -117,7 +115,6 @@ class Watcher:
         self._position: Mapping[str, Any] | None = None
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
-        """See `Observer.begin`."""
         self._recorder.begin(run, stop_index)
         self._outputs, self._count, self._last_index, self._run = run.output_names, 0, -1, run
         further = (stop_index - run.index) // self.every + 2
@@ -131,7 +128,6 @@ class Watcher:
             self._position = None
 
     def observe(self, run: ObservedRun) -> None:
-        """See `Observer.observe`."""
         if run.index == self._last_index:
             return  # taken up again where this look was made already
         self._last_index = run.index

@@ -114,8 +114,6 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
 
 
 class _Responses:
-    """Findings stretch by stretch."""
-
     def __init__(self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest]) -> None:
         self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
         self.masked: dict[Stretch, Sequence[Unrest]] = {}
@@ -163,7 +161,7 @@ def _late(starts: Mapping[str, LateStart]) -> Iterator[Finding]:
         message = (
             f"{late.text}: the FMU of component {component!r} computes its outputs only as initialisation ends, so "
             "everything else starts from a wrong value, and what is found to move from the start follows from it; "
-            "`gfor check --only initial_outputs` shows it alone"
+            "`gfor fmu check --only initial_outputs` shows it alone"
         )
         yield Finding("undisturbed_motion", 0.0, component, late.variable, message)
 

@@ -17,7 +17,7 @@ def checked(gallery, tmp_path, capsys):
         assert old in text
         path = tmp_path / "mine.toml"
         path.write_text(text.replace(old, new), encoding="utf-8")
-        code = main(["check", str(fmu), "--binding", str(path), *options])
+        code = main(["fmu", "check", str(fmu), "--binding", str(path), *options])
         return code, capsys.readouterr().out
 
     return run
@@ -64,5 +64,5 @@ def test_the_binding_alone_can_be_checked(checked):
 
 
 def test_the_binding_alone_needs_a_binding(gallery, capsys):
-    assert main(["check", str(gallery("converter")[0]), "--only", "binding"]) == 2
+    assert main(["fmu", "check", str(gallery("converter")[0]), "--only", "binding"]) == 2
     assert "needs a binding" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""`gfor bind`, `gfor check`, and a vendor's FMU in a case, as a user meets them."""
+"""`gfor fmu bind`, `gfor fmu check`, and a vendor's FMU in a case, as a user meets them."""
 
 import ast
 import json
@@ -73,22 +73,22 @@ def test_every_result_stands_under_the_name_of_a_check():
 def test_a_draft_tells_what_is_left_to_fill_in(gfor, gallery, tmp_path):
     fmu, _ = gallery("converter_qd_si")
     out = tmp_path / "vendor.toml"
-    code, text, _ = gfor("bind", fmu, "--out", out)
+    code, text, _ = gfor("fmu", "bind", fmu, "--out", out)
     assert code == 0
     assert "to be filled in: S_n" not in text  # its S_n has a start value
     assert text.count("to be filled in: value") == 3
     assert "to be filled in: V_n" in text  # its port is in kV and kA
-    code, _, error = gfor("bind", fmu, "--out", out)
+    code, _, error = gfor("fmu", "bind", fmu, "--out", out)
     assert code == 2
     assert "there already" in error
-    assert gfor("bind", fmu, "--out", out, "--force")[0] == 0
-    code, _, error = gfor("check", fmu, "--binding", out, *FAST)
+    assert gfor("fmu", "bind", fmu, "--out", out, "--force")[0] == 0
+    code, _, error = gfor("fmu", "check", fmu, "--binding", out, *FAST)
     assert code == 2
     assert "still to be filled in" in error
 
 
 def test_a_sound_fmu_ends_with_0(gfor, gallery):
-    code, text, _ = gfor("check", *_bound(gallery("converter_qd_si")), *FAST)
+    code, text, _ = gfor("fmu", "check", *_bound(gallery("converter_qd_si")), *FAST)
     assert code == 0
     assert "no check failed" in text
     assert "S is what is asked" in text
@@ -96,7 +96,7 @@ def test_a_sound_fmu_ends_with_0(gfor, gallery):
 
 def test_a_faulty_one_ends_with_1_and_says_what_to_do(gfor, gallery, tmp_path):
     junit = tmp_path / "out.xml"
-    code, text, _ = gfor("check", gallery("sign")[0], *FAST, "--json", "--junit", junit)
+    code, text, _ = gfor("fmu", "check", gallery("sign")[0], *FAST, "--json", "--junit", junit)
     assert code == 1
     report = json.loads(text)
     assert report["faults"] == ["wrong sign"]
@@ -112,7 +112,9 @@ def test_a_faulty_one_ends_with_1_and_says_what_to_do(gfor, gallery, tmp_path):
 
 def test_one_cause_is_told_once(gfor, gallery):
     """A step that is discarded at 0.3 s ends three checks; what to do about it stands once as well."""
-    code, text, _ = gfor("check", gallery("discards")[0], "--only", "loads", "--only", "runs", "--only", "steady_state")
+    code, text, _ = gfor(
+        "fmu", "check", gallery("discards")[0], "--only", "loads", "--only", "runs", "--only", "steady_state"
+    )
     assert code == 1
     assert text.count("fmi2DoStep returned fmi2Discard") == 1
     assert "error in a step: the same as in 'runs'" in text
@@ -122,7 +124,7 @@ def test_one_cause_is_told_once(gfor, gallery):
 
 
 def test_a_hostile_file_is_a_finding_and_not_an_accident(gfor, gallery, tmp_path):
-    code, text, _ = gfor("check", entities(tmp_path, gallery("gain")[0]))
+    code, text, _ = gfor("fmu", "check", entities(tmp_path, gallery("gain")[0]))
     assert code == 1
     assert "entity expansion" in text
 
@@ -132,12 +134,12 @@ def test_a_hostile_file_is_a_finding_and_not_an_accident(gfor, gallery, tmp_path
     [
         (("none.fmu",), "there is no such file"),
         (("FMU", "--only", "nothing"), "there is no check 'nothing'; there are: archive, binding, fmi_validity"),
-        (("FMU", "--binding", "none.toml"), "`gfor bind FILE.fmu` drafts one"),
+        (("FMU", "--binding", "none.toml"), "`gfor fmu bind FILE.fmu` drafts one"),
         (("FMU", "--time-limit", "-1"), "must be a number above 0"),
     ],
 )
 def test_what_cannot_be_used(arguments, words, gfor, gallery):
-    code, out, error = gfor("check", *[gallery("gain")[0] if a == "FMU" else a for a in arguments])
+    code, out, error = gfor("fmu", "check", *[gallery("gain")[0] if a == "FMU" else a for a in arguments])
     assert code == 2
     assert out == ""
     assert words in error
@@ -153,7 +155,7 @@ def test_what_cannot_be_used(arguments, words, gfor, gallery):
 )
 def test_a_check_at_the_step_of_use(fmu, step, verdict, words, gfor, gallery):
     """Of the last one, an own step of 10 ms, every third step does nothing at 7 ms, and runs agree at common times."""
-    code, text, _ = gfor("check", gallery(fmu)[0], "--only", "sample_time", "--step", step, "--json")
+    code, text, _ = gfor("fmu", "check", gallery(fmu)[0], "--only", "sample_time", "--step", step, "--json")
     result = json.loads(text)["checks"][-1]
     assert code == (verdict == "fail")
     assert result["verdict"] == verdict
@@ -168,13 +170,13 @@ def test_a_check_as_a_case_uses_it(gfor, gallery, case):
     assert (use.step_size, use.point.P) == (1e-4, pytest.approx(0.9))
     assert use.values["S_n"] > 0
     assert found.samefile(binding)
-    code, text, error = gfor("check", fmu, "--case", path, "--only", "power_balance", "--json")
+    code, text, error = gfor("fmu", "check", fmu, "--case", path, "--only", "power_balance", "--json")
     assert code == 0, error
     assert "at 8 points" in json.loads(text)["checks"][-1]["evidence"]
-    code, _, error = gfor("check", gallery("gain")[0], "--case", path)
+    code, _, error = gfor("fmu", "check", gallery("gain")[0], "--case", path)
     assert code == 2
     assert "no component is gain.fmu; say which one it is with --component (components that are FMUs: gfor)" in error
-    code, _, error = gfor("check", fmu, "--component", "gfor")
+    code, _, error = gfor("fmu", "check", fmu, "--component", "gfor")
     assert code == 2
     assert "give --case as well" in error
 
@@ -185,16 +187,16 @@ def test_the_first_scenario_that_has_the_component_is_used(gfor, gallery, case):
     text = path.read_text(encoding="utf-8")
     bare = '[scenarios.bare]\nremove = ["gfor"]\n'
     path.write_text(text.replace("[scenarios.vendor]", f"{bare}[scenarios.vendor]"), encoding="utf-8")
-    code, out, error = gfor("check", fmu, "--case", path, "--only", "units")
+    code, out, error = gfor("fmu", "check", fmu, "--case", path, "--only", "units")
     assert code == 0, error
     assert "As component 'gfor' in scenario 'vendor' of case.toml: P_0 = 0.9, " in out
-    code, _, error = gfor("check", fmu, "--case", path, "--scenario", "bare")
+    code, _, error = gfor("fmu", "check", fmu, "--case", path, "--scenario", "bare")
     assert code == 2
     assert "scenario 'bare' removes component 'gfor'; scenarios that have it: vendor" in error
-    code, _, error = gfor("check", fmu, "--case", path, "--scenario", "other")
+    code, _, error = gfor("fmu", "check", fmu, "--case", path, "--scenario", "other")
     assert "there is no scenario 'other'; scenarios with 'gfor': vendor" in error
     path.write_text(text.replace("[scenarios.vendor]", bare), encoding="utf-8")
-    code, _, error = gfor("check", fmu, "--case", path)
+    code, _, error = gfor("fmu", "check", fmu, "--case", path)
     assert code == 2
     assert "every scenario removes component 'gfor'" in error
 

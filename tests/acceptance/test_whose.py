@@ -109,7 +109,7 @@ def without_libm(content):
 @linux
 def test_a_missing_system_library_is_named_and_said_once(gallery, gfor, tmp_path):
     fmu = changed(gallery("converter")[0], tmp_path, binary=without_libm)
-    code, text, _ = gfor("check", fmu, "--junit", tmp_path / "out.xml")
+    code, text, _ = gfor("fmu", "check", fmu, "--junit", tmp_path / "out.xml")
     assert code == 2
     assert text.count("it needs libq.so.3, which this machine has not") == 1
     assert "install it" in text
@@ -117,7 +117,7 @@ def test_a_missing_system_library_is_named_and_said_once(gallery, gfor, tmp_path
     assert "ask the author" not in text
     suite = ElementTree.parse(tmp_path / "out.xml").getroot()
     assert (suite.get("failures"), suite.get("errors")) == ("0", "1")
-    report = json.loads(gfor("check", fmu, "--json")[1])
+    report = json.loads(gfor("fmu", "check", fmu, "--json")[1])
     assert (report["trusted"], report["faults"]) == (False, [])
     assert report["not_supported"] == ["missing system library"]
     (said,) = [c for c in report["checks"] if c["whose"]]

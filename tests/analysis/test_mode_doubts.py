@@ -110,7 +110,7 @@ def test_a_trend_is_named_and_not_taken_for_growth(tmp_path, gfor):
     assert trends
     assert all(abs(m.eigenvalue) < 0.05 for m in trends)
     assert not any("too short" in text or "doubtful" in text for text in modes.remarks)
-    code, out, _ = gfor("identify", tmp_path / "rec.cfg", "F", "--start", 0)
+    code, out, _ = gfor("signal", "identify", tmp_path / "rec.cfg", "F", "--start", 0)
     rows = [line for line in out.splitlines() if "j" in line]
     assert (code, sum("trend" in row and "100.00" not in row for row in rows)) == (0, len(trends))
 
@@ -135,7 +135,7 @@ def test_too_few_periods_are_not_rounded_to_enough():
 
 
 def test_the_amplitude_of_an_oscillation_is_half_of_its_peak_as_the_help_says(gfor):
-    code, out, _ = gfor("identify", "--help")
+    code, out, _ = gfor("signal", "identify", "--help")
     assert (code, "half of its peak" in " ".join(out.split())) == (0, True)
     assert found(lambda t: swing(t, 0.6, 5, 0.1)).modes[0].amplitude == pytest.approx(0.05)
 

@@ -42,7 +42,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def closed(folder):
     """Our converter with its model inside, and states that cannot be set, as other people's are."""
-    arguments = ["build", "gfor", "--native", "--platform", "linux64", "--with-linear-model", "two_area"]
+    arguments = ["fmu", "build", "gfor", "--native", "--platform", "linux64", "--with-linear-model", "two_area"]
     assert main([*arguments, "--scenario", "pod_pq", "--dest", str(folder)]) == 0
     unsettable = {"modelDescription.xml": lambda text: text.replace(b'settable="true"', b'settable="false"')}
     return rewritten(folder / "gfor.fmu", folder / "closed.fmu", unsettable)
@@ -52,7 +52,7 @@ def closed(folder):
 def system_with(folder, closed):
     """A function from a change of the packed model's JSON to the two-area system with that FMU."""
     ours = folder / "ours.ssp"
-    arguments = ["export-ssp", "two_area", "--scenario", "pod_pq", "--set", "*.native=true", "--out", str(ours)]
+    arguments = ["export", "ssp", "two_area", "--scenario", "pod_pq", "--set", "*.native=true", "--out", str(ours)]
     assert main(arguments) == 0
 
     def make(change=lambda model: None, name="honest"):
@@ -120,7 +120,7 @@ def test_an_element_that_made_a_damped_mode_unstable_is_refused(system_with, cap
     assert "component 'gfor': the linear model inside its FMU is not what the FMU does" in said
     assert re.search(r"\d s into small steps of v_re, v_im, der\(droop\.theta\) is \S+ per unit", said)
     assert re.search(r"off by \d+\S* % of its largest value", said)
-    assert "gfor black-box" in said
+    assert "gfor modes --black-box" in said
 
 
 def test_every_single_element_that_matters_is_seen(master, with_model):
@@ -200,7 +200,7 @@ def test_the_honest_model_is_used_and_said_to_be_packed(system_with, folder, cap
     assert "gfor from the model packed in its FMU" in page
     assert "Modes come from perturbing the running FMUs" not in page
     capsys.readouterr()
-    assert main(["linearize", str(system_with()), "--input", "sg1.governor.delta_P_ref", "--out", str(out)]) == 0
+    assert main(["export", "linear", str(system_with()), "--input", "sg1.governor.delta_P_ref", "--out", str(out)]) == 0
     assert "gfor from the model packed in its FMU" in capsys.readouterr().out
     written = scipy.io.loadmat(out / "pod_pq" / "linear_model.mat")
     assert json.loads(written["provenance"][0])["linearised"]["gfor"] == "packed"

@@ -11,11 +11,15 @@ import orchestrator
 MODULES = (
     *(
         "acceptance",
+        "admittance",
+        "binding",
         "case",
+        "certification",
         "comparison",
         "comtrade",
         "coordinated_design",
         "design",
+        "export",
         "fmu",
         "identification",
         "linear",

@@ -9,10 +9,12 @@ from pathlib import Path
 import pytest
 
 import orchestrator
+from orchestrator.cli import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 NAMES = {
     *("Case", "CosimError", "Modes", "Run", "Scenario", "build", "built_in_cases", "check", "compare", "load"),
+    *("admittance", "bind", "certify", "export", "verify"),
     *("export_comtrade", "identify", "info", "nyquist", "open_fmu", "read_linear_model", "source"),
 }
 
@@ -68,6 +70,21 @@ def test_the_reference_page_lists_every_name():
     page = (ROOT / ".docs" / "reference" / "python.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^::: (orchestrator\.\S+)$", page, re.MULTILINE))
     assert {f"orchestrator.{home}.{name}" for name, home in orchestrator._HOMES.items()} <= listed
+
+
+def test_each_command_has_its_twin_or_the_page_says_why_not():
+    page = (ROOT / ".docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `gfor ([a-z ]+)` \| (.+) \|$", page, re.MULTILINE)
+    assert [command for command, _ in rows] == list(COMMANDS)
+    for command, twin in rows:
+        named = re.findall(r"`([\w.]+)`", twin)
+        assert named or (twin.startswith("none: ") and len(twin.split()) > 5), command
+        for name in named:
+            first, *rest = name.split(".")
+            found = getattr(orchestrator, first)
+            for part in rest:
+                found = getattr(found, part)
+            assert callable(found), name
 
 
 @pytest.mark.slow

@@ -73,7 +73,7 @@ def test_a_run_is_that_of_the_command(gfor, tmp_path, run):
 
 def test_a_linear_model_is_that_of_the_command(gfor, tmp_path, two_area):
     names = ("--input", "gfor.droop.delta_P_ref", "--output", "sg1.omega")
-    code, _, _ = gfor("linearize", "two_area", "--scenario", "gfor", *names, "--out", tmp_path)
+    code, _, _ = gfor("export", "linear", "two_area", "--scenario", "gfor", *names, "--out", tmp_path)
     assert code == 0
     model = two_area.scenario("gfor").linearize(["gfor.droop.delta_P_ref"], ["sg1.omega"])
     for name in "ABCD":
@@ -383,7 +383,7 @@ def test_an_fmu_is_checked_as_a_case_uses_it(fmu_path, gfor, tmp_path):
 
 def test_an_fmu_shows_what_it_declares(fmu_path, gfor):
     found = face.info(fmu_path("infinite_bus"))
-    code, out, _ = gfor("info", fmu_path("infinite_bus"))
+    code, out, _ = gfor("fmu", "info", fmu_path("infinite_bus"))
     assert code == 0
     assert all(name in out for name in found.table().index if not name.startswith("der("))
     assert found.linear_model is None

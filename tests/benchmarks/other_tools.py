@@ -1,4 +1,4 @@
-"""What `gfor info` and `gfor check` say of a folder of FMUs: `python -m tests.benchmarks.other_tools FOLDER`."""
+"""What `gfor fmu info` and `check` say of a folder of FMUs: `python -m tests.benchmarks.other_tools FOLDER`."""
 
 import argparse
 import hashlib
@@ -17,11 +17,11 @@ _PATIENCE = 300
 """Longest time for the checks of one FMU [s]."""
 
 
-def said(command: str, path: Path) -> str:
-    """The last line that a command prints of an FMU, without its name."""
+def said(path: Path) -> str:
+    """The last line that `gfor fmu check` prints of an FMU, without its name."""
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "orchestrator.cli", command, str(path)],
+            [sys.executable, "-m", "orchestrator.cli", "fmu", "check", str(path)],
             capture_output=True, text=True, timeout=_PATIENCE, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
@@ -46,8 +46,8 @@ def main() -> None:
             tool = f"{declared.generation_tool}, FMI {declared.fmi_version}"
         except CosimError:
             tool = ""
-        rows.append((path.name, tool, said("check", path)))
-    table = make_table(f"{len(rows)} FMUs", "File", "Tool", "gfor check", left=3)
+        rows.append((path.name, tool, said(path)))
+    table = make_table(f"{len(rows)} FMUs", "File", "Tool", "gfor fmu check", left=3)
     for row in rows:
         table.add_row(*map(escape, row))
     Console().print(table)

@@ -31,14 +31,14 @@ WORDS: dict[str, tuple[str, ...]] = {
     "run": (*RUN, "--out", "out"),
     "run of two": ("run", "infinite_bus", "--stop", "1.3", "--linear", "--out", "out"),
     "modes": ("modes", "infinite_bus", "--scenario", "dip", "--out", "out"),
-    "linearize": ("linearize", "infinite_bus", "--scenario", "dip", "--out", "out"),
-    "export-ssp": ("export-ssp", "infinite_bus", "--scenario", "dip", "--out", "out"),
-    "export-comtrade": ("export-comtrade", "before/dip", "--out", "out"),
+    "linearize": ("export", "linear", "infinite_bus", "--scenario", "dip", "--out", "out"),
+    "export-ssp": ("export", "ssp", "infinite_bus", "--scenario", "dip", "--out", "out"),
+    "export-comtrade": ("export", "comtrade", "before/dip", "--out", "out"),
     "sensitivities": ("sensitivities", "two_area", "--scenario", "gfor", "--parameter", "gfor.*", "--out", "out"),
     "report": ("report", "before", "--out", "out.html"),
-    "admittance": ("admittance", "gfor.fmu", "--from-hz", "1", "--out", "out"),
-    "build": ("build", "gfor", "--dest", "out"),
-    "bind": ("bind", "gfor.fmu", "--out", "out.toml"),
+    "admittance": ("fmu", "admittance", "gfor.fmu", "--from-hz", "1", "--out", "out"),
+    "build": ("fmu", "build", "gfor", "--dest", "out"),
+    "bind": ("fmu", "bind", "gfor.fmu", "--out", "out.toml"),
 }  # fmt: skip
 """Words of a command by its name here; ``before`` and ``gfor.fmu`` are there."""
 
@@ -139,7 +139,7 @@ def tried(top: Path, before: Path, name: str, count: int, chance: random.Random)
 def made(folder: Path) -> Path:
     """What the commands read: a run, and an FMU."""
     folder.mkdir()
-    for words in ((*RUN, "--out", "before"), ("build", "gfor", "--dest", ".")):
+    for words in ((*RUN, "--out", "before"), ("fmu", "build", "gfor", "--dest", ".")):
         subprocess.run([sys.executable, "-m", "orchestrator.cli", *words], cwd=folder, check=True, capture_output=True)
     return folder
 

@@ -1,4 +1,4 @@
-"""Whether `gfor source` finds the unit that was forced: each reference of each unit, away from modes and at one.
+"""Whether `gfor signal source` finds the unit that was forced: each reference of each unit, away from modes and at one.
 
     python -m tests.benchmarks.sources             # the tables, some minutes
     python -m tests.benchmarks.sources --models    # the linear models of tests/oscillations/models

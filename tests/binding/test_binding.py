@@ -138,7 +138,7 @@ def test_our_converter_behind_a_binding_is_our_converter(fmu_path, binding):
     [
         ('S_n = "1500 MVA"', 'S_n = "1500 kV"', "rating: S_n: .*kV.*MVA is needed"),
         ('S_n = "1500 MVA"', 'S_n = "-3 MVA"', "S_n = -3 MVA; it must exceed 0"),
-        ('["v_re", "v_im"]', '["v_re", "v_xx"]', "voltage: the FMU has no variable 'v_xx'; `gfor info"),
+        ('["v_re", "v_im"]', '["v_re", "v_xx"]', "voltage: the FMU has no variable 'v_xx'; `gfor fmu info"),
         ('["v_re", "v_im"]', '["v_re", "v_re"]', "voltage: form 'rectangular' needs 2 different variables"),
         ('["v_re", "v_im"]', '["v_re", "i_im"]', "voltage: i_im is of causality output; input is needed"),
         ('["v_re", "v_im"]', '["v_re", "v_im"]\nunit = "kV"', "unit = 'kV', but the FMU declares v_re in 'pu'"),
@@ -174,7 +174,7 @@ def test_what_is_in_volts_needs_to_say_which(gallery, binding):
 
 
 def test_a_file_that_is_not_there_or_not_toml(fmu_path, binding, tmp_path):
-    with pytest.raises(InputError, match=r"`gfor bind FILE\.fmu` drafts one"):
+    with pytest.raises(InputError, match=r"`gfor fmu bind FILE\.fmu` drafts one"):
         bound_fmu(fmu_path("gfor"), tmp_path / "none.toml")
     with pytest.raises(InputError, match="not a TOML file"):
         bound_fmu(fmu_path("gfor"), binding("[rating"))

@@ -18,7 +18,7 @@ def hidden(tmp_path_factory):
     """The two-area system with such a converter: nothing of its file is ours but the equations."""
     folder = tmp_path_factory.mktemp("hidden")
     ours, target = folder / "ours.ssp", folder / "hidden.ssp"
-    arguments = ["export-ssp", "two_area", "--scenario", "pod_p", "--set", "*.native=true", "--out", str(ours)]
+    arguments = ["export", "ssp", "two_area", "--scenario", "pod_p", "--set", "*.native=true", "--out", str(ours)]
     assert main(arguments) == 0
     with zipfile.ZipFile(ours) as old:
         fmu = zipfile.ZipFile(io.BytesIO(old.read("resources/gfor.fmu")))
@@ -42,7 +42,7 @@ def test_the_error_names_the_commands_that_do_it(hidden, gfor):
     assert code == 1
     assert "component 'gfor': its FMU does not let a master set its continuous states" in said
     assert "`gfor modes CASE --black-box`" in said
-    assert "`gfor black-box CASE --component gfor`" in said
+    assert "`gfor modes CASE --black-box --component gfor`" in said
 
 
 def test_one_way_to_linearise_at_a_time(gfor):

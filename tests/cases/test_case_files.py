@@ -292,7 +292,8 @@ def test_unknown_scenarios_and_overrides_are_reported(written):
     case = written(LOOP)
     assert the_problem(case.prepare, ["z"]) == "--scenario: there is no scenario 'z'; the case has: loop"
     assert problems_of(case.prepare, (), {"k.G": 1.0, "z.K": 1.0, "k.K": "1 MW"}) == [
-        f"--set k.G: component 'k' has no variable 'G'; `gfor info {case.path.parent / 'fmus' / 'k.fmu'}` lists them",
+        "--set k.G: component 'k' has no variable 'G'; "
+        f"`gfor fmu info {case.path.parent / 'fmus' / 'k.fmu'}` lists them",
         "--set z.K: there is no component 'z'; the case has: x, k",
         "--set k.K: K: '1 MW' is in MW, but a plain number is needed",
     ]

@@ -172,7 +172,7 @@ FAULT = event("bias", "value = 0.01", "0.1 s")
 @pytest.mark.parametrize(("more", "events", "words"), [(LATE, "", "delay"), ("", FAULT, "fault")])
 def test_an_ssp_is_refused_rather_than_written_without_them(tmp_path, capsys, more, events, words):
     case = case_with(tmp_path, more, events)
-    assert main(["export-ssp", str(case.path), "--scenario", "gfor", "--out", str(tmp_path / "x.ssp")]) == 2
+    assert main(["export", "ssp", str(case.path), "--scenario", "gfor", "--out", str(tmp_path / "x.ssp")]) == 2
     assert words in capsys.readouterr().err
     assert not (tmp_path / "x.ssp").exists()
 

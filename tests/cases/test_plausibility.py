@@ -4,12 +4,19 @@ import re
 
 import pytest
 
+from fmus.converter_parts.usual import FOLLOWING
+from fmus.regfm_a1.model import USUAL
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
+from fmus.synchronous_generator.usual import MACHINE
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, sketch_model
+from fmus.toolchain.port_variables import RATED
+from fmus.toolchain.variables import Usual
+from gfor_fmu.usual import FORMING
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.data_rules import RULES
-from orchestrator.cases.plausible_ranges import RANGES
 from orchestrator.errors import CaseError
+from orchestrator.fmi import description
+from orchestrator.fmi.description import read_description
 from tests.binding.test_binding import OURS
 
 CASE = """\
@@ -94,10 +101,8 @@ def test_built_in_cases_raise_no_question(name):
 @pytest.mark.parametrize("name", [n for n in model_names() if not needs_arguments(n)])
 def test_the_defaults_of_every_model_are_plausible_and_obey_the_rules(name):
     start = {v.name: v.start for v in build_model(name).parameters}
-    unit = {v.name: v.unit for v in build_model(name).parameters}
-    for variable in start.keys() & RANGES.keys():
-        assert unit[variable] == RANGES[variable].unit
-        assert RANGES[variable].fits(start[variable]), variable
+    for v in build_model(name).parameters:
+        assert v.usual is None or v.usual.fits(v.start), v.name
     for rule in RULES:
         assert not {rule.larger, rule.smaller} <= start.keys() or rule.holds(start[rule.larger], start[rule.smaller])
 
@@ -110,14 +115,39 @@ RECORDED_PARTS = [
 @pytest.mark.parametrize("parts", RECORDED_PARTS, ids=lambda parts: "-".join(parts.values()))
 def test_the_defaults_of_every_part_that_a_record_can_be_are_plausible(parts):
     for v in sketch_model("synchronous_generator_phasor", **parts).parameters:
-        assert v.name not in RANGES or RANGES[v.name].unit != v.unit or RANGES[v.name].fits(v.start), v.name
+        assert v.usual is None or v.usual.fits(v.start), v.name
 
 
 def test_every_range_and_rule_is_of_a_variable_that_some_model_has():
     known = {v.name for name in model_names() if not needs_arguments(name) for v in build_model(name).parameters}
     recorded = [sketch_model("synchronous_generator_phasor", **parts) for parts in RECORDED_PARTS]
     known |= {v.name for model in recorded for v in model.parameters}
-    assert {*RANGES, *(r.larger for r in RULES), *(r.smaller for r in RULES)} <= known
+    ranged = {*FOLLOWING, *FORMING, *MACHINE, *USUAL, *(v.name for v in RATED)}
+    assert {*ranged, *(r.larger for r in RULES), *(r.smaller for r in RULES)} <= known
+
+
+@pytest.mark.parametrize("name", [n for n in model_names() if not needs_arguments(n)])
+def test_every_model_says_what_it_is_and_its_fmu_tells(name, fmu_path):
+    model = build_model(name)
+    assert model.kind or name.startswith("probe")
+    described = read_description(fmu_path(name))
+    assert described.kind == model.kind
+    for v in model.parameters:
+        told = described.variables[v.name].usual
+        assert told == v.usual or (v.usual is None and v.name in {r.name for r in RATED}), v.name
+
+
+def test_what_a_foreign_fmu_declares_of_itself_is_taken(monkeypatch, questions):
+    """A range of a parameter that none of our models has, and a range that is no number."""
+    read = description._component
+
+    def changed(root, version):
+        kind, usual = read(root, version)
+        return kind, usual | {"machine.D": Usual(2, 3, "their own data")}
+
+    monkeypatch.setattr(description, "_component", changed)
+    description.read_description.cache_clear() if hasattr(description.read_description, "cache_clear") else None
+    assert any("machine.D = 0 pu is outside of 2 to 3 pu (their own data)" in q for q in questions())
 
 
 @pytest.mark.parametrize("value", [6500.0, 0.0999, 15.5])
@@ -386,6 +416,6 @@ def test_a_converter_that_is_loaded_beyond_its_rating_is_questioned(questions, p
 
 @pytest.mark.parametrize(("name", "largest"), [("droop.R_f", 0.3), ("droop.R_V", 0.5)])
 def test_a_droop_of_a_tenth_of_a_percent_is_usual_and_less_is_asked_about(name, largest):
-    wanted = RANGES[name]
+    wanted = FORMING[name]
     assert all(wanted.fits(value) for value in (0.0, 0.001, 0.05, largest))
     assert not any(wanted.fits(value) for value in (0.0009, 1.01 * largest))

@@ -189,7 +189,7 @@ def test_devices_of_one_file_name_keep_their_results_beside_one_that_cannot_be_u
 @pytest.mark.parametrize(
     ("words", "said"),
     [(["a.fmu", "b.fmu"], "there is no such file"), (["x.fmu", "--code", "all"], "there is no such file"),
-     (["a.fmu", "b.fmu", "--check", "report.json"], "a report of `gfor check` is of one FMU"),
+     (["a.fmu", "b.fmu", "--check", "report.json"], "a report of `gfor fmu check` is of one FMU"),
      (["a.fmu", "b.fmu", "--binding", "v.toml"], "does not say whose it is"),
      (["a.fmu", "--code", "all", "--pod", "p"], "only --code nts631 has it"),
      (["a.fmu", "--code", "all", "--set", "sg1.machine.H=4"], "the test bench has no such component")],

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.cases.case import load_case
-from orchestrator.cli import COMMANDS, _parser
+from orchestrator.cli import COMMANDS, GROUPS, OLD, QUESTIONS, _command_in, _parser
 from orchestrator.fmi import wine
 from orchestrator.fmi.description import read_description
 from tests.coupling.small_fmus import small_fmu
@@ -37,14 +37,49 @@ def refused(gfor):
 # -- help ------------------------------------------------------------------------------------------
 
 
-def test_help_opens_with_examples_that_the_command_understands(gfor):
+def test_help_opens_with_the_newcomers_page_and_lists_all(gfor):
     code, out, _ = gfor("--help")
     assert code == 0
-    first, *lines = out.split("\n\n")[0].splitlines()
-    assert first == "examples:"
-    assert len(lines) >= 5
-    assert all(line.startswith("  gfor ") for line in lines)
-    assert {line.split()[1] for line in lines} <= set(COMMANDS)
+    assert out.startswith(QUESTIONS)
+    assert {line.split()[0] for line in out.splitlines() if re.match(r" {4}\w", line)} == {
+        name.split()[0] for name in COMMANDS
+    }
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_a_group_alone_lists_its_commands(gfor, group):
+    code, out, err = gfor(group)
+    assert (code, err) == (0, "")
+    listed = {f"{group} {line.split()[0]}" for line in out.splitlines() if re.match(r" {4}\w", line)}
+    assert listed == {name for name in COMMANDS if name.startswith(f"{group} ")}
+
+
+@pytest.mark.parametrize("old", OLD)
+def test_an_old_spelling_is_the_same_command_with_a_note(gfor, old):
+    """Help of both, but for the note, which is not on standard output."""
+    words = OLD[old].split()
+    command = [words[0]] if words[-1].startswith("--") else words
+    code, out, err = gfor(old, "--help")
+    assert (code, out, err) == (*gfor(*command, "--help")[:2], f"note: gfor {old} is now gfor {OLD[old]}; the old "
+                                "spelling works until 1.0\n")  # fmt: skip
+
+
+def test_an_old_spelling_gives_the_same_json(gfor, fmu_path):
+    path = fmu_path("infinite_bus")
+    code, out, err = gfor(*["info", path, "--json"])
+    assert (code, err.count("\n")) == (0, 1)
+    assert (0, out, "") == gfor("fmu", "info", path, "--json")
+
+
+def test_a_wrong_name_in_a_group_names_what_is_there(refused):
+    assert "invalid choice: 'inf' (choose from 'info', 'bind'" in refused("fmu", "inf", "x.fmu")
+
+
+def test_what_is_of_one_black_box_needs_its_name(refused):
+    case = ("modes", "two_area")
+    assert "give --black-box as well" in refused(*case, "--component", "gfor")
+    assert "--method is for a black box" in refused(*case, "--black-box", "--method", "pulse")
+    assert "--details does not go with --component" in refused(*case, "--black-box", "--component", "gfor", "--details")
 
 
 def test_alone_it_answers_a_newcomers_questions_with_lines_that_parse(gfor):
@@ -53,22 +88,28 @@ def test_alone_it_answers_a_newcomers_questions_with_lines_that_parse(gfor):
     lines = [re.split(r" {2,}", line.strip())[0] for line in out.splitlines() if line.startswith("  gfor ")]
     assert out.count("?\n") >= 4
     assert len(lines) >= 15
-    assert len(out.splitlines()) <= 40
+    assert len(out.splitlines()) <= 36
+    assert max(map(len, out.splitlines())) <= 100
     for line in lines:
-        command, *words = shlex.split(line)[1:]
-        _parser(command).parse_args([command, *words])
+        words = shlex.split(line)[1:]
+        _parser(_command_in(words)).parse_args(words)
+    named = {name for name in COMMANDS if re.search(rf"\b{name.split()[-1]}\b", out)}
+    assert named == set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help(gfor, command):
-    code, out, _ = gfor(command, "--help")
+    code, out, _ = gfor(*command.split(), "--help")
     assert code == 0
     assert out.startswith(f"usage: gfor {command}")
 
 
 def test_as_a_module_in_a_process_of_its_own():
     done = subprocess.run(
-        [sys.executable, "-m", "orchestrator.cli", "info", "none.fmu"], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "orchestrator.cli", "fmu", "info", "none.fmu"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "error: none.fmu: there is no such file; give the path of an .fmu\n"
@@ -195,13 +236,13 @@ def test_square_brackets_of_the_user_are_shown_as_they_are(refused):
 
 
 def test_build_writes_an_fmu_that_info_reads(gfor, tmp_path):
-    code, out, err = gfor("build", "gfor", "--dest", tmp_path / "new")
+    code, out, err = gfor("fmu", "build", "gfor", "--dest", tmp_path / "new")
     assert code == 0
     assert err.startswith("gfor: compiling, Python-backed (1 of 1)")
     assert out == f"{tmp_path / 'new' / 'gfor.fmu'}\n"
     description = read_description(tmp_path / "new" / "gfor.fmu")
 
-    code, out, err = gfor("info", tmp_path / "new" / "gfor.fmu")
+    code, out, err = gfor("fmu", "info", tmp_path / "new" / "gfor.fmu")
     assert (code, err) == (0, "")
     assert description.guid in out
     assert description.title in out
@@ -215,18 +256,18 @@ def test_build_writes_an_fmu_that_info_reads(gfor, tmp_path):
 
 
 def test_build_of_an_unknown_model_builds_nothing(refused, tmp_path):
-    err = refused("build", "gfor", "gfro", "--dest", tmp_path / "new")
+    err = refused("fmu", "build", "gfor", "gfro", "--dest", tmp_path / "new")
     assert "there is no model 'gfro'; there are: external_grid, external_grid_phasor, gfl, " in err
     assert not (tmp_path / "new").exists()
 
 
 def test_build_of_a_model_that_needs_a_network(refused, tmp_path):
-    err = refused("build", "grid", "--dest", tmp_path)
+    err = refused("fmu", "build", "grid", "--dest", tmp_path)
     assert "model 'grid' is built from the [network] table of a case file" in err
 
 
 def test_build_for_an_unknown_platform(refused, tmp_path):
-    assert "invalid choice: 'amiga'" in refused("build", "gfor", "--dest", tmp_path, "--platform", "amiga")
+    assert "invalid choice: 'amiga'" in refused("fmu", "build", "gfor", "--dest", tmp_path, "--platform", "amiga")
 
 
 @pytest.fixture
@@ -246,24 +287,26 @@ def damaged(tmp_path):
 
 def test_info_on_a_file_that_is_not_an_archive(refused, tmp_path):
     (tmp_path / "text.fmu").write_text("text")
-    assert "it is not an FMU: an .fmu is a zip archive and this file is not" in refused("info", tmp_path / "text.fmu")
+    assert "it is not an FMU: an .fmu is a zip archive and this file is not" in refused(
+        "fmu", "info", tmp_path / "text.fmu"
+    )
 
 
 def test_info_on_an_archive_without_a_model_description(refused, damaged):
     path = damaged(keep=lambda name: name != "modelDescription.xml")
-    assert "damaged.fmu: the archive has no modelDescription.xml at its top" in refused("info", path)
+    assert "damaged.fmu: the archive has no modelDescription.xml at its top" in refused("fmu", "info", path)
 
 
 def test_info_on_another_fmi_version(refused, damaged):
     path = damaged(lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"'))
-    assert "it is an FMU of FMI 1.0; this master runs co-simulation of FMI 2.0 and 3.0" in refused("info", path)
+    assert "it is an FMU of FMI 1.0; this master runs co-simulation of FMI 2.0 and 3.0" in refused("fmu", "info", path)
 
 
 def test_info_on_model_exchange_only(refused, damaged):
     exchange = '<ModelExchange modelIdentifier="small_gain" />'
     path = damaged(lambda text: re.sub(r"<CoSimulation .*?/>", exchange, text, flags=re.DOTALL))
     assert "it is not an FMU for co-simulation (for Model Exchange only), which this master needs" in refused(
-        "info", path
+        "fmu", "info", path
     )
 
 
@@ -275,10 +318,10 @@ def test_info_on_an_fmu_for_other_platforms(gfor, refused, damaged, monkeypatch)
 
     monkeypatch.setattr(wine, "find_wine", missing)
     path = damaged(keep=lambda name: not name.startswith(f"binaries/{fmpy.platform}/"))
-    code, out, _ = gfor("info", path)
+    code, out, _ = gfor("fmu", "info", path)
     assert code == 0
     assert f"It cannot run here: it has no binary for this platform ({fmpy.platform})" in " ".join(out.split())
-    assert f"it has no binary for this platform ({fmpy.platform}), only for: " in refused("bind", path)
+    assert f"it has no binary for this platform ({fmpy.platform}), only for: " in refused("fmu", "bind", path)
 
 
 # -- run -------------------------------------------------------------------------------------------

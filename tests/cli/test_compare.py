@@ -1,4 +1,4 @@
-"""``gfor compare`` and ``gfor identify`` on recorded runs."""
+"""``gfor signal compare`` and ``gfor signal identify`` on recorded runs."""
 
 import json
 from types import SimpleNamespace
@@ -31,7 +31,10 @@ def runs(tmp_path):
 
 
 def test_two_runs_side_by_side(runs, capsys):
-    assert main(["compare", *map(str, runs), "--signal", "a.omega - b.omega", "--signal", "b.omega", "--json"]) == 0
+    assert (
+        main(["signal", "compare", *map(str, runs), "--signal", "a.omega - b.omega", "--signal", "b.omega", "--json"])
+        == 0
+    )
     ring, still = json.loads(capsys.readouterr().out)
     assert [m["damping_percent"] for m in ring["modes"]] == pytest.approx(
         [100 * 0.3 / abs(-0.3 + 4j), 100 * 0.9 / abs(-0.9 + 5j)], abs=0.05
@@ -42,13 +45,13 @@ def test_two_runs_side_by_side(runs, capsys):
 
 
 def test_without_signals_those_that_differ_most_are_shown(runs, capsys):
-    assert main(["compare", *map(str, runs)]) == 0
+    assert main(["signal", "compare", *map(str, runs)]) == 0
     out = capsys.readouterr().out
     assert out.index("b.omega") < out.index("a.omega")
 
 
 def test_the_modes_of_a_signal(runs, capsys):
-    assert main(["identify", str(runs[0]), "a.omega", "--start", "1", "--json"]) == 0
+    assert main(["signal", "identify", str(runs[0]), "a.omega", "--start", "1", "--json"]) == 0
     mode, *_ = json.loads(capsys.readouterr().out)
     assert (mode["real"], mode["imag"]) == pytest.approx((-0.3, 4.0), abs=1e-3)
     assert mode["amplitude"] == pytest.approx(0.5e-3 * np.exp(-0.3), rel=0.01)
@@ -57,10 +60,10 @@ def test_the_modes_of_a_signal(runs, capsys):
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["identify", "{0}", "a.speed"], "was not recorded; there are: a.omega, b.omega"),
-        (["identify", "{0}", "b.omega"], "constant"),
-        (["identify", "{0}/..", "a.omega"], "choose a scenario in it: one, two"),
-        (["compare", "{0}", "nowhere"], "there is no trajectory.nc"),
+        (["signal", "identify", "{0}", "a.speed"], "was not recorded; there are: a.omega, b.omega"),
+        (["signal", "identify", "{0}", "b.omega"], "constant"),
+        (["signal", "identify", "{0}/..", "a.omega"], "choose a scenario in it: one, two"),
+        (["signal", "compare", "{0}", "nowhere"], "there is no trajectory.nc"),
     ],
 )
 def test_what_cannot_be_compared_is_said(runs, arguments, word, capsys):
@@ -68,7 +71,7 @@ def test_what_cannot_be_compared_is_said(runs, arguments, word, capsys):
     assert word in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", [["compare", "{0}", "{1}"], ["identify", "{0}", "a.omega"]])
+@pytest.mark.parametrize("command", [["signal", "compare", "{0}", "{1}"], ["signal", "identify", "{0}", "a.omega"]])
 @pytest.mark.parametrize(
     ("start", "words"),
     [
@@ -87,25 +90,27 @@ def test_a_start_that_leaves_nothing_is_refused(runs, gfor, command, start, word
 
 def test_a_start_may_have_a_unit_and_be_the_beginning(runs, gfor):
     for start, same in (("1200 ms", "1.2"), ("0 s", "0")):
-        printed = [gfor("identify", runs[0], "a.omega", "--start", text, "--json")[1] for text in (start, same)]
+        printed = [
+            gfor("signal", "identify", runs[0], "a.omega", "--start", text, "--json")[1] for text in (start, same)
+        ]
         assert printed[0] == printed[1]
         assert json.loads(printed[0])
 
 
 def test_the_heading_names_the_part_of_the_record_that_was_used(runs, gfor):
-    _, out, _ = gfor("identify", runs[0], "a.omega", "--start", "1.005", "--stop", "99")
+    _, out, _ = gfor("signal", "identify", runs[0], "a.omega", "--start", "1.005", "--stop", "99")
     assert "a.omega from 1.01 to 14.99 s" in out
     assert "λ [rad/s]" in out
-    code, _, err = gfor("identify", runs[0], "a.omega", "--start", "3", "--stop", "2")
+    code, _, err = gfor("signal", "identify", runs[0], "a.omega", "--start", "3", "--stop", "2")
     assert (code, "stop = 2.0: it must come after start = 3.0" in err) == (2, True)
 
 
 def test_other_intervals_and_short_runs_are_said(runs, gfor, tmp_path):
-    _, out, _ = gfor("compare", *runs)
+    _, out, _ = gfor("signal", "compare", *runs)
     assert "at [s]" in out
     assert "they are compared at the 750 times that both have" in out.replace("\n", " ")
     short = save(tmp_path / "short", -0.3 + 4j, times=np.arange(0, 1.5, 0.01))
-    code, out, err = gfor("compare", runs[0], short, "--json")
+    code, out, err = gfor("signal", "compare", runs[0], short, "--json")
     assert code == 0
     assert [c["modes"][1] for c in json.loads(out)] == [None, None]
     assert "short ends at t = 1.49 s: its oscillations, which are read from t = 2 s on, are not shown" in err
@@ -115,13 +120,13 @@ def test_other_intervals_and_short_runs_are_said(runs, gfor, tmp_path):
 def test_identify_says_what_the_records_can_show(tmp_path, capsys, interval, near):
     """0.5733 Hz, recorded every second, appears at 0.4267 Hz."""
     run = str(save(tmp_path / "run", complex(-0.02, 2 * np.pi * 0.5733), times=np.arange(0, 100, interval)))
-    assert main(["identify", run, "a.omega"]) == 0
+    assert main(["signal", "identify", run, "a.omega"]) == 0
     out = capsys.readouterr().out
     assert ("0.4267" in out) == near
     assert ("show nothing above 0.5 Hz" in out) == near
     assert "show nothing above" in out
     assert ("Above a quarter of the sampling frequency of 1 Hz" in out) == near
-    assert main(["identify", run, "a.omega", "--json"]) == 0
+    assert main(["signal", "identify", run, "a.omega", "--json"]) == 0
     captured = capsys.readouterr()
     assert isinstance(json.loads(captured.out), list)
     assert "show nothing above" in captured.err

@@ -44,17 +44,17 @@ def test_everything_that_reads_it_says_so(gfor, folders):
     assert "ended_early" not in json.loads((whole / "dip" / "manifest.json").read_text(encoding="utf-8"))
     early = "its run ended early, at t = 2.6"
     for words in (
-        ("identify", cut / "dip", "gfor.omega", "--start", "1.2"),
-        ("compare", whole / "dip", cut / "dip"),
+        ("signal", "identify", cut / "dip", "gfor.omega", "--start", "1.2"),
+        ("signal", "compare", whole / "dip", cut / "dip"),
         ("report", cut),
     ):
         code, _, error = gfor(*words)
         assert code == 0, error
         assert early in " ".join(error.split()), words
-    assert "ends at t = 3 s, and" in " ".join(gfor("compare", whole / "dip", cut / "dip")[2].split())
+    assert "ends at t = 3 s, and" in " ".join(gfor("signal", "compare", whole / "dip", cut / "dip")[2].split())
     for words in (
-        ("identify", whole / "dip", "gfor.omega", "--start", "1.2"),
-        ("compare", whole / "dip", whole / "dip"),
+        ("signal", "identify", whole / "dip", "gfor.omega", "--start", "1.2"),
+        ("signal", "compare", whole / "dip", whole / "dip"),
         ("report", whole),
     ):
         code, _, error = gfor(*words)

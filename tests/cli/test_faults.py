@@ -114,9 +114,9 @@ def test_torn_results_are_refused_by_name_by_all_who_read_them(gfor, tmp_path):
         file.write_bytes(torn)
         for words in (
             ("report", tmp_path),
-            ("identify", tmp_path / "dip", "gfor.p"),
-            ("identify", file, "gfor.p"),
-            ("compare", tmp_path / "dip", tmp_path / "load_step"),
+            ("signal", "identify", tmp_path / "dip", "gfor.p"),
+            ("signal", "identify", file, "gfor.p"),
+            ("signal", "compare", tmp_path / "dip", tmp_path / "load_step"),
         ):
             code, _, error = gfor(*words)
             assert code == 2, words
@@ -128,10 +128,13 @@ def test_results_without_a_manifest_are_read_with_one_warning(gfor, tmp_path):
     assert gfor(*RUN, "--out", tmp_path)[0] == 0
     for path in tmp_path.rglob("manifest.json"):
         path.unlink()
-    for words in (("report", tmp_path), ("compare", tmp_path / "dip", tmp_path / "load_step", "--signal", "gfor.p")):
+    for words in (
+        ("report", tmp_path),
+        ("signal", "compare", tmp_path / "dip", tmp_path / "load_step", "--signal", "gfor.p"),
+    ):
         code, _, error = gfor(*words)
         assert code == 0
-        assert error.count("warning:") == (2 if words[0] == "compare" else 1)
+        assert error.count("warning:") == (2 if "compare" in words else 1)
         assert "there is no manifest.json of these results" in error
 
 
@@ -175,7 +178,7 @@ def test_what_was_recorded_until_a_kill_can_be_read(gfor, tmp_path, wait):
         process.send_signal(signal.SIGKILL)
     begun = list(tmp_path.glob("*.part-*"))
     for place in (*begun, *(tmp_path / name for name in ("base", "gfor") if (tmp_path / name).exists())):
-        code, _, error = gfor("identify", place, "sg1.omega - sg2.omega", "--start", "0", "--json")
+        code, _, error = gfor("signal", "identify", place, "sg1.omega - sg2.omega", "--start", "0", "--json")
         assert code in (0, 1), error  # 1: too short, or constant
         assert "Traceback" not in error
     assert gfor("report", tmp_path)[0] == 2

@@ -1,4 +1,4 @@
-"""``gfor linearize`` and ``gfor run --linear``: the linear model as files, and beside the simulation."""
+"""``gfor export linear`` and ``gfor run --linear``: the linear model as files, and beside the simulation."""
 
 import csv
 import json
@@ -13,7 +13,7 @@ from orchestrator.cli import main
 
 
 def test_the_files_hold_the_model_with_its_names(tmp_path, capsys):
-    code = main(["linearize", "two_area", "--scenario", "gfor", "--continuous", "--out", str(tmp_path)])
+    code = main(["export", "linear", "two_area", "--scenario", "gfor", "--continuous", "--out", str(tmp_path)])
     assert code == 0
     assert "62 states, 1 inputs, 7 outputs" in capsys.readouterr().out
     content = scipy.io.loadmat(tmp_path / "gfor" / "linear_model.mat", simplify_cells=True)
@@ -61,8 +61,8 @@ def test_a_continuous_and_a_stepped_model_answer_alike():
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["linearize", "two_area", "--input", "sg1.S_n"], "fixed parameter"),
-        (["linearize", "two_area", "--output", "sg1.speed"], "no variable 'sg1.speed'"),
+        (["export", "linear", "two_area", "--input", "sg1.S_n"], "fixed parameter"),
+        (["export", "linear", "two_area", "--output", "sg1.speed"], "no variable 'sg1.speed'"),
         (["run", "two_area", "--linear", "--stop", "0.5"], "no event that a linear model could answer to"),
     ],
 )
@@ -73,6 +73,6 @@ def test_what_cannot_be_linear_is_said(arguments, word, tmp_path, capsys):
 
 def test_a_parameter_at_its_bound_is_perturbed_to_the_other_side(gfor, tmp_path):
     """The dip's depth is 0, and may not be less."""
-    code, shown, said = gfor("linearize", "infinite_bus", "--scenario", "dip", "--out", str(tmp_path))
+    code, shown, said = gfor("export", "linear", "infinite_bus", "--scenario", "dip", "--out", str(tmp_path))
     assert (code, said) == (0, "")
     assert "1 inputs" in shown

@@ -19,7 +19,7 @@ __all__ = ["gallery"]
 
 def test_info_as_json_has_what_the_file_declares(gallery, capsys):
     path = gallery("open_lag")[0]
-    assert main(["info", str(path), "--json"]) == 0
+    assert main(["fmu", "info", str(path), "--json"]) == 0
     found, described = json.loads(capsys.readouterr().out), read_description(path)
     assert (found["model_name"], found["fmi_version"]) == ("open_lag", "2.0")
     assert found["continuous_states"] == list(described.states)
@@ -29,10 +29,10 @@ def test_info_as_json_has_what_the_file_declares(gallery, capsys):
     assert [v["name"] for v in found["variables"]] == list(described.variables)
 
 
-@pytest.mark.parametrize("command", ["info", "modes", "check"])
+@pytest.mark.parametrize("command", ["fmu info", "modes", "fmu check"])
 def test_a_folder_is_called_a_folder(command, tmp_path, capsys):
     (tmp_path / "case.toml").write_text("", encoding="utf-8")
-    assert main([command, str(tmp_path)]) == 2
+    assert main([*command.split(), str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert "it is a folder" in said
     assert "no such file" not in said
@@ -52,14 +52,14 @@ def test_a_model_that_breaks_a_rule_is_one_error_of_one_line(monkeypatch, tmp_pa
         return m.build()
 
     monkeypatch.setattr(models, "build_model", lambda name: lag())
-    assert main(["build", "infinite_bus", "--dest", str(tmp_path)]) == 2
+    assert main(["fmu", "build", "infinite_bus", "--dest", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert "error: model 'infinite_bus' cannot be built: variable 'K' is in pu and names no base" in said
     assert "Traceback" not in said
 
 
 def test_a_build_says_what_it_is_at(tmp_path, capsys):
-    assert main(["build", "infinite_bus", "--dest", str(tmp_path)]) == 0
+    assert main(["fmu", "build", "infinite_bus", "--dest", str(tmp_path)]) == 0
     printed = capsys.readouterr()
     assert "infinite_bus: compiling, Python-backed (1 of 1)" in printed.err
     assert printed.out.strip().endswith("infinite_bus.fmu")

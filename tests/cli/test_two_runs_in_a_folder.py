@@ -117,7 +117,8 @@ def test_rows_that_are_not_the_runs_are_not_published(gfor, monkeypatch, tmp_pat
 
 
 @pytest.mark.parametrize(
-    "words", [("report", "{0}"), ("identify", "{0}/dip", "gfor.omega"), ("compare", "{0}/dip", "{0}/dip")]
+    "words",
+    [("report", "{0}"), ("signal", "identify", "{0}/dip", "gfor.omega"), ("signal", "compare", "{0}/dip", "{0}/dip")],
 )
 def test_an_empty_recording_is_one_error(gfor, tmp_path, words):
     assert gfor(*SHORT, "--out", tmp_path)[0] == 0

@@ -56,7 +56,7 @@ def test_a_run_says_it_in_terminal_summary_plots_and_report(tmp_path, capsys):
 
 
 def test_a_linear_model_is_written_with_its_verdict(tmp_path, capsys):
-    code, text = output(capsys, "linearize", "two_area", *FAST, "--out", tmp_path, "--fail-unstable")
+    code, text = output(capsys, "export", "linear", "two_area", *FAST, "--out", tmp_path, "--fail-unstable")
     assert code == 1
     assert text.startswith("UNSTABLE: SG + GFOR")
     verdict = json.loads((tmp_path / "gfor" / "stability.json").read_text(encoding="utf-8"))

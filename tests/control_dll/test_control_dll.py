@@ -188,7 +188,7 @@ def test_what_cannot_be_written_is_refused(part, tmp_path):
 
 
 def test_the_command_writes_library_and_sheet(tmp_path, capsys):
-    call = ["export-dll", "gfor", "--platform", "linux64", "--dest", str(tmp_path), "--set", "S_n=500"]
+    call = ["export", "dll", "gfor", "--platform", "linux64", "--dest", str(tmp_path), "--set", "S_n=500"]
     assert main(call) == 0
     library, sheet = capsys.readouterr().out.split()
     assert read_dll(Path(library)).interface.sample_time == 2e-5
@@ -197,7 +197,7 @@ def test_the_command_writes_library_and_sheet(tmp_path, capsys):
     assert f"| L_c | converter-side inductor, bridge to capacitor | {0.15 * 230**2 / 500 / 0.1 / np.pi:.10g} mH" in text
     assert main([*call, "--set", "S_n=abc"]) == 2
     assert "give NAME=VALUE with a number" in capsys.readouterr().err
-    assert main(["export-dll", "gfl", "--dest", str(tmp_path)]) == 2
+    assert main(["export", "dll", "gfl", "--dest", str(tmp_path)]) == 2
     assert "'gfl' has no control part" in capsys.readouterr().err
 
 

@@ -456,7 +456,7 @@ def test_observers_are_ended_after_a_failure_at_the_point_that_was_reached():
 def test_observers_already_begun_are_ended_if_another_cannot_begin():
     calls = []
     with Master(oscillator(), jacobi(("a", "b")), H) as master:
-        with pytest.raises(InputError, match=r"cannot record 'a\.nothing'.*`gfor info` lists them"):
+        with pytest.raises(InputError, match=r"cannot record 'a\.nothing'.*`gfor fmu info` lists them"):
             master.run(H, (), [Probe(1, calls), Recorder(["a.nothing"], 1)])
         assert master.index == 0
     assert [call for _, call, _ in calls] == ["begin", "observe", "end"]

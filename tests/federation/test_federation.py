@@ -354,7 +354,7 @@ def _until(holds, seconds=60.0):
 
 def test_a_component_of_ours_that_was_started_by_hand(prepared, temporary, started):
     ready, port = prepared(), broker_port(None)
-    words = ["federate", str(ready.case.path), "--component", "load", "--broker", f"tcp://127.0.0.1:{port}"]
+    words = ["master", "federate", str(ready.case.path), "--component", "load", "--broker", f"tcp://127.0.0.1:{port}"]
     late = "import time, sys; time.sleep(3); from orchestrator.cli import main; sys.exit(main(sys.argv[1:]))"
     with subprocess.Popen([sys.executable, "-c", late, *words], stdout=subprocess.PIPE) as process:
         try:
@@ -370,7 +370,7 @@ def test_a_component_of_ours_that_was_started_by_hand(prepared, temporary, start
 
 def test_a_federate_without_a_broker(gfor, prepared):
     words = ("--component", "load", "--broker", f"tcp://127.0.0.1:{broker_port(None)}")
-    code, _, error = gfor("federate", prepared().case.path, *words)
+    code, _, error = gfor("master", "federate", prepared().case.path, *words)
     assert code == 2
     assert "nothing answers there" in error
 

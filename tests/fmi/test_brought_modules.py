@@ -99,7 +99,7 @@ def test_modules_of_an_fmu_are_its_own_alone(foreign):
 
 def test_a_package_is_installed_after_an_fmu_that_brings_a_part_of_it(tmp_path):
     """A case's Python-backed FMUs are loaded before the wrapper's binaries are looked for."""
-    words = ["build", "gfor", "--with-linear-model", "two_area", "--scenario", "pod_p"]
+    words = ["fmu", "build", "gfor", "--with-linear-model", "two_area", "--scenario", "pod_p"]
     done = subprocess.run(
         [sys.executable, "-m", "orchestrator.cli", *words], capture_output=True, text=True, check=False, cwd=tmp_path
     )

@@ -94,7 +94,7 @@ def test_parameters_of_every_type_are_set_by_name(component):
 
 
 def test_an_unknown_name_is_an_input_error_with_a_remedy(component):
-    with pytest.raises(InputError, match=r"component 'converter' has no variable 'pod\.K'; `gfor info` lists them"):
+    with pytest.raises(InputError, match=r"component 'converter' has no variable 'pod\.K'; `gfor fmu info` lists them"):
         component.set({"pod.K": 1.0})
 
 

@@ -161,7 +161,7 @@ def test_at_a_command_s_end_the_signal_wins_over_any_error(gfor, ours, monkeypat
 
     monkeypatch.setattr(info, "run", lambda options: ours["wraps"](library, error, number))
     code, words = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "ended by SIGTERM")}[number]
-    assert gfor("info", "a.fmu") == (code, "", f"{words}\n")
+    assert gfor("fmu", "info", "a.fmu") == (code, "", f"{words}\n")
 
 
 @SIGNALS
@@ -173,7 +173,7 @@ def test_at_a_command_s_end_a_signal_that_was_cleared_is_not_lost(gfor, monkeypa
             return 0
 
     monkeypatch.setattr(info, "run", cleared)
-    assert gfor("info", "a.fmu")[0] == (143 if number == signal.SIGTERM else 130)
+    assert gfor("fmu", "info", "a.fmu")[0] == (143 if number == signal.SIGTERM else 130)
 
 
 def test_an_error_without_a_signal_stays_what_it_is(gfor, monkeypatch):
@@ -181,11 +181,11 @@ def test_an_error_without_a_signal_stays_what_it_is(gfor, monkeypatch):
         raise ResultsError("a file")
 
     monkeypatch.setattr(info, "run", fails)
-    code, _, error = gfor("info", "a.fmu")
+    code, _, error = gfor("fmu", "info", "a.fmu")
     assert (code, error) == (1, "error: a file\n")
     monkeypatch.setattr(info, "run", lambda options: len(1))
     with pytest.raises(TypeError):
-        gfor("info", "a.fmu")
+        gfor("fmu", "info", "a.fmu")
 
 
 _TWICE = """

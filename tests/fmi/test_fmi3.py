@@ -153,7 +153,7 @@ def test_a_refused_value_is_told_in_words_of_fmi_3(ours):
 
 @pytest.mark.slow
 def test_gfor_check_finds_nothing(ours, gfor):
-    code, out, err = gfor("check", ours("gfor", "3.0"), "--time-limit", "10")
+    code, out, err = gfor("fmu", "check", ours("gfor", "3.0"), "--time-limit", "10")
     assert (re.findall(r"^fail.*", out, re.MULTILINE), code, err) == ([], 0, "")
 
 
@@ -167,7 +167,7 @@ def test_no_fmu_waits_for_a_compiler_while_it_is_checked(ours, gfor, monkeypatch
     monkeypatch.setenv("ZIG_LIB_DIR", str(fmu.parent))
     with pytest.raises(RuntimeError, match="the C compiler"):
         compile_library("int never_compiled_before;", host_platform())
-    code, out, err = gfor("check", fmu, "--only", "runs")
+    code, out, err = gfor("fmu", "check", fmu, "--only", "runs")
     assert (re.findall(r"^fail.*", out, re.MULTILINE), code, err) == ([], 0, "")
 
 

@@ -266,7 +266,7 @@ def test_clocks_have_no_start_values(fmu):
 
 def test_gfor_check_says_once_that_a_clock_is_not_supported(fmu, gfor):
     path = fmu(old='intervalVariability="countdown"', new='intervalVariability="triggered"')
-    code, text, _ = gfor("check", path)
+    code, text, _ = gfor("fmu", "check", path)
     assert code == 2
     assert text.count("its clock 'late' is triggered by another FMU's clock") == 1
     assert "not supported here: triggered clocks" in text

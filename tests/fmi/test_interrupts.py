@@ -202,7 +202,7 @@ def test_the_command_line_ends_with_the_code_of_sigterm(gfor, monkeypatch):
     from orchestrator.cli import info  # noqa: PLC0415
 
     monkeypatch.setattr(info, "run", lambda options: signal.raise_signal(signal.SIGTERM))
-    assert gfor("info", "a.fmu") == (143, "", "ended by SIGTERM\n")
+    assert gfor("fmu", "info", "a.fmu") == (143, "", "ended by SIGTERM\n")
 
 
 @pytest.fixture(params=["a command", "a run in Python"])

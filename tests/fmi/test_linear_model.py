@@ -29,7 +29,17 @@ H = 1e-4
 def fmu(tmp_path_factory):
     """The converter with its model at the steady state of the case study with both PODs."""
     folder = tmp_path_factory.mktemp("fmu")
-    arguments = ["build", "gfor", "--with-linear-model", "two_area", "--scenario", "pod_pq", "--dest", str(folder)]
+    arguments = [
+        "fmu",
+        "build",
+        "gfor",
+        "--with-linear-model",
+        "two_area",
+        "--scenario",
+        "pod_pq",
+        "--dest",
+        str(folder),
+    ]
     assert main(arguments) == 0
     return folder / "gfor.fmu"
 
@@ -158,13 +168,23 @@ def test_json_and_matlab_files_say_the_same(fmu):
 
 
 def test_equal_models_give_equal_files(fmu, tmp_path):
-    arguments = ["build", "gfor", "--with-linear-model", "two_area", "--scenario", "pod_pq", "--dest", str(tmp_path)]
+    arguments = [
+        "fmu",
+        "build",
+        "gfor",
+        "--with-linear-model",
+        "two_area",
+        "--scenario",
+        "pod_pq",
+        "--dest",
+        str(tmp_path),
+    ]
     assert main(arguments) == 0
     assert (tmp_path / "gfor.fmu").read_bytes() == fmu.read_bytes()
 
 
 def test_native_fmus_carry_it_too_and_exactly(tmp_path, fmu):
-    arguments = ["build", "gfor", "--native", "--platform", "linux64", "--with-linear-model", "two_area"]
+    arguments = ["fmu", "build", "gfor", "--native", "--platform", "linux64", "--with-linear-model", "two_area"]
     assert main([*arguments, "--scenario", "pod_pq", "--dest", str(tmp_path)]) == 0
     path = tmp_path / "gfor.fmu"
     assert validate_fmu(str(path)) == []
@@ -177,7 +197,7 @@ def test_native_fmus_carry_it_too_and_exactly(tmp_path, fmu):
 
 @pytest.mark.slow
 def test_fmus_of_fmi_3_carry_it_too(tmp_path):
-    arguments = ["build", "synchronous_generator_st4b", "--native", "--fmi", "3.0", "--platform", "linux64"]
+    arguments = ["fmu", "build", "synchronous_generator_st4b", "--native", "--fmi", "3.0", "--platform", "linux64"]
     arguments += ["--with-linear-model", "two_area", "--scenario", "gfor", "--component", "sg1"]
     assert main([*arguments, "--dest", str(tmp_path)]) == 0
     path = tmp_path / "synchronous_generator_st4b.fmu"
@@ -186,11 +206,11 @@ def test_fmus_of_fmi_3_carry_it_too(tmp_path):
 
 
 def test_info_tells_of_it(fmu, fmu_path, capsys):
-    assert main(["info", str(fmu)]) == 0
+    assert main(["fmu", "info", str(fmu)]) == 0
     said = capsys.readouterr().out
     assert "linear model inside: 27 states, 2 inputs, 10 outputs, at the operating point of case two_area" in said
     assert "scenario pod_pq, component gfor" in said
-    assert main(["info", str(fmu_path("gfor"))]) == 0
+    assert main(["fmu", "info", str(fmu_path("gfor"))]) == 0
     assert "linear model" not in capsys.readouterr().out
 
 
@@ -215,7 +235,7 @@ def test_info_tells_of_it(fmu, fmu_path, capsys):
     ],
 )
 def test_what_is_not_clear_is_asked(arguments, word, tmp_path, capsys):
-    assert main(["build", *arguments, "--dest", str(tmp_path)]) == 2
+    assert main(["fmu", "build", *arguments, "--dest", str(tmp_path)]) == 2
     assert word in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
@@ -244,7 +264,7 @@ def foreign(fmu, tmp_path_factory):
     folder = tmp_path_factory.mktemp("foreign")
     description = {"modelDescription.xml": lambda text: text.replace(b'settable="true"', b'settable="false"')}
     closed = rewritten(fmu, folder / "gfor.fmu", description)
-    assert main(["export-ssp", "two_area", "--scenario", "pod_pq", "--out", str(folder / "ours.ssp")]) == 0
+    assert main(["export", "ssp", "two_area", "--scenario", "pod_pq", "--out", str(folder / "ours.ssp")]) == 0
     return rewritten(folder / "ours.ssp", folder / "foreign.ssp", {"resources/gfor.fmu": lambda _: closed.read_bytes()})
 
 
@@ -281,6 +301,6 @@ def test_a_model_of_another_point_is_not_used(foreign, capsys, value, name):
 
 
 def test_an_input_that_the_model_does_not_have(foreign, tmp_path, capsys):
-    arguments = ["linearize", str(foreign), "--input", "gfor.droop.delta_P_ref", "--out", str(tmp_path)]
+    arguments = ["export", "linear", str(foreign), "--input", "gfor.droop.delta_P_ref", "--out", str(tmp_path)]
     assert main(arguments) == 1
     assert "the linear model inside its FMU has no 'droop.delta_P_ref'" in capsys.readouterr().err

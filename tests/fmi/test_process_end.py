@@ -48,7 +48,7 @@ def test_the_last_line_of_an_output(tmp_path, written, words):
 
 
 def test_each_end_of_a_process_has_its_remedy():
-    """`gfor check` of an FMU that forks ended with `KeyError: 'too many processes'`."""
+    """`gfor fmu check` of an FMU that forks ended with `KeyError: 'too many processes'`."""
     assert [fault for fault in ProcessFault if fault not in REMEDIES] == []
     found = {fault_of_exit(code, LIMITS)[0] for code in (*range(-64, 256), 0xC0000005)}
     assert found == set(ProcessFault) - {ProcessFault.HANG, ProcessFault.TAMPERING}

@@ -434,7 +434,7 @@ def test_nothing_outlives_gfor_that_is_killed_while_an_fmu_hangs(layers, fmu):
     assert not Path(folder).exists()
 
 
-# -- gfor check ----------------------------------------------------------------------------------------
+# -- gfor fmu check ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""``gfor nyquist`` as it is typed, on files that the project makes."""
+"""``gfor fmu nyquist`` as it is typed, on files that the project makes."""
 
 import json
 
@@ -29,7 +29,7 @@ def files(folder, line=STRONG, device=None, **points):
 
 def test_the_form_that_must_work(tmp_path, capsys):
     given = files(tmp_path)
-    command = ["nyquist", *given, "--frequency", "50 Hz", "--compensation", "32 %", "--json"]
+    command = ["fmu", "nyquist", *given, "--frequency", "50 Hz", "--compensation", "32 %", "--json"]
     assert main([*command, "--out", str(tmp_path / "out")]) == 0
     answer = json.loads(capsys.readouterr().out)
     line = Line(STRONG.R, STRONG.L, 0.32)
@@ -42,13 +42,13 @@ def test_the_form_that_must_work(tmp_path, capsys):
 
 def test_an_unstable_plant_is_said_on_the_first_line_and_by_the_exit_code(tmp_path, capsys):
     given = files(tmp_path, WEAK)
-    assert main(["nyquist", *given, "--fail-unstable", "--out", str(tmp_path / "out")]) == 3
+    assert main(["fmu", "nyquist", *given, "--fail-unstable", "--out", str(tmp_path / "out")]) == 3
     assert capsys.readouterr().out.startswith("unstable: −1 is encircled")
 
 
 def test_a_setting_of_another_form_is_told_at_its_option(tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["nyquist", "two_area", "--component", "gfor", "--set", "nonsense", "--out", str(tmp_path)])
+        main(["fmu", "nyquist", "two_area", "--component", "gfor", "--set", "nonsense", "--out", str(tmp_path)])
     assert ended.value.code == 2
     assert "'nonsense' is not of the form variable=value" in " ".join(capsys.readouterr().err.split())
 
@@ -70,7 +70,7 @@ def test_python_gives_what_the_command_prints(tmp_path):
 )
 def test_options_that_cannot_be_meant(tmp_path, capsys, more, said):
     try:
-        code = main(["nyquist", *files(tmp_path), *more, "--out", str(tmp_path / "out")])
+        code = main(["fmu", "nyquist", *files(tmp_path), *more, "--out", str(tmp_path / "out")])
     except SystemExit as end:
         code = end.code
     assert code == 2
@@ -78,7 +78,7 @@ def test_options_that_cannot_be_meant(tmp_path, capsys, more, said):
 
 
 def test_a_device_alone_asks_for_its_network(tmp_path, capsys):
-    assert main(["nyquist", files(tmp_path)[0]]) == 2
+    assert main(["fmu", "nyquist", files(tmp_path)[0]]) == 2
     assert "give its network as well" in capsys.readouterr().err
 
 

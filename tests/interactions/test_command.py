@@ -21,7 +21,7 @@ def test_words_files_and_what_is_kept(gfor, results):
     assert code == 0
     assert "stable: the largest real part of all 79 eigenvalues" in said
     assert "worst pair of 3 pairs: A + B: UNSTABLE together, though stable alone" in said
-    assert "stands static_generation, at the same power flow" in said
+    assert "static_generation stands in for the vendors" in said
     assert {path.name for path in results.iterdir() if path.is_file()} >= {
         "modes.csv", "pairs.csv", "interactions.json", "interactions.html",
     }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Jobs for `drivers`: what to couple, as plain data, and as the SSP that ``gfor export-ssp`` would write."""
+"""Jobs for `drivers`: what to couple, as plain data, and as the SSP that ``gfor export ssp`` would write."""
 
 from pathlib import Path
 

@@ -214,7 +214,7 @@ def test_fmpy_is_recognised(master, alike, told, tmp_path):
 
 def test_the_command_builds_the_pair_and_reads_what_it_gave(tmp_path, capsys):
     kit = tmp_path / "kit"
-    assert main(["which-master", "--build", str(kit)]) == 0
+    assert main(["master", "which", "--build", str(kit)]) == 0
     assert sorted(path.name for path in kit.iterdir()) == ["INSTRUCTIONS.md", "probe_a.fmu", "probe_b.fmu"]
     page = (kit / "INSTRUCTIONS.md").read_text(encoding="utf-8")
     assert "`a.y` → `b.u`" in page
@@ -225,12 +225,12 @@ def test_the_command_builds_the_pair_and_reads_what_it_gave(tmp_path, capsys):
     result = tmp_path / "result.csv"
     result.write_text(table(rows), encoding="utf-8")
     capsys.readouterr()
-    assert main(["which-master", str(result)]) == 0
+    assert main(["master", "which", str(result)]) == 0
     out = capsys.readouterr().out
     assert "one after the other" in out
     assert "fmpy_container" in out
     assert "These schedules give the same values here:" in out
-    assert main(["which-master", str(result), "--json"]) == 0
+    assert main(["master", "which", str(result), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["told"]["wire_by_wire"] is True
     assert found["told"]["first_inputs"] is None
@@ -242,16 +242,16 @@ def test_the_command_says_when_nothing_fits(tmp_path, capsys):
     strange[5:, 1] += 0.05
     result = tmp_path / "result.csv"
     result.write_text(table(strange), encoding="utf-8")
-    assert main(["which-master", str(result)]) == 1
+    assert main(["master", "which", str(result)]) == 1
     assert "None of the schedules known here gives these values" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("arguments", [[], ["result.csv", "--build", "kit"]])
 def test_either_a_result_or_a_folder(arguments, capsys):
-    assert main(["which-master", *arguments]) == 2
+    assert main(["master", "which", *arguments]) == 2
     assert "give either the tool's RESULT.csv, or --build DIR" in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_column_without_a_heading(tmp_path, capsys):
-    assert main(["which-master", str(tmp_path / "r.csv"), "--column", "a.y"]) == 2
+    assert main(["master", "which", str(tmp_path / "r.csv"), "--column", "a.y"]) == 2
     assert "write SIGNAL=HEADING" in capsys.readouterr().err

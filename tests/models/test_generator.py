@@ -6,7 +6,7 @@ import pytest
 
 from fmus.synchronous_generator.conversion import AxisData, RotorBranches, classical, exact
 from fmus.synchronous_generator.data import GovernorData
-from fmus.synchronous_generator.governors import ieeeg1
+from fmus.synchronous_generator.turbines.without_limits import ieeeg1
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.model_builder import ModelBuilder
 

@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from fmus.synchronous_generator.exciters import ac4a, st1, st4b
+from fmus.synchronous_generator.excitation.without_ceilings import ac4a, st1, st4b
 from fmus.synchronous_generator.machine import Start
-from fmus.synchronous_generator.stabilizers import pss2a
+from fmus.synchronous_generator.stabilization.norm631 import pss2a
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from fmus.synchronous_generator.stabilizers import pss2a
+from fmus.synchronous_generator.stabilization.norm631 import pss2a
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.model_builder import ModelBuilder
 

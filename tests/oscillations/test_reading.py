@@ -28,7 +28,7 @@ def csv(path, measured, *, units=("pu", "deg", "MW", "Mvar"), scale=(1, 57.29577
 
 
 def test_phasors_in_csv(gfor, tmp_path, measured):
-    code, out, _ = gfor("source", csv(tmp_path / "pmu.csv", measured), "--json")
+    code, out, _ = gfor("signal", "source", csv(tmp_path / "pmu.csv", measured), "--json")
     found = json.loads(out)
     assert code == 0
     (one,) = found["oscillations"]
@@ -41,7 +41,7 @@ def test_phasors_in_csv(gfor, tmp_path, measured):
 
 
 def test_the_first_screen_is_the_answer(gfor, tmp_path, measured):
-    code, out, _ = gfor("source", csv(tmp_path / "pmu.csv", measured), "--details")
+    code, out, _ = gfor("signal", "source", csv(tmp_path / "pmu.csv", measured), "--details")
     assert code == 0
     assert "forced" in out
     assert "sg1 feeds 100 % of it" in out
@@ -57,7 +57,7 @@ def test_the_first_screen_is_the_answer(gfor, tmp_path, measured):
     ],
 )
 def test_units_that_do_not_fit_are_refused(gfor, tmp_path, measured, units, said):
-    code, _, error = gfor("source", csv(tmp_path / "pmu.csv", measured, units=units))
+    code, _, error = gfor("signal", "source", csv(tmp_path / "pmu.csv", measured, units=units))
     assert code == 2
     assert said in error
 
@@ -65,7 +65,7 @@ def test_units_that_do_not_fit_are_refused(gfor, tmp_path, measured, units, said
 def test_a_record_without_phasors_is_told_what_it_needs(gfor, tmp_path):
     file = tmp_path / "f.csv"
     file.write_text("time,f\n" + "".join(f"{0.1 * k},50\n" for k in range(100)))
-    code, _, error = gfor("source", file)
+    code, _, error = gfor("signal", "source", file)
     assert code == 2
     assert "NORTH.vm [pu]" in error
 
@@ -95,7 +95,7 @@ def contest(folder, measured, *, double=True):
 def test_a_folder_of_the_contest(gfor, tmp_path, measured):
     for case in ("Case1", "Case2", "Case10"):
         contest(tmp_path / "cases" / case, measured)
-    code, out, _ = gfor("source", "--contest", tmp_path / "cases", "--json")
+    code, out, _ = gfor("signal", "source", "--contest", tmp_path / "cases", "--json")
     assert code == 0
     found = json.loads(out)
     assert [one["record"] for one in found] == ["Case1", "Case2", "Case10"]
@@ -119,4 +119,4 @@ def test_what_is_no_case_of_the_contest(tmp_path, measured):
 
 def test_neither_or_both_are_refused(gfor, tmp_path):
     assert gfor("source")[0] == 2
-    assert gfor("source", tmp_path, "--contest", tmp_path)[0] == 2
+    assert gfor("signal", "source", tmp_path, "--contest", tmp_path)[0] == 2

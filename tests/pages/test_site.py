@@ -41,7 +41,7 @@ def test_commands_are_filled_in(site):
 
 def test_no_comment_for_tests_stands_where_the_file_is_named(site):
     text = (site / "how-to" / "add-an-exciter" / "index.html").read_text(encoding="utf-8")
-    assert "fmus/synchronous_generator/exciters.py" in text
+    assert "fmus/synchronous_generator/excitation/without_ceilings.py" in text
     assert "title=&quot;" not in text
 
 

@@ -29,7 +29,7 @@ def test_info_shows_what_the_file_says(described, tmp_path, capsys):
         return text.replace(b'name="k"', f'name="k" description="{described}"'.encode())
 
     source = replace(Source("odd", "small.c", {"MODEL_GAIN": 1}, GAIN), change=with_text)
-    assert main(["info", str(build(source, tmp_path))]) == 0
+    assert main(["fmu", "info", str(build(source, tmp_path))]) == 0
     printed = capsys.readouterr().out
     assert described in printed
     assert "v[d]" in printed

@@ -156,7 +156,7 @@ def test_files_that_are_not_there(tmp_path, recording, gfor):
         read_comtrade(tmp_path / "none.cfg")
     path = recording()
     path.with_suffix(".dat").unlink()
-    code, _, error = gfor("identify", path, "UL1")
+    code, _, error = gfor("signal", "identify", path, "UL1")
     assert code == 2
     assert "rec.dat: there is no such file; a recording needs both its .cfg and its .dat" in error
     (tmp_path / "x.cff").write_bytes(b"--- file type: CFG ---\n")
@@ -224,13 +224,13 @@ def test_the_commands(tmp_path, gfor):
     folder = tmp_path / "run"
     folder.mkdir()
     swing(0.02).rename({"F": "a.omega"}).to_netcdf(folder / "trajectory.nc", engine="scipy")
-    code, out, _ = gfor("export-comtrade", folder, "--frequency", 60, "--form", "float32")
+    code, out, _ = gfor("export", "comtrade", folder, "--frequency", 60, "--form", "float32")
     assert (code, out.split()) == (0, [str(folder / "trajectory.cfg"), str(folder / "trajectory.dat")])
-    code, out, _ = gfor("identify", folder / "trajectory.cfg", "a.omega", "--json")
+    code, out, _ = gfor("signal", "identify", folder / "trajectory.cfg", "a.omega", "--json")
     assert json.loads(out)[0]["frequency_hz"] == pytest.approx(0.6, abs=1e-3)
-    code, out, _ = gfor("compare", folder, folder / "trajectory.cfg", "--signal", "a.omega", "--json")
+    code, out, _ = gfor("signal", "compare", folder, folder / "trajectory.cfg", "--signal", "a.omega", "--json")
     assert json.loads(out)[0]["largest"] < 1e-8
-    code, _, error = gfor("export-comtrade", folder, "--form", "morse")
+    code, _, error = gfor("export", "comtrade", folder, "--form", "morse")
     assert (code, "the form 'MORSE' is unknown; choose one of ASCII" in error) == (2, True)
 
 

@@ -71,7 +71,7 @@ def test_outages_are_ranked_and_what_a_bus_does_not_reach_is_said():
 
 
 def test_a_foreign_fmu_is_linearised_and_confirmed(gfor, tmp_path):
-    code, _, err = gfor("build", "gfor", "--dest", str(tmp_path))
+    code, _, err = gfor("fmu", "build", "gfor", "--dest", str(tmp_path))
     assert code == 0, err
     found = find_sites(load_case("two_area"), SiteRequest(str(tmp_path / "gfor.fmu"), scenario="gfor"))
     assert {one.bus for one in found.confirmations} == {"bus_2", "bus_3"}

@@ -183,7 +183,8 @@ def test_modes_and_linear_model_of_a_foreign_system(tmp_path, capsys):
     # μ² − 2μ + 1 + 600·H² = 0
     assert complex(mode["real"], mode["imag"]) == pytest.approx(np.log(1 + 1j * np.sqrt(600) * H) / H, rel=1e-8)
     assert (
-        main(["linearize", str(path), "--output", "a.y", "--input", "a.gain", "--out", str(tmp_path / "linear")]) == 0
+        main(["export", "linear", str(path), "--output", "a.y", "--input", "a.gain", "--out", str(tmp_path / "linear")])
+        == 0
     )
     assert (tmp_path / "linear" / "foreign" / "A.csv").exists()
 

@@ -1,4 +1,4 @@
-"""``gfor export-ssp``: archives that are valid, complete for us, and open to others."""
+"""``gfor export ssp``: archives that are valid, complete for us, and open to others."""
 
 import ctypes
 import json
@@ -82,7 +82,7 @@ def small(tmp_path):
     """A small case and its SSP."""
     case, target = tmp_path / "small.toml", tmp_path / "out" / "small.ssp"
     case.write_text(SMALL_CASE, encoding="utf-8")
-    assert main(["export-ssp", str(case), "--out", str(target)]) == 0
+    assert main(["export", "ssp", str(case), "--out", str(target)]) == 0
     return case, target
 
 
@@ -90,7 +90,7 @@ def small(tmp_path):
 def two_area(tmp_path_factory):
     """SSPs of the two-area system, one a scenario."""
     folder = tmp_path_factory.mktemp("two_area")
-    assert main(["export-ssp", "two_area", "--out", str(folder)]) == 0
+    assert main(["export", "ssp", "two_area", "--out", str(folder)]) == 0
     return {name: folder / f"two_area_{name}.ssp" for name in ("base", "gfor", "pod_p", "pod_q", "pod_pq")}
 
 
@@ -131,7 +131,7 @@ def test_the_two_area_system_comes_back_to_the_last_bit(two_area, name):
 @pytest.mark.slow
 def test_many_units_and_a_unit_s_trip_come_back_too(tmp_path):
     target = tmp_path / "trip.ssp"
-    assert main(["export-ssp", "ieee39", "--scenario", "unit_trip", "--out", str(target)]) == 0
+    assert main(["export", "ssp", "ieee39", "--scenario", "unit_trip", "--out", str(target)]) == 0
     assert_valid(target)
     (before,), (after,) = (
         load_case("ieee39").prepare(["unit_trip"], stop_time=1.2),
@@ -154,7 +154,7 @@ def test_all_commands_take_an_ssp(two_area, tmp_path, capsys):
     assert with_ssp == without
     assert main(["run", ssp, "--stop", "0.2", "--out", str(tmp_path / "run")]) == 0
     assert main(["report", str(tmp_path / "run")]) == 0
-    assert main(["linearize", ssp, "--out", str(tmp_path / "linear")]) == 0
+    assert main(["export", "linear", ssp, "--out", str(tmp_path / "linear")]) == 0
     assert "62 states, 1 inputs, 7 outputs" in capsys.readouterr().out
     assert (tmp_path / "linear" / "pod_p" / "A.csv").exists()
 
@@ -170,12 +170,12 @@ def test_mistakes_in_values_are_told_with_their_place(two_area, capsys):
 def test_equal_contents_give_equal_files(small, tmp_path):
     case, ssp = small
     again = tmp_path / "again.ssp"
-    assert main(["export-ssp", str(case), "--out", str(again)]) == 0
+    assert main(["export", "ssp", str(case), "--out", str(again)]) == 0
     assert again.read_bytes() == ssp.read_bytes()
 
 
 def test_several_scenarios_do_not_go_into_one_file(tmp_path, capsys):
-    assert main(["export-ssp", "two_area", "--out", str(tmp_path / "all.ssp")]) == 2
+    assert main(["export", "ssp", "two_area", "--out", str(tmp_path / "all.ssp")]) == 2
     assert "an SSP holds one scenario, not base, gfor" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 

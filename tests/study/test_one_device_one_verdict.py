@@ -1,4 +1,4 @@
-"""What `gfor check` says of a device and its binding, `modes`, `run` and `certify` say of both in the same words."""
+"""What `fmu check` says of a device and its binding, `modes`, `run` and `certify` say of both in the same words."""
 
 import json
 import re

@@ -61,5 +61,5 @@ def test_without_the_option_nothing_changes():
 
 
 def test_python_backed_fmus_have_no_source(tmp_path, capsys):
-    assert main(["build", "gfor", "--sources", "--dest", str(tmp_path)]) == 2
+    assert main(["fmu", "build", "gfor", "--sources", "--dest", str(tmp_path)]) == 2
     assert "add --native" in capsys.readouterr().err

@@ -309,7 +309,7 @@ BROKEN = {
 def test_a_broken_dll_is_refused_in_one_line(tmp_path, capsys, broken):
     source, words = BROKEN[broken]
     library = compiled(source, tmp_path)
-    assert main(["build", "--from-dll", str(library), "--dest", str(tmp_path)]) == 2
+    assert main(["fmu", "build", "--from-dll", str(library), "--dest", str(tmp_path)]) == 2
     printed = capsys.readouterr().err
     assert "controller.so: " in printed
     assert words in " ".join(printed.split())
@@ -348,7 +348,7 @@ def test_a_library_of_another_machine_is_refused(tmp_path, head, words):
 
 def test_the_command_tells_what_was_found_out(tmp_path, capsys):
     library = compiled(PLACES["library"], tmp_path)
-    assert main(["build", "--from-dll", str(library), "--dest", str(tmp_path)]) == 0
+    assert main(["fmu", "build", "--from-dll", str(library), "--dest", str(tmp_path)]) == 0
     printed = " ".join(capsys.readouterr().out.split())
     assert "lag 1.0: a sample every 0.0001 s; declared states: none" in printed
     assert "it keeps state in variables of its own" in printed

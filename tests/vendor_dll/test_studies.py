@@ -94,9 +94,9 @@ def said(capsys):
     return " ".join((printed.out + printed.err).split())
 
 
-@pytest.mark.parametrize("command", [["admittance"], ["certify"], ["certify", "--code", "aemo"]], ids=" ".join)
+@pytest.mark.parametrize("command", [["fmu", "admittance"], ["certify"], ["certify", "--code", "aemo"]], ids=" ".join)
 def test_a_controller_alone_is_refused_with_the_remedy(folder, capsys, command):
-    assert main([command[0], str(folder / "droop.so"), *command[1:]]) == 2
+    assert main([*command, str(folder / "droop.so")]) == 2
     printed = said(capsys)
     assert "it has no v_re, v_im, i_re, i_im: a controller alone stands at no bus" in printed
     assert "device's file" in printed
@@ -105,17 +105,17 @@ def test_a_controller_alone_is_refused_with_the_remedy(folder, capsys, command):
 
 def test_a_binding_is_drafted_of_a_device_and_a_controller_is_warned_about(folder, capsys):
     draft = folder / "draft.toml"
-    assert main(["bind", str(folder / "droop.toml"), "--out", str(draft)]) == 0
+    assert main(["fmu", "bind", str(folder / "droop.toml"), "--out", str(draft)]) == 0
     assert "REQUIRED:" not in draft.read_text(encoding="utf-8")
     assert "stands at no bus" not in said(capsys)
-    assert main(["bind", str(folder / "droop.so"), "--out", str(folder / "other.toml")]) == 0
+    assert main(["fmu", "bind", str(folder / "droop.so"), "--out", str(folder / "other.toml")]) == 0
     assert "droop.so: a controller alone stands at no bus" in said(capsys)
 
 
 @pytest.mark.parametrize("file", ["droop.so", "droop.toml"])
 def test_the_acceptance_tests_run_it(folder, capsys, file):
     wanted = ["archive", "loads", "state", "settable_states", "power_balance"]
-    assert main(["check", str(folder / file), "--json", *(f"--only={name}" for name in wanted)]) == 0
+    assert main(["fmu", "check", str(folder / file), "--json", *(f"--only={name}" for name in wanted)]) == 0
     verdicts = {c["check"]: c["verdict"] for c in json.loads(capsys.readouterr().out)["checks"]}
     alone = {"power_balance": "not applicable"} if file == "droop.so" else {}
     assert verdicts == dict.fromkeys(wanted, "pass") | alone
@@ -124,7 +124,7 @@ def test_the_acceptance_tests_run_it(folder, capsys, file):
 def test_its_measured_admittance_gives_its_modes(folder, capsys):
     """Through its port alone, though its phase quantities ripple within a period."""
     options = ["--from-hz", "0.5", "--to-hz", "200", "--json", "--out", str(folder / "box")]
-    assert main(["black-box", str(folder / "one.toml"), "--component", "ibr", *options]) == 0
+    assert main(["modes", "--black-box", str(folder / "one.toml"), "--component", "ibr", *options]) == 0
     (found,) = json.loads(capsys.readouterr().out)
     (measured,), (perturbed,) = found["modes"], found["white_box_modes"]
     assert abs(measured["frequency_hz"] - perturbed["frequency_hz"]) < 0.005
@@ -132,7 +132,9 @@ def test_its_measured_admittance_gives_its_modes(folder, capsys):
 
 
 def test_a_sampled_component_beside_the_box_is_named(folder, capsys):
-    assert main(["black-box", str(folder / "one.toml"), "--component", "bus", "--out", str(folder / "no")]) == 1
+    assert (
+        main(["modes", "--black-box", str(folder / "one.toml"), "--component", "bus", "--out", str(folder / "no")]) == 1
+    )
     assert "ibr is sampled beside the communication step, or works on phase quantities" in said(capsys)
 
 
@@ -186,8 +188,8 @@ def test_a_sweep_has_the_modes_of_each_value(folder):
 
 
 def test_info_says_what_the_states_of_a_sampled_controller_are(folder, capsys):
-    assert main(["info", str(folder / "droop.toml")]) == 0
+    assert main(["fmu", "info", str(folder / "droop.toml")]) == 0
     text = "3 in the arrays that it declares, 4 outputs held until its next sample, 5 of the circuit around it"
     assert f"states of a sampled controller: {text}" in said(capsys)
-    assert main(["info", str(folder / "none.so")]) == 2
+    assert main(["fmu", "info", str(folder / "none.so")]) == 2
     assert "give the vendor's .so or .dll file" in said(capsys)

@@ -9,6 +9,7 @@ import casadi as ca
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
+    TerminalVoltage,
     exciter_saturation,
     gain,
     lead_lag_stage,
@@ -18,7 +19,6 @@ from fmus.synchronous_generator.excitation.common import (
     time,
     voltage_before_rectifier,
 )
-from fmus.synchronous_generator.exciters import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, held_at_limits, limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
@@ -33,13 +33,7 @@ _LEAST = 1e-3
 def ac1a(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """Declare it and return (E_fd, |v_t|) [pu].
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    """
+    """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 400.0, "Gain", 1e-3), time(m, "T_A", 0.02, "Amplifier; 0 leaves the lag out")
         A_high, A_low = gain(m, "V_AMAX", 14.5, "Upper limit of V_A"), gain(m, "V_AMIN", -14.5, "Lower limit of V_A")

@@ -1,58 +1,50 @@
-"""What excitation systems have in common: parameters, the measured voltage, a rate feedback, rectifier and saturation.
+"""Parts that excitation systems share: parameters, the measured voltage, a rate feedback, rectifier and saturation.
 
 Signals of a regulator are per unit of the terminal voltage (base S_n) before the gain and of E_fd after it.
 """
 
+from collections.abc import Callable
+from functools import partial
+from typing import Protocol
+
 import casadi as ca
 
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.declarations import require_between, time_constant
 from fmus.synchronous_generator.machine import Start
 from fmus.synchronous_generator.saturation import require_rising, saturated_part
 from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
+
+TerminalVoltage = Callable[[ca.SX], ca.SX]
+"""|v_t| [pu, S_n] for an E_fd [pu]; it depends, weakly, on E_fd because of the transformer in series."""
 
 SOURCE = "typical data, IEEE 421.5"
 
 E_FD = "E_fd"
 
 
-def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
-    """Declare a gain or limit per unit of the field voltage.
+class Exciter(Protocol):
+    """Declares an excitation system and returns (E_fd, |v_t|) [pu]; ``v_s`` is a stabiliser's signal [pu]."""
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text, minimum
-        Of the parameter, as `ModelBuilder.parameter` has them.
-    """
+    def __call__(
+        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
+    ) -> tuple[ca.SX, ca.SX]:
+        """Declare the exciter; returns (E_fd, |v_t|) [pu]."""
+
+
+def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
+    """Declare a gain or limit per unit of the field voltage."""
     return m.parameter(name, value, "pu", text, base=E_FD, minimum=minimum, source=SOURCE)
 
 
-def time(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0) -> ca.SX:
-    """Declare a time constant [s]; where it may be 0, 0 leaves its block out."""
-    T = m.parameter(name, value, "s", text, minimum=minimum, source=SOURCE)
-    if minimum == 0:
-        m.require(
-            ca.if_else(T <= 0, 1, T - m.internal_step / 2),
-            f"exciter.{name} must be 0 or longer than half of internal_step",
-        )
-    return T
+time = partial(time_constant, source=SOURCE)
 
 
 class Measurement:
     """The measured terminal voltage, 1/(1 + s·T_R), and the reference that it is compared with.
 
-    Parameters
-    ----------
-    m
-        The generator's model, in the exciter's scope.
-    start
-        The machine's operating point.
-    terminal_voltage
-        Gives |v_t| [pu, S_n] for an E_fd [pu].
-    I_fd
-        Field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly.
+    ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
+    field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly.
     """
 
     def __init__(self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> None:
@@ -83,16 +75,8 @@ class Measurement:
 def lead_lag_stage(m: ModelBuilder, u: ca.SX, initial: Scalar, mark: str = "", lead: float = 0.0) -> ca.SX:
     """(1 + s·T_C)/(1 + s·T_B), passed through where T_B = 0, which needs T_C = 0.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    u, initial
-        What goes in, and its value in steady state.
-    mark
-        Follows C and B in the parameters' names.
-    lead
-        Default of T_C [s]; T_B is ten seconds then, otherwise 0.
+    ``u``, ``initial``: what goes in, and its value in steady state; ``mark``: follows C and B in the parameters' names;
+    ``lead``: default of T_C [s]; T_B is ten seconds then, otherwise 0.
     """
     T_C = time(m, f"T_C{mark}", lead, f"Lead T_C{mark}")
     T_B = time(m, f"T_B{mark}", 10.0 if lead else 0.0, f"Lag T_B{mark}; 0 leaves the stage out")
@@ -113,26 +97,11 @@ def rate_feedback(
     return gain_F / lag * (u - x), gain_F
 
 
-def require_within(m: ModelBuilder, value: Scalar, low: Scalar, high: Scalar, names: tuple[str, str]) -> None:
-    """Refuse an operating point at or beyond a limit.
-
-    Parameters
-    ----------
-    m
-        The model.
-    value
-        Of the limited signal in steady state.
-    low, high
-        Its limits.
-    names
-        Of the two limits, such as ``exciter.V_RMIN``.
-    """
-    for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
-        m.require(
-            margin,
-            f"{name}: the operating point of the power flow lies at or {side} this limit, so the generator cannot "
-            "hold its voltage; change the limit, the gain, or the generator's voltage and reactive power",
-        )
+require_within = partial(
+    require_between,
+    rule="so the generator cannot hold its voltage; change the limit, the gain, or the generator's voltage and "
+    "reactive power",
+)
 
 
 def exciter_saturation(m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E2: float) -> "ExciterSaturation":

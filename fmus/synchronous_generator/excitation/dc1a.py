@@ -13,6 +13,7 @@ import casadi as ca
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
+    TerminalVoltage,
     exciter_saturation,
     gain,
     lead_lag_stage,
@@ -20,7 +21,6 @@ from fmus.synchronous_generator.excitation.common import (
     require_within,
     time,
 )
-from fmus.synchronous_generator.exciters import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
@@ -37,12 +37,7 @@ def dc1a(
 ) -> tuple[ca.SX, ca.SX]:
     """Declare it and return (E_fd, |v_t|) [pu].
 
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    compensated
-        Whether it has the stage (1+sT_C)/(1+sT_B).
+    ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B).
     """
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 20.0, "Gain", 1e-3), time(m, "T_A", 0.2, "Amplifier; 0 leaves the lag out")

@@ -5,7 +5,7 @@ v_t, I_fd, v_s ──► exciter of another component ──► exciter.E_fd
 
 import casadi as ca
 
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
@@ -13,13 +13,7 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 def external(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """Declare it and return (E_fd, |v_t|) [pu].
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    """
+    """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         m.calculated("E_fd_0", start.E_fd, "pu", "Field voltage of the operating point", base="E_fd")
         m.calculated("v_t_0", start.v_t, "pu", "Terminal voltage of the operating point", base="S_n")

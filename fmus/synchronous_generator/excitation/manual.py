@@ -5,7 +5,7 @@ E_fd = E_fd,0 + delta_E_fd
 
 import casadi as ca
 
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
@@ -13,13 +13,7 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 def manual(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """Declare it and return (E_fd, |v_t|) [pu].
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    """
+    """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         E_0 = m.calculated("E_fd_0", start.E_fd, "pu", "Field voltage of the operating point", base="E_fd")
         delta = m.parameter("delta_E_fd", 0.0, "pu", "Change of the field voltage", base="E_fd", tunable=True)

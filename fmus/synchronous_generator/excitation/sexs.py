@@ -8,8 +8,7 @@ V_ref + V_S ─►(+)►│ 1 + s·T_A │─►│    K    │──► E_fd
 
 import casadi as ca
 
-from fmus.synchronous_generator.excitation.common import Measurement, gain, require_within, time
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import Measurement, TerminalVoltage, gain, require_within, time
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import lead_lag, limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
@@ -18,13 +17,7 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 def sexs(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """Declare it and return (E_fd, |v_t|) [pu].
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    """
+    """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K = gain(m, "K", 100.0, "Gain", 1e-3)
         T_A = time(m, "T_A", 1.0, "Lead")

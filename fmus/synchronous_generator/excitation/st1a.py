@@ -11,13 +11,13 @@ import casadi as ca
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
+    TerminalVoltage,
     gain,
     lead_lag_stage,
     rate_feedback,
     require_within,
     time,
 )
-from fmus.synchronous_generator.exciters import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, close_limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
@@ -26,13 +26,7 @@ from fmus.toolchain.model_builder import ModelBuilder, Scalar
 def st1a(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """Declare it and return (E_fd, |v_t|) [pu].
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    """
+    """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.0, "Amplifier; 0 leaves the lag out")
         I_high, I_low = gain(m, "V_IMAX", 999.0, "Upper limit of the error"), gain(m, "V_IMIN", -999.0, "Lower one")

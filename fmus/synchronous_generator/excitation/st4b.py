@@ -13,8 +13,14 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from fmus.synchronous_generator.excitation.common import Measurement, gain, rectifier, require_within, time
-from fmus.synchronous_generator.exciters import TerminalVoltage
+from fmus.synchronous_generator.excitation.common import (
+    Measurement,
+    TerminalVoltage,
+    gain,
+    rectifier,
+    require_within,
+    time,
+)
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, limited_proportional_integral, low_pass_or_nothing
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
@@ -35,13 +41,7 @@ class _Inner:
 def st4b(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """Declare it and return (E_fd, |v_t|) [pu].
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `exciters.ac4a`.
-    """
+    """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_PR = gain(m, "K_PR", 3.15, "Proportional gain", 0)
         K_IR = m.parameter("K_IR", 3.15, "1/s", "Integral gain", minimum=1e-6)

@@ -1,4 +1,4 @@
-"""What all machines of `synchronous_generator` declare: their base, motion and the transformer in series.
+"""Declarations of all machines of `synchronous_generator`: their base, motion and the transformer in series.
 
 Data sheets give reactances, H and D on ratings of their own; networks on 100 MVA. ``machine.S_data`` says on which.
 """
@@ -29,14 +29,7 @@ class Common:
 def declare_common(m: ModelBuilder, S_n: ca.SX, H: float = 6.5) -> Common:
     """Declare transformer, base, resistance and motion; in steady state speed is 1.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    S_n
-        Rating [MVA].
-    H
-        Default of the inertia constant [s].
+    ``S_n``: rating [MVA]; ``H``: default of the inertia constant [s].
     """
     with m.scope("transformer"):
         R_t = m.parameter("R_t", 0.0, "pu", "Resistance", base=SN, minimum=0)
@@ -53,26 +46,10 @@ def declare_common(m: ModelBuilder, S_n: ca.SX, H: float = 6.5) -> Common:
 
 
 def reactance(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
-    """Declare a reactance on the data's base.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text
-        Of the parameter, as `ModelBuilder.parameter` has them.
-    """
+    """Declare a reactance on the data's base."""
     return m.parameter(name, value, "pu", text, base="S_data", minimum=1e-4, source=SOURCE)
 
 
 def time(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
-    """Declare an open-circuit time constant [s].
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text
-        Of the parameter, as `ModelBuilder.parameter` has them.
-    """
+    """Declare an open-circuit time constant [s]."""
     return m.parameter(name, value, "s", text, minimum=1e-3, source=SOURCE)

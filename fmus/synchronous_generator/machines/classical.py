@@ -19,16 +19,8 @@ from fmus.toolchain.port import DevicePort
 def classical(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
     """Declare the machine.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    port
-        Gives the operating point.
-    S_n
-        Rating [MVA].
-    stator_flux
-        Declares the stator's fluxes: as states, or as signals that a model without stator transients closes.
+    ``port``: gives the operating point; ``S_n``: rating [MVA]; ``stator_flux``: declares the stator's fluxes: as
+    states, or as signals that a model without stator transients closes.
     """
     common = declare_common(m, S_n)
     with m.scope("machine"):

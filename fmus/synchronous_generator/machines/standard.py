@@ -32,13 +32,7 @@ _NO_TIME = 1e-3
 
 
 def two_axis(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
-    """Declare the machine of fourth order (Sauer and Pai). It has no saturation.
-
-    Parameters
-    ----------
-    m, port, S_n, stator_flux
-        As `genrou`.
-    """
+    """Declare the machine of fourth order (Sauer and Pai). It has no saturation."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
         d, q = (
@@ -50,13 +44,7 @@ def two_axis(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDec
 
 
 def gensal(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
-    """Declare the machine of fifth order, one with salient poles. E'_q saturates the d axis.
-
-    Parameters
-    ----------
-    m, port, S_n, stator_flux
-        As `genrou`.
-    """
+    """Declare the machine of fifth order, one with salient poles. E'_q saturates the d axis."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
         X_l, X_2, d = _d_axis(m, common)
@@ -73,16 +61,8 @@ def gensal(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDecla
 def genrou(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
     """Declare the machine of sixth order, one with a round rotor. Its subtransient flux saturates both axes.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    port
-        Gives the operating point.
-    S_n
-        Rating [MVA].
-    stator_flux
-        Declares the stator's fluxes: as states, or as signals that a model without stator transients closes.
+    ``port``: gives the operating point; ``S_n``: rating [MVA]; ``stator_flux``: declares the stator's fluxes: as
+    states, or as signals that a model without stator transients closes.
     """
     common = declare_common(m, S_n)
     with m.scope("machine"):
@@ -101,13 +81,7 @@ def genrou(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDecla
 
 
 def genrou_rated_speed(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
-    """Declare `genrou` with the emf e'' instead of w·e'', as most stability programs have it.
-
-    Parameters
-    ----------
-    m, port, S_n, stator_flux
-        As `genrou`.
-    """
+    """Declare `genrou` with the emf e'' instead of w·e'', as most stability programs have it."""
     return replace(genrou(m, port, S_n, stator_flux), at_rated_speed=True)
 
 
@@ -125,7 +99,7 @@ def _time_1(m: ModelBuilder, axis: str) -> ca.SX:
 
 
 def _one_winding(common: Common, X: ca.SX, X1: ca.SX, T_0: ca.SX, X_l: ca.SX | float = 0.0) -> AxisData:
-    """Of an axis with one winding the leakage reactance changes nothing that is seen from outside."""
+    """Data of an axis with one winding, whose leakage reactance cannot be seen from outside."""
     k = common.scale
     return AxisData(k * X, k * X1, k * X1, ca.SX(k * X_l), T_0, ca.SX(_NO_TIME))
 

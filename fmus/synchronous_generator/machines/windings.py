@@ -67,22 +67,9 @@ def declare_wound_machine(
 ) -> Machine:
     """Declare windings, speed and angle in the steady state of the operating point.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    port
-        Gives the operating point.
-    common
-        Transformer, stator resistance and motion.
-    d, q
-        Data of the axes. With saturation of both axes X''_d = X''_q.
-    stator_flux
-        As `declare_machine`.
-    saturation
-        Of the iron; None for none.
-    salient
-        Whether the last reactances of the axes, X'' or X', may differ.
+    ``port``: gives the operating point; ``common``: transformer, stator resistance and motion; ``d``, ``q``: data of
+    the axes. With saturation of both axes X''_d = X''_q; ``saturation``: of the iron; None for none; ``salient``:
+    whether the last reactances of the axes, X'' or X', may differ.
     """
     with m.scope("machine"):
         circuits = {name: _circuit(m, port, name, axis, common.X_t) for name, axis in (("d", d), ("q", q))}

@@ -1,7 +1,10 @@
-"""What stabilisers have in common: parameters, lead/lag stages and the limits of the signal."""
+"""Parts that stabilisers share: parameters, lead/lag stages and the limits of the signal."""
+
+from functools import partial
 
 import casadi as ca
 
+from fmus.synchronous_generator.declarations import time_constant
 from fmus.toolchain.blocks import clamp, lead_lag
 from fmus.toolchain.model_builder import ModelBuilder
 
@@ -9,40 +12,18 @@ SOURCE = "typical data, IEEE 421.5"
 
 
 def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
-    """Declare a gain or limit per unit.
-
-    Parameters
-    ----------
-    m
-        The generator's model.
-    name, value, text, minimum
-        Of the parameter, as `ModelBuilder.parameter` has them.
-    """
+    """Declare a gain or limit per unit."""
     return m.parameter(name, value, "pu", text, base="S_n", minimum=minimum, source=SOURCE)
 
 
-def time(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
-    """Declare a time constant [s]; 0 leaves its block out."""
-    T = m.parameter(name, value, "s", text, minimum=0, source=SOURCE)
-    m.require(
-        ca.if_else(T <= 0, 1, T - m.internal_step / 2), f"pss.{name} must be 0 or longer than half of internal_step"
-    )
-    return T
+time = partial(time_constant, source=SOURCE)
 
 
 def stage(m: ModelBuilder, u: ca.SX, number: int, names: tuple[str, str], values: tuple[float, float]) -> ca.SX:
     """(1 + s·T_lead)/(1 + s·T_lag), passed through where T_lag = 0, which needs T_lead = 0.
 
-    Parameters
-    ----------
-    m
-        The model.
-    u
-        What goes in; 0 in steady state.
-    number
-        Of the stage.
-    names, values
-        Of lead and lag, and their defaults [s].
+    ``u``: what goes in; 0 in steady state; ``number``: of the stage; ``names``, ``values``: of lead and lag, and their
+    defaults [s].
     """
     T_lead, T_lag = (
         time(m, names[0], values[0], f"Lead of stage {number}"),

@@ -12,13 +12,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 
 
 def pss1a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX) -> ca.SX:
-    """Declare the stabiliser and return its signal to the voltage regulator [pu].
-
-    Parameters
-    ----------
-    m, delta_omega, P_e, P_e_0
-        As `stabilizers.pss2a`; the power is not used.
-    """
+    """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
     with m.scope("pss"):
         K_S = gain(m, "K_S", 20.0, "Gain")
         signal = low_pass_or_nothing(m, "transducer", delta_omega, time(m, "T_6", 0.0, "Transducer; 0 leaves it out"))

@@ -14,7 +14,7 @@ from functools import partial
 import casadi as ca
 
 from fmus.synchronous_generator.stabilization.common import gain, limited_output, stage, time
-from fmus.synchronous_generator.stabilizers import RAMP_LAGS
+from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
 from fmus.toolchain.blocks import clamp, lead_lag, low_pass_or_nothing, washout_or_nothing
 from fmus.toolchain.model_builder import ModelBuilder
 
@@ -22,12 +22,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX, *, newer: bool = False) -> ca.SX:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
-    Parameters
-    ----------
-    m, delta_omega, P_e, P_e_0
-        As `stabilizers.pss2a`.
-    newer
-        Whether it has what PSS2B has beyond PSS2A.
+    ``newer``: whether it has what PSS2B has beyond PSS2A.
     """
     with m.scope("pss"):
         speed, power = delta_omega, P_e - P_e_0

@@ -13,13 +13,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 
 
 def gast(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
-    """Declare governor and turbine and return the mechanical power [pu, S_n].
-
-    Parameters
-    ----------
-    m, w, P_m_0
-        As `tgov1.tgov1`.
-    """
+    """Declare governor and turbine and return the mechanical power [pu, S_n]."""
     with m.scope("governor"):
         R = power(m, "R", 0.05, "Droop", 1e-4)
         T_1 = time(m, "T_1", 0.4, "Governor; 0 leaves the lag out")

@@ -18,13 +18,7 @@ _LEAST_GATE = 1e-3
 
 
 def hygov(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
-    """Declare governor and turbine and return the mechanical power [pu, S_n].
-
-    Parameters
-    ----------
-    m, w, P_m_0
-        As `tgov1.tgov1`.
-    """
+    """Declare governor and turbine and return the mechanical power [pu, S_n]."""
     with m.scope("governor"):
         R = power(m, "R", 0.05, "Permanent droop", 1e-4)
         r = power(m, "r", 0.3, "Transient droop", 1e-4)

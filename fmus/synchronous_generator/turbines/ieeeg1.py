@@ -18,13 +18,7 @@ _FRACTIONS = (0.3, 0.0, 0.3, 0.0, 0.4, 0.0, 0.0, 0.0)
 
 
 def ieeeg1(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
-    """Declare governor and turbine and return the mechanical power [pu, S_n].
-
-    Parameters
-    ----------
-    m, w, P_m_0
-        As `tgov1.tgov1`.
-    """
+    """Declare governor and turbine and return the mechanical power [pu, S_n]."""
     with m.scope("governor"):
         K = power(m, "K", 20.0, "Gain, 1/droop", 0)
         T_1, T_2 = time(m, "T_1", 0.0, "Controller, lag; 0 leaves it out"), time(m, "T_2", 0.0, "Controller, lead")

@@ -137,5 +137,5 @@ static int circuit_start(struct instance *s) {
     const double f_n = s->circuit[AT_FREQUENCY], other = f_n > 55 ? 50 : 60;
     if (status <= WARNING || s->probing || circuit_check(s) || !starts_at(s, other)) return status;
     return say(s, ERROR, "in a network of %g Hz it starts, and here f_n = %g Hz: its control is made for %g Hz, which is the likely cause; "
-               "give f_n = %g in [circuit] of the device's file, in the case that it stands in, or to gfor check as --frequency", other, f_n, other, other);
+               "give f_n = %g in [circuit] of the device's file, in the case that it stands in, or to gfor fmu check as --frequency", other, f_n, other, other);
 }

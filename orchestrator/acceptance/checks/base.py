@@ -45,7 +45,6 @@ class CheckResult:
 
     @classmethod
     def of_dict(cls, values: dict[str, Any]) -> "CheckResult":
-        """The result that `as_dict` wrote."""
         return cls(**{**values, "verdict": Verdict(values["verdict"]), "whose": Whose(values.get("whose", ""))})
 
 
@@ -76,8 +75,6 @@ SAME = ("independence", "repeatability")  # what must hold for two runs to be co
 def check(
     name: str, question: str, needs: tuple[str, ...] = ()
 ) -> Callable[[Callable[[Subject], CheckResult]], Callable[[Subject], CheckResult]]:
-    """Enter a function into `CHECKS`."""
-
     def enter(function: Callable[[Subject], CheckResult]) -> Callable[[Subject], CheckResult]:
         CHECKS[name] = Check(name, question, needs, function)
         return function
@@ -105,7 +102,6 @@ def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
 
 
 def not_applicable(name: str, because: str) -> CheckResult:
-    """A check that has nothing to test on this FMU."""
     return CheckResult(name, Verdict.NOT_APPLICABLE, because)
 
 

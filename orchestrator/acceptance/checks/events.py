@@ -32,7 +32,6 @@ Segment = tuple[complex, float]  # A factor on the voltage, and for how long [s]
 
 
 def factor(draw: np.random.Generator, kind: str) -> complex:
-    """A factor on the voltage, of a kind in `RANGES` or `JUMPS`."""
     if kind in RANGES:
         return complex(round(draw.uniform(*RANGES[kind]), 3))
     return rect(1.0, draw.choice((-1, 1)) * round(draw.uniform(*JUMPS[kind]), 1) * pi / 180)

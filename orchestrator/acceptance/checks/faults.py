@@ -10,7 +10,7 @@ REMEDIES = {
     "too many variables": "ask for an FMU that declares only what others need",
     "entity expansion": "do not trust this file; ask for a model description without a document type",
     "unreadable": "ask for the file again, exported as an FMI 2.0 co-simulation FMU for this platform",
-    "binding does not fit": "mend these places of the binding; `gfor bind` drafts one from the FMU",
+    "binding does not fit": "mend these places of the binding; `gfor fmu bind` drafts one from the FMU",
     "invalid FMI": "have the exporter corrected; `fmpy validate` lists all problems",
     "wrong units": "have the unit corrected in modelDescription.xml; what it means cannot be known otherwise",
     "bad start values": "have the start values declared as FMI 2.0 asks",

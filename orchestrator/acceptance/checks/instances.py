@@ -157,7 +157,6 @@ def repeatability(subject: Subject) -> CheckResult:
 
 
 def _first(subject: Subject, rows: Numbers) -> Numbers:
-    """The run that is the first one of a process."""
     subject.in_a_new_process()
     return subject.through(rows)
 

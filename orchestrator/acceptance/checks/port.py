@@ -32,7 +32,7 @@ _PART = 0.75  # wall-clock time to spend on a long rest, in parts of the time fo
 _GOES_ON = 0.4  # part of a movement that its second half has where it goes on; of a ramp it is a half
 
 WHY = {
-    "no port": "because it has no port: give a binding with --binding (`gfor bind` drafts one), or, around a "
+    "no port": "because it has no port: give a binding with --binding (`gfor fmu bind` drafts one), or, around a "
     "controller alone, a device's file",
     "no start": "because the binding has no start values (P_0, Q_0, v_0, theta_0) to start from a power flow",
 }
@@ -59,7 +59,6 @@ def current_limit(subject: Subject) -> float | None:
 
 
 def voltage_rows(running: Running, factors: Complex) -> Numbers:
-    """Deviations of the inputs, one row for each factor on the voltage from which it started."""
     names = running.subject.inputs
     at = [names.index("v_re"), names.index("v_im")]
     moved = complex(*running.rest[at]) * (factors - 1)

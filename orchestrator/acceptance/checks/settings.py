@@ -59,7 +59,6 @@ def _settings(subject: Subject) -> list[dict[str, float | bool]]:
 
 
 def _in_words(setting: Setting) -> str:
-    """A setting in words, to stand at the end of a sentence."""
     return f", with {', '.join(f'{n} = {str(v).lower()}' for n, v in setting.items())}" if setting else ""
 
 

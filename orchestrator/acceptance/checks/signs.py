@@ -250,7 +250,6 @@ def _apart(a: complex, b: complex) -> float:
 
 
 def _windows(end: float) -> tuple[tuple[float, float], ...]:
-    """An early cycle, and two windows at the end."""
     return _EARLY, (0.7 * end, 0.8 * end), (0.9 * end, end)
 
 

@@ -89,7 +89,6 @@ class Subject:
     # -- instances -------------------------------------------------------------------------------
 
     def open(self, name: str = "fmu") -> HostedComponent:
-        """A new instance, before initialisation."""
         return HostedComponent(name, self.process())
 
     @contextmanager
@@ -189,11 +188,9 @@ class Subject:
         return lambda time: heights[int(time / hold + 1e-6) % len(heights)]
 
     def one_step(self) -> Stimulus:
-        """All inputs step at the beginning and stay."""
         return lambda time: self.amplitudes
 
     def motion(self, step_size: float) -> Stimulus:
-        """All inputs move with every step."""
         return lambda time: self.amplitudes * np.sin(1.0 + 0.86 * time / step_size)
 
     def trajectory(self, steps: int, step_size: float, stimulus: Stimulus, **options: Any) -> Numbers:
@@ -238,7 +235,6 @@ class Running:
         self._in.write()
 
     def read(self) -> Numbers:
-        """The outputs at this time."""
         return self._out.read().copy()
 
     def step(self, step_size: float) -> None:
@@ -267,14 +263,12 @@ class Running:
         return values
 
     def save(self) -> Any:
-        """Save the FMU's state."""
         return self.component.save_state()
 
     def restore(self, state: Any) -> None:
         self.component.restore_state(state)
 
     def reset(self) -> None:
-        """Reset the instance and initialise it again."""
         self.component.reset()
         self.begin()
 
@@ -289,7 +283,6 @@ class Running:
 
 @contextmanager
 def saved(running: Running) -> Iterator[Any]:
-    """A saved state that is freed at the end."""
     state = running.save()
     try:
         yield state

@@ -156,7 +156,6 @@ def _doubts(
 
 
 def _sets(name: str) -> set[str]:
-    """Parameters that a record sets."""
     return {p for field in (_KNOWN[name].fields if name in _KNOWN else ()) for p in field.parameters}
 
 

@@ -27,8 +27,6 @@ _SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may d
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """One generator in service."""
-
     bus: int
     name: str
     line: int

@@ -66,7 +66,6 @@ class Record:
         return int(value)
 
     def error(self, text: str) -> InputError:
-        """An error with the record's place."""
         return InputError(f"{self.place}, line {self.line}: {text}")
 
 

@@ -20,7 +20,6 @@ BY_DECLARATION: dict[str, tuple[Sequence[Declaration], Callable[[Mapping[str, fl
 
 
 def code_for(key: str, given: Mapping[str, object]) -> GridCode:
-    """A code, for what is declared of the converter."""
     if key in CODES:
         checked((), given, key)
         return CODES[key]

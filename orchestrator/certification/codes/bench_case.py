@@ -37,14 +37,12 @@ def rated_frequency(request: CertificationRequest, wanted: float) -> float:
 
 
 def case_name(row: str) -> str:
-    """Name of a row's case file."""
     return f"row_{row}.toml"
 
 
 def write_row(
     request: CertificationRequest, row: str, title: str, programme: BenchProgramme, f_n: float, folder: Path
 ) -> Path:
-    """Write the case file of a row beside the FMU."""
     description = bound_fmu(request.fmu, request.binding)
     own = dict(request.values)
     components: dict[str, Any] = {PLANT: _plant(request, description, own, RATING_MVA, programme.power, f_n)}

@@ -48,11 +48,9 @@ class BenchResult:
 
     @classmethod
     def lost(cls, task: BenchTask, error: WorkerLostError) -> Self:
-        """The result of a row whose worker died."""
         return cls(task.row, failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
         header = {"row": self.row, "findings": self.findings, "seconds": self.seconds}
         return header, signal_arrays(self.times, self.signals)
 

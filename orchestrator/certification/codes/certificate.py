@@ -65,7 +65,6 @@ def certify_code(
     rows: Sequence[str] = (),
     report: CountReport = lambda done, total: None,
 ) -> CodeCertificate:
-    """Run a code's rows and judge them."""
     request.check()
     f_n = rated_frequency(request, code.f_n)
     chosen = [row for row in code.rows if not rows or row.name in rows]

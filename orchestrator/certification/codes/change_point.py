@@ -56,11 +56,9 @@ class ChangeResult:
 
     @classmethod
     def lost(cls, _: ChangeTask, error: WorkerLostError) -> Self:
-        """The result of a row whose worker died."""
         return cls(failure=Failure.lost(error))
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
         return {"criteria": [asdict(criterion) for criterion in self.criteria], "mark": self.mark}, {}
 
     @classmethod
@@ -101,7 +99,6 @@ def margins_with_time(
 
 
 def mark_of(result: BenchResult) -> str:
-    """Hash of a response."""
     hasher = hashlib.sha256(np.ascontiguousarray(result.times).tobytes())
     for name in sorted(result.signals):
         hasher.update(name.encode() + b"\0" + np.ascontiguousarray(result.signals[name]).tobytes())

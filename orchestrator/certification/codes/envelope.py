@@ -67,7 +67,6 @@ class Swinging:
 
     @property
     def ratio(self) -> float:
-        """Damping ratio ζ."""
         return self.decay / self.natural
 
     @property

@@ -93,7 +93,7 @@ def _values(description: FmuDescription, request: CertificationRequest, f_n: flo
     values = {}
     for name, value in wanted.items():
         if name not in description.variables:
-            raise InputError(f"--set {name}: {request.fmu} has no such variable; `gfor info` lists them")
+            raise InputError(f"--set {name}: {request.fmu} has no such variable; `gfor fmu info` lists them")
         try:
             values[name] = convert(description.variables[name], value)
         except ValueError as error:
@@ -118,7 +118,6 @@ def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, 
 
 
 def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
-    """Lines on the figures of `figures_of_stiffness`."""
     slow = figures["slow"]
     least = [f"least |{name}|: {one['value']:.4g} at {one['at_hz']:.4g} Hz" for name, one in figures["least"].items()]
     return [*least, f"P/ω at {slow['at_hz']:g} Hz: {slow['real']:.4g} {slow['imag']:+.4g}j pu/pu"]

@@ -91,7 +91,6 @@ class MeasuredRow:
 
     @property
     def undecided(self) -> list[str]:
-        """What the watch could not tell."""
         return [str(f["message"]) for f in self.findings if f["kind"] == NOT_JUDGED]
 
     @property

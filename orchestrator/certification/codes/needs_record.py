@@ -39,7 +39,6 @@ def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) 
 
 
 def needs_json(plan: ChangePlan, needs: Sequence[CriterionNeeds]) -> dict[str, Any]:
-    """All figures as JSON's types."""
     return {
         "format": FORMAT, "code": plan.certificate.code.key, "change": plan.change,
         "failed": [

@@ -29,7 +29,6 @@ def code_responses(certificate: CodeCertificate) -> xr.Dataset:
 
 
 def code_json(c: CodeCertificate) -> dict[str, Any]:
-    """All figures as JSON's types."""
     return {
         "format": CODE, "code": c.code.key, "title": c.code.title, "source": c.code.source, "date": c.code.date,
         "f_n": c.f_n, "verdict": c.verdict, "sentence": c.sentence(), "model": c.description.model_name,
@@ -50,7 +49,6 @@ def _row(v: RowVerdict, c: CodeCertificate) -> dict[str, Any]:
 
 
 def finding_json(finding: RowFinding) -> dict[str, Any]:
-    """A finding as JSON's types."""
     return {name: getattr(finding, name) for name in RowFinding.__dataclass_fields__}
 
 

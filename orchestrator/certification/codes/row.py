@@ -12,14 +12,9 @@ from orchestrator.certification.codes.programme import BenchProgramme
 class RowFinding:
     """A criterion applied to a response.
 
-    Attributes
-    ----------
-    origin
-        ``code`` where the number is the code's, ``reading`` where the code gives none and this program's is taken.
-    value, limit
-        What was measured and what it is compared with; None where there is no such number.
-    margin
-        How far the value is on the good side of the limit, in parts of the limit (negative: on the bad side).
+    ``origin``: ``code`` where the number is the code's, ``reading`` where the code gives none and this program's is
+    taken; ``value``, ``limit``: what was measured and what it is compared with; None where there is no such number;
+    ``margin``: how far the value is on the good side of the limit, in parts of the limit (negative: on the bad side).
     """
 
     criterion: str
@@ -40,18 +35,9 @@ Judge = Callable[[MeasuredRow], RowFinding]
 class Band:
     """Where a criterion asks a quantity to stay, for a picture.
 
-    Attributes
-    ----------
-    label
-        The quantity, with its unit.
-    quantity
-        The response of a row → the quantity over its times, shape (n,).
-    times
-        At which the limits hold [s], shape (m,).
-    low, high
-        Limits in the quantity's unit, shape (m,); None where there is none.
-    alone
-        Whether it gets a picture of its own, which shows its times alone.
+    ``label``: the quantity, with its unit; ``quantity``: the response of a row → the quantity over its times, shape
+    (n,); ``times``: at which the limits hold [s], shape (m,); ``low``, ``high``: limits in the quantity's unit, shape
+    (m,); None where there is none; ``alone``: whether it gets a picture of its own, which shows its times alone.
     """
 
     criterion: str
@@ -71,7 +57,6 @@ class Bounded:
     bands: Callable[[MeasuredRow], Sequence[Band]]
 
     def __call__(self, row: MeasuredRow) -> RowFinding:
-        """Whether it is met."""
         return self.judge(row)
 
 
@@ -79,14 +64,8 @@ class Bounded:
 class CodeRow:
     """One row of a code's table: a stimulus, and what is asked of the response.
 
-    Attributes
-    ----------
-    name
-        Short, for files: letters, digits and underscores.
-    programme
-        What the bench does, for a rated frequency [Hz].
-    shown_only
-        Whether the code gives no verdict on it.
+    ``name``: short, for files: letters, digits and underscores; ``programme``: what the bench does, for a rated
+    frequency [Hz]; ``shown_only``: whether the code gives no verdict on it.
     """
 
     name: str
@@ -101,18 +80,10 @@ class CodeRow:
 class GridCode:
     """A code as a table.
 
-    Attributes
-    ----------
-    title, source, date
-        What it is, where its numbers were read, and of when it is.
-    f_n
-        Rated frequency of the system [Hz].
-    left_out
-        What the code asks and this table does not test, with the reason.
-    readings
-        Where the code leaves something open, how it was read.
-    declared
-        What the applicant declares of the converter, where the rows depend on it.
+    ``title``, ``source``, ``date``: what it is, where its numbers were read, and of when it is; ``f_n``: rated
+    frequency of the system [Hz]; ``left_out``: what the code asks and this table does not test, with the reason;
+    ``readings``: where the code leaves something open, how it was read; ``declared``: what the applicant declares of
+    the converter, where the rows depend on it.
     """
 
     key: str

@@ -40,7 +40,6 @@ class RowVerdict:
         ]
 
     def word(self, finding: RowFinding) -> str:
-        """What is said of one of its findings: accepted, not accepted, not judged, or that the code has no verdict."""
         if self.row.shown_only:
             return NO_VERDICT
         return {True: "accepted", False: "not accepted", None: NOT_JUDGED}[finding.accepted]

@@ -46,8 +46,6 @@ Distances = Callable[[Numbers], Bounds]
 
 @dataclass(frozen=True)
 class Envelope:
-    """Bounds of one response."""
-
     distances: Distances  # what is asked and allowed over the time after the event [s]
     sign: int  # +1 where the value has to rise
     opens_at_once: bool = False  # whether all of what is allowed is allowed from the event on
@@ -126,7 +124,6 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
 
 
 def rte_code(declared: Mapping[str, float]) -> GridCode:
-    """RTE's rows for what an applicant declares."""
     rows = [
         made
         for scr in (STRONG, WEAK)

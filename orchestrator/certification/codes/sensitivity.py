@@ -34,7 +34,6 @@ class MarginSensitivity:
 
     @property
     def values_that_meet(self) -> list[float]:
-        """Values of the parameter with which the criterion was met."""
         return [value for value, met in zip(self.values, self.met, strict=True) if met]
 
     @property

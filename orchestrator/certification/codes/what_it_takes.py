@@ -51,7 +51,6 @@ class ConfirmedChange:
 
     @property
     def value(self) -> float:
-        """The parameter's value with the change, in its unit."""
         return self.parameter.value + self.change * self.parameter.scale
 
 
@@ -198,7 +197,6 @@ def _computed(
 
 
 def _task(certificate: CodeCertificate, folder: Path, row: str, parameter: Parameter, change: float) -> ChangeTask:
-    """A row with a relative change of one parameter, in the duplicate as well."""
     prepared = _prepared(folder, row)
     value = parameter.value + change * parameter.scale
     places = [name for name in (PLANT, DUPLICATE) if name in prepared.system.components]

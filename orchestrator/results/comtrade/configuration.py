@@ -31,8 +31,6 @@ class Channel:
 
 @dataclass(frozen=True)
 class Configuration:
-    """What a ``.cfg`` says."""
-
     place: str
     station: str
     device: str

@@ -23,7 +23,7 @@ class Member:
     Attributes
     ----------
     fault
-        Its name, as `gfor check` gives it; empty for a good one.
+        Its name, as `gfor fmu check` gives it; empty for a good one.
     binding
         Text of its binding; None for an FMU that has none.
     thread

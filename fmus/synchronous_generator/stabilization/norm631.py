@@ -23,14 +23,8 @@ RAMP_LAGS = 5
 def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX) -> ca.SX:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
-    Parameters
-    ----------
-    m
-        The model it belongs to.
-    delta_omega
-        w − 1 [pu].
-    P_e, P_e_0
-        Electrical power at the terminal [pu, S_n], and at the operating point.
+    ``delta_omega``: w − 1 [pu]; ``P_e``, ``P_e_0``: electrical power at the terminal [pu, S_n], and at the operating
+    point.
     """
     with m.scope("pss"):
         enabled = m.switch("enabled", True, "Adds the stabiliser's signal to the voltage reference", tunable=True)

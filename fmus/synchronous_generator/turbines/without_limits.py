@@ -13,16 +13,8 @@ def ieeeg1(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX, data: GovernorData) -> ca.SX
     −Δw → (1/R)·(1+sT_2)/(1+sT_1) → + P_ref → 1/(1+sT_3) → 1/(1+sT_4) → 1/(1+sT_5) → 1/(1+sT_6)
     → 1/(1+sT_7), tapped after T_4, T_5, T_6 and T_7 with K_1+K_2, K_3+K_4, K_5+K_6 and K_7+K_8.
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    w
-        Rotor speed [pu, f_n].
-    P_m_0
-        Mechanical power at the operating point [pu, S_n].
-    data
-        Defaults of the parameters.
+    ``w``: rotor speed [pu, f_n]; ``P_m_0``: mechanical power at the operating point [pu, S_n]; ``data``: defaults of
+    the parameters.
     """
     with m.scope("governor"):
         enabled = m.switch("enabled", True, "Governor in service; otherwise the mechanical power is constant")

@@ -1,32 +1,19 @@
-"""Excitation systems AC4A, ST1 and ST4B (IEEE 421.5 structures, without ceiling limits).
+"""Excitation systems AC4A, ST1 and ST4B without ceilings (IEEE 421.5 structures), those of the case studies.
 
 Each takes the machine's terminal voltage as a function of its own E_fd, because the transformer in
 series makes |v_t| depend, weakly, on E_fd itself; returned are E_fd and the |v_t| that belongs to it.
 """
 
-from collections.abc import Callable
-from typing import Protocol
-
 import casadi as ca
 
 from fmus.synchronous_generator.data import NTS631, PAPER, STAMP
+from fmus.synchronous_generator.excitation.common import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import lead_lag, low_pass, proportional_integral
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
-TerminalVoltage = Callable[[ca.SX], ca.SX]
-
 LOOP_PASSES = 4
 """Fixed-point passes for the algebraic loop of ST4B; each shrinks its error more than fiftyfold."""
-
-
-class Exciter(Protocol):
-    """Declares an excitation system and returns (E_fd, |v_t|) [pu]; ``v_s`` is a stabiliser's signal [pu]."""
-
-    def __call__(
-        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-    ) -> tuple[ca.SX, ca.SX]:
-        """Declare the exciter; returns (E_fd, |v_t|) [pu]."""
 
 
 def ac4a(
@@ -34,18 +21,9 @@ def ac4a(
 ) -> tuple[ca.SX, ca.SX]:
     """(1+sT_C)/(1+sT_B) → K_A/(1+sT_A).
 
-    Parameters
-    ----------
-    m
-        The generator's model.
-    start
-        The machine's operating point.
-    terminal_voltage
-        Gives |v_t| [pu, S_n] for an E_fd [pu].
-    I_fd
-        Field current; 1 pu gives 1 pu of voltage on open circuit. Of the three exciters ST4B alone needs it.
-    v_s
-        A stabiliser's signal, added to the voltage reference [pu, S_n].
+    ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
+    field current; 1 pu gives 1 pu of voltage on open circuit. Of the three exciters ST4B alone needs it; ``v_s``: a
+    stabiliser's signal, added to the voltage reference [pu, S_n].
     """
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=PAPER)
@@ -59,13 +37,7 @@ def ac4a(
 def st1(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """(1+sT_C)/(1+sT_B) → K_A: as AC4A, with an amplifier that has no lag.
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `ac4a`.
-    """
+    """(1+sT_C)/(1+sT_B) → K_A: as AC4A, with an amplifier that has no lag."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=NTS631)
         v_m, error = _measured_error(m, start.v_t, start.v_t + start.E_fd / K_A, v_s, T_R=0.01, source=NTS631)
@@ -76,13 +48,7 @@ def st1(
 def st4b(
     m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
 ) -> tuple[ca.SX, ca.SX]:
-    """PI → 1/(1+sT_A) → × K_P·|v_t|·f_ex, fed from the machine's own terminal through a rectifier.
-
-    Parameters
-    ----------
-    m, start, terminal_voltage, I_fd, v_s
-        As `ac4a`.
-    """
+    """PI → 1/(1+sT_A) → × K_P·|v_t|·f_ex, fed from the machine's own terminal through a rectifier."""
     with m.scope("exciter"):
         K_PR = m.parameter("K_PR", 3.15, "pu", "Proportional gain", base="E_fd", minimum=0, source=NTS631)
         K_IR = m.parameter("K_IR", 3.15, "1/s", "Integral gain", minimum=1e-6, source=NTS631)

@@ -1,0 +1,43 @@
+"""The draft of a binding."""
+
+from pathlib import Path
+
+from orchestrator.api.values import path as path_of
+from orchestrator.binding.draft import draft_binding
+from orchestrator.errors import InputError, ResultsError
+from orchestrator.fmi.description import read_description
+from orchestrator.safe_files import write_text
+
+
+def bind(fmu: str | Path, out: str | Path | None = None) -> str:
+    """Draft what a foreign FMU's variables mean at our port; returns the text of a binding file.
+
+    Lines with ``GUESS`` are to be confirmed, values ``REQUIRED`` to be filled in.
+
+    Parameters
+    ----------
+    fmu
+        The FMU.
+    out
+        File that the draft is written to, over an older one; without it nothing is written.
+
+    Raises
+    ------
+    InputError
+        If the FMU cannot be used, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> draft = gfor.bind(gfor.build("gfor"))
+    >>> "[voltage]" in draft, "[current]" in draft
+    (True, True)
+    """
+    description, place = read_description(path_of(fmu, "fmu")), None if out is None else path_of(out, "out", "path")
+    text = draft_binding(description, None if place is None else place.parent)
+    if place is not None:
+        try:
+            write_text(place, text)
+        except ResultsError as error:
+            raise InputError(f"--out {error}") from error
+    return text

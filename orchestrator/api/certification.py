@@ -1,0 +1,245 @@
+"""Certificates: a converter's FMU under a grid code, and whether a certificate still holds."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.api.executors import choose_executor
+from orchestrator.api.progress import shown_progress
+from orchestrator.api.values import binding_path, plain
+from orchestrator.api.values import path as path_of
+from orchestrator.errors import InputError
+from orchestrator.results.lock import held
+from orchestrator.safe_files import made_folder
+
+if TYPE_CHECKING:
+    from orchestrator.certification.verification import Verification
+    from orchestrator.points.executor import Executor
+    from orchestrator.points.points import CountReport
+
+
+class IssuedCertificate:
+    """A certificate in its folder. `certify` makes it.
+
+    Attributes
+    ----------
+    folder
+        It holds the page, the figures, the responses and the FMU; `verify` takes it.
+    content
+        The figures, as ``certificate.json`` has them.
+    """
+
+    def __init__(self, folder: Path, content: dict[str, Any]) -> None:
+        self.folder, self.content = folder, content
+
+    @property
+    def verdict(self) -> str:
+        """``passes``, ``fails`` or ``incomplete``."""
+        return str(self.content["verdict"])
+
+    @property
+    def sentence(self) -> str:
+        """The verdict as a sentence, with what failed or was not tested."""
+        return str(self.content["sentence"])
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor certify --json`` prints, as JSON's types."""
+        return self.content
+
+    def __repr__(self) -> str:
+        return f"<IssuedCertificate in {self.folder}: {self.verdict}>"
+
+
+def certify(
+    fmu: str | Path,
+    code: str = "nts631",
+    *,
+    binding: str | Path | None = None,
+    values: Mapping[str, Any] | None = None,
+    declared: Mapping[str, float] | None = None,
+    pod: str | None = None,
+    reactances: Sequence[float] | None = None,
+    black_box: bool = False,
+    check: bool = True,
+    folder: str | Path | None = None,
+    workers: int | None = 1,
+    progress: bool = False,
+) -> IssuedCertificate:
+    """Test a converter's FMU under a grid code, and write its certificate.
+
+    Parameters
+    ----------
+    fmu
+        The converter.
+    code
+        ``"nts631"``, the damping test, or another that ``gfor certify --code`` names, with a verdict.
+    binding
+        File that says what the FMU's variables mean at our port.
+    values
+        Of the converter, such as ``{"pod_p.K": 150}``; or of the damping test's study, which makes it another test.
+    declared
+        What the applicant declares, for codes that compare the converter with that.
+    pod
+        Active damping controllers, ``"none"``, ``"p"``, ``"q"`` or ``"pq"``; as the FMU shows them by default.
+    reactances
+        Line reactances of the damping test [pu]; the norm's 13 by default, less is incomplete.
+    black_box
+        Do not use the converter's states for the modes, even if it shows them.
+    check
+        Whether the acceptance tests of the FMU are run.
+    folder
+        For the certificate; ``results/certify_<file>[_<code>]`` by default. Points that are there are kept.
+    workers
+        Processes; one for each core where None.
+    progress
+        Whether a bar is shown.
+
+    Raises
+    ------
+    InputError
+        If there is no such code, or the FMU, the binding or a value cannot be used.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> gfor.certify("vendor.fmu", "miso", folder="certificate").verdict  # doctest: +SKIP
+    'passes'
+    >>> gfor.certify("vendor.fmu", "misa")
+    Traceback (most recent call last):
+        ...
+    orchestrator.errors.InputError: code = 'misa'; choose from nts631, miso, aemo, ercot, fingrid, prc029, rte
+    """
+    from orchestrator.certification.acceptance import run_checks  # noqa: PLC0415 - `verify` computes less
+    from orchestrator.certification.files import JSON, read_record, save  # noqa: PLC0415 - as above
+    from orchestrator.certification.issue import NTS631, WITH_VERDICT, issue_of  # noqa: PLC0415 - as above
+    from orchestrator.certification.request import REACTANCES  # noqa: PLC0415 - as above
+
+    if code not in WITH_VERDICT:
+        raise InputError(f"code = {code!r}; choose from {', '.join(WITH_VERDICT)}")
+    file, given = path_of(fmu, "fmu"), plain(values)
+    chosen = REACTANCES if reactances is None else tuple(reactances)
+    issue = issue_of(code, file, binding_path(binding), given, declared=declared or {}, pod=pod, reactances=chosen,
+                     black_box=black_box)  # fmt: skip
+    usual = Path("results") / f"certify_{file.stem}{'' if code == NTS631 else f'_{code}'}"
+    place = made_folder(usual if folder is None else path_of(folder, "folder", "folder"), "folder")
+    with held(place), shown_progress(f"Certificate, {code}", shown=progress) as report:
+        with closing(choose_executor(workers, None, [issue.worker])) as executor:
+            found = issue.compute(executor, place, report)
+        found.acceptance = run_checks(issue.request.fmu, issue.request.binding, place) if check else None
+        save(found, place)
+    return IssuedCertificate(place, read_record(place / JSON))
+
+
+def verify(
+    certificate: str | Path, anew: Iterable[float | str] | None = None, *, every: bool = False, workers: int | None = 1
+) -> "Verification":
+    """Whether a certificate still holds: hashes, its judgement made again, and points or rows computed anew.
+
+    Parameters
+    ----------
+    certificate
+        Its folder, or its ``certificate.json``.
+    anew
+        Line reactances [pu], or names of rows, that are computed anew; the least damped point, or the row with the
+        narrowest margin and one by chance, where None; none where empty.
+    every
+        Compute all of them anew.
+    workers
+        Processes; one for each core where None.
+
+    Returns
+    -------
+    Verification
+        ``holds``, with what agreed and what did not.
+
+    Raises
+    ------
+    InputError
+        If it is no certificate, or has no such point or row.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> gfor.verify("certificate", anew=()).holds  # doctest: +SKIP
+    True
+    >>> try:
+    ...     gfor.verify("nowhere")
+    ... except gfor.CosimError as error:
+    ...     print(type(error).__name__)
+    InputError
+    """
+    from orchestrator.certification.verification import read_certificate, verify_files  # noqa: PLC0415 - as above
+
+    folder, content = read_certificate(path_of(certificate, "certificate"))
+    wanted = None if anew is None else tuple(anew)
+    chosen = [] if wanted == () and not every else chosen_anew(folder, content, wanted or (), every=every)
+    found = verify_files(folder, content)
+    if chosen and found.holds:
+        with closing(choose_executor(workers, None, [worker_of(content)])) as executor:
+            again = verify_anew(folder, content, chosen, executor)
+        found.faults, found.agreed = found.faults + again.faults, found.agreed + again.agreed
+    return found
+
+
+def worker_of(content: Mapping[str, Any]) -> str:
+    """The module that a process imports to compute a part of a certificate anew."""
+    return f"orchestrator.certification.{'point' if is_of_norm(content) else 'codes.bench_point'}"
+
+
+def is_of_norm(content: Mapping[str, Any]) -> bool:
+    """Whether it is the damping test's, which has points at line reactances; others have rows."""
+    from orchestrator.certification.form import NORM  # noqa: PLC0415 - as above
+
+    return bool(content["format"] == NORM)
+
+
+def chosen_anew(folder: Path, content: dict[str, Any], wanted: Sequence[Any], *, every: bool) -> list[Any]:
+    """Line reactances, or names of rows, that are computed anew.
+
+    Parameters
+    ----------
+    folder, content
+        The certificate.
+    wanted
+        Those that were asked for.
+    every
+        Whether all are meant.
+    """
+    from orchestrator.certification.codes.rows_anew import chosen_rows  # noqa: PLC0415 - as above
+    from orchestrator.certification.points_anew import chosen_points  # noqa: PLC0415 - as above
+
+    norm, named = is_of_norm(content), any(isinstance(one, str) for one in wanted)
+    if norm and named:
+        raise InputError(f"--rows: {folder} is the certificate of a damping test, which has points; give --points, "
+                         "with line reactances")  # fmt: skip
+    if wanted and not norm and not named:
+        raise InputError(f"--points: {folder} is the certificate of a grid code, which has rows; give --rows, with "
+                         "their names")  # fmt: skip
+    return chosen_points(content, wanted, every=every) if norm else chosen_rows(content, wanted, every=every)
+
+
+def verify_anew(
+    folder: Path,
+    content: dict[str, Any],
+    chosen: list[Any],
+    executor: "Executor",
+    report: "CountReport" = lambda done, total: None,
+) -> "Verification":
+    """Compute points or rows anew, and compare them with what was certified.
+
+    Parameters
+    ----------
+    folder, content
+        The certificate.
+    chosen
+        What `chosen_anew` gave.
+    executor
+        Where they are computed.
+    report
+        Called with how many are done, of how many.
+    """
+    from orchestrator.certification.codes.rows_anew import verify_rows  # noqa: PLC0415 - as above
+    from orchestrator.certification.points_anew import verify_points  # noqa: PLC0415 - as above
+
+    return (verify_points if is_of_norm(content) else verify_rows)(folder, content, chosen, executor, report)
