@@ -13,7 +13,6 @@ from orchestrator.api.coordinated_design import STUDY as COORDINATED_DESIGN
 from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoints, request_of
 from orchestrator.api.design import ControllerDesign, Wanted, design_controller
 from orchestrator.api.design import request_of as design_of
-from orchestrator.api.executors import Plan, PointStudy, Result, Shown, choose_executor
 from orchestrator.api.interactions import STUDY as INTERACTIONS
 from orchestrator.api.interactions import Interactions, WantedInteractions
 from orchestrator.api.interactions import request_of as interactions_of
@@ -39,6 +38,7 @@ from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.points.store import POINTS
+from orchestrator.points.study import Plan, PointStudy, Result, Shown, choose_executor
 from orchestrator.results.lock import held
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 from orchestrator.screening.study import plan_screening
@@ -591,7 +591,7 @@ def _studied(
 ) -> Shown:
     """Plan a study and compute it; a folder that keeps its points is kept from other commands meanwhile."""
     workers, scheduler, tls = where
-    executor = choose_executor(workers, scheduler, (study.worker,), tls)
+    executor = choose_executor(workers, scheduler, study.task, tls)
     planned = plan()
     question(study.prepared(planned), above=1)
     kept = None if folder is None else _folder(folder)

@@ -7,14 +7,15 @@ from typing import Any, TypedDict
 import pandas as pd
 
 from orchestrator.api.design import parameter_file_path, require_controllers
-from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
 from orchestrator.asked import Names, checked, require_known
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.coordinated_design.files import as_json, points_rows, ranking_rows, save
+from orchestrator.coordinated_design.point import PointsTask
 from orchestrator.coordinated_design.study import PointsDesign, PointsDesignRequest, design_over_points, values_of
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.errors import InputError
+from orchestrator.points.study import PointStudy
 
 
 class WantedOverPoints(TypedDict, total=False):
@@ -127,4 +128,4 @@ class CoordinatedDesign:
         return page(f"Design over points of {self.result.plan.case.name}", lines, self.points())
 
 
-STUDY = PointStudy(design_over_points, CoordinatedDesign, "orchestrator.coordinated_design.worker")
+STUDY = PointStudy(design_over_points, CoordinatedDesign, PointsTask)

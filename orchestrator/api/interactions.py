@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypedDict
 
-from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
 from orchestrator.api.values import binding_path
 from orchestrator.api.values import path as path_of
@@ -15,11 +14,13 @@ from orchestrator.asked import Names, checked, require_known
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.interactions.judgement import JudgedInteractions
+from orchestrator.interactions.point import SystemTask
 from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import InteractionsResult, run_interactions
 from orchestrator.interactions.tables import as_json, assignment_rows, mode_rows, pair_rows, warnings_of
 from orchestrator.interactions.words import sentences
 from orchestrator.late import pd
+from orchestrator.points.study import PointStudy
 from orchestrator.safe_files import made_folder
 
 
@@ -129,4 +130,4 @@ class Interactions:
         return page(repr(self).strip("<>"), self.sentences, self.pairs())
 
 
-STUDY = PointStudy(run_interactions, Interactions, "orchestrator.interactions.worker")
+STUDY = PointStudy(run_interactions, Interactions, SystemTask)

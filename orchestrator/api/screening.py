@@ -5,9 +5,10 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import page
+from orchestrator.points.study import PointStudy
 from orchestrator.safe_files import made_folder
+from orchestrator.screening.point import StretchTask
 from orchestrator.screening.study import ScreeningResult, run_screening
 from orchestrator.screening.summary import ModeAt, Summary, as_json
 from orchestrator.screening.words import verdict_sentence, what_was_counted
@@ -76,4 +77,4 @@ class Screening:
         return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
 
 
-STUDY = PointStudy(run_screening, Screening, "orchestrator.screening.worker")
+STUDY = PointStudy(run_screening, Screening, StretchTask)

@@ -8,18 +8,19 @@ import pandas as pd
 import xarray as xr
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.executors import PointStudy
 from orchestrator.api.show import Axes, axes_or_new, page
 from orchestrator.api.values import Paths, Time, case_values, check_case_name, in_seconds, parameter_files
 from orchestrator.asked import Names, frequency_range, names, plain_value
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.errors import InputError
+from orchestrator.points.study import PointStudy
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
 from orchestrator.sweep.limit import Until
+from orchestrator.sweep.point import SweepPointTask
 from orchestrator.sweep.sweep import SweepPlan, SweepResult, plan_sweep, run_sweep
 
 
@@ -212,7 +213,7 @@ def _until(given: str | float | None) -> Until | None:
     return Until(damping)
 
 
-STUDY = PointStudy(run_sweep, ParameterSweep, "orchestrator.sweep.worker", lambda plan: plan.scenarios)
+STUDY = PointStudy(run_sweep, ParameterSweep, SweepPointTask, lambda plan: plan.scenarios)
 
 
 def _varied(vary: Mapping[str, Iterable[Any]] | Iterable[str | Vary]) -> list[Vary]:

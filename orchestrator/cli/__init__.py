@@ -162,7 +162,7 @@ def _command_in(words: Sequence[str]) -> str | None:
 
 
 def _origin(words: Sequence[str]) -> dict[str, str]:
-    from orchestrator.points.key import code_hash  # noqa: PLC0415 - only where results are written
+    from orchestrator.points.code import code_hash  # noqa: PLC0415 - only where results are written
 
     return {"command": shlex.join(["gfor", *words]), "code": code_hash()}
 

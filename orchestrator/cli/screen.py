@@ -17,11 +17,11 @@ from orchestrator.cli.case_arguments import add_case_arguments, add_range_argume
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.cli.terminal import make_console, make_errors, print_parts
 from orchestrator.errors import InputError
+from orchestrator.operating_points.item import Status
 from orchestrator.points.store import POINTS
 from orchestrator.safe_files import made_folder
 from orchestrator.screening import tables
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
-from orchestrator.screening.record import Status
 from orchestrator.screening.study import Shard, plan_screening
 from orchestrator.screening.summary import Summary
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from orchestrator.operating_points.item import Status
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.safe_files import write_text
-from orchestrator.screening.record import Status
 from orchestrator.screening.stress import by_outage
 from orchestrator.screening.summary import ScreenedMode, Summary, duration
 from orchestrator.screening.words import verdict_sentence, what_was_counted

@@ -6,8 +6,8 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from orchestrator.operating_points.item import Status
 from orchestrator.report.tables import Cell, make_table
-from orchestrator.screening.record import Status
 from orchestrator.screening.stress import OutageRow, by_outage
 from orchestrator.screening.study import ScreenedItem
 from orchestrator.screening.summary import ModeAt, Summary

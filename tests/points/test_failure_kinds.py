@@ -17,11 +17,12 @@ from orchestrator.errors import (
     Problem,
     StartError,
 )
+from orchestrator.operating_points.item import Item, Status
+from orchestrator.operating_points.preparation import failure
 from orchestrator.points.failure import Failure
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
-from orchestrator.screening.preparation import failure
-from orchestrator.screening.record import Item, Status
 from orchestrator.screening.study import plan_screening, run_screening
 
 ROOT = Path(__file__).parents[2]
@@ -71,7 +72,9 @@ def test_an_overloaded_converter_has_one_status_opened_anew_and_reset(tmp_path):
     for name, rows in (("opened", over.format("over")), ("reset", "usual,\n" + over.format("over"))):
         path = tmp_path / f"{name}.csv"
         path.write_text("name,gfor.P_0\n" + rows)
-        found.append(run_screening(plan_screening(case, path, None, "gfor"), Serial(), PointStore(tmp_path / name)))
+        found.append(
+            run_screening(plan_screening(case, path, None, "gfor"), Work(Serial(), PointStore(tmp_path / name)))
+        )
     opened, reset = (result.items[-1].record for result in found)
     assert found[1].items[0].record.status is Status.COMPUTED
     assert (opened.status, opened.text, opened.lasting) == (reset.status, reset.text, reset.lasting)
