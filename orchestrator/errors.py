@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
@@ -59,6 +60,15 @@ class CosimError(Exception):
         super().__init__(message)
         if kind is not None:
             self.kind = kind
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made_again, (type(self), self.args, self.__dict__)  # it may have been made from other arguments
+
+
+def _made_again(kind: type[CosimError], arguments: tuple[Any, ...], values: dict[str, Any]) -> CosimError:
+    error = kind.__new__(kind, *arguments)
+    error.__dict__.update(values)
+    return error
 
 
 class InputError(CosimError):

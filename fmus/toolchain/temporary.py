@@ -70,12 +70,19 @@ def _under_lock(new: Path) -> Path:
 
 
 @atexit.register
-def _remove_own() -> None:
+def remove_own() -> None:
     """Remove what an interrupt left; a copy of this process, which has the same list, removes nothing."""
     if os.getpid() == _process:
         for folder in {*_locks} - _left:
             with contextlib.suppress(OSError):
                 remove(folder)
+
+
+def in_a_copy() -> None:
+    """Leave the folders to the process that this one is a copy of, and have own ones from now on."""
+    global _process  # noqa: PLW0603 - a process has one number
+    _process = os.getpid()
+    _locks.clear()
 
 
 def leave(folder: Path) -> None:

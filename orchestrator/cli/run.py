@@ -2,11 +2,12 @@
 
 import argparse
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.api.scenario import RunEndedWarning, Scenario
@@ -16,6 +17,7 @@ from orchestrator.cli.arguments import option, repeatable, seconds, switch, tole
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
+from orchestrator.cli.side_by_side import Outcome, Report, SideBySide, number_of_workers
 from orchestrator.cli.terminal import (
     make_console,
     make_errors,
@@ -26,14 +28,16 @@ from orchestrator.cli.terminal import (
     say,
 )
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
-from orchestrator.cores import MOST_THREADS
+from orchestrator.cores import MOST_THREADS, number_of_cores
 from orchestrator.coupling.progress import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, ResultsError, RunInterruptedError
 from orchestrator.federation.choice import Federates
 from orchestrator.fmi.interrupts import calls
+from orchestrator.late import xr
 from orchestrator.report.progress import progress_bar
 from orchestrator.results.lock import held
-from orchestrator.results.recording import FOLDER, RecordingFolder
+from orchestrator.results.recorded import open_whole
+from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder
 from orchestrator.results.room import require_room
 from orchestrator.results.staging import ScenarioFolder, mend, staged, unfinished
 from orchestrator.safe_files import PARTIAL, made_folder
@@ -56,6 +60,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--linear", "lay the linear model's response over the simulated one")
     option(parser, "--threads", "N", "threads that step native FMUs (default: as many as are faster than one, up to "
            "one for each core); no value depends on it", read=read_whole(1, MOST_THREADS))  # fmt: skip
+    option(parser, "--workers", "N", "scenarios at a time, each in a process (default: one a core; Linux only); "
+           "no value depends on it", read=read_whole(1, 1000))  # fmt: skip
     switch(parser, "--json", "print the summary as JSON")
     add_verdict_argument(parser)
     add_details_argument(parser)
@@ -87,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Namespace, engine: Federates | None) -> int:
-    """Run the scenarios one after the other; each is written as soon as it is done."""
+    """Run the scenarios; each is written as soon as it is done."""
     require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
     mend(folder)
     if options.resume is None:
@@ -95,37 +101,34 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     console = make_console(stderr=options.json)
     kept = checkpoints.StudyCheckpoints([scenario.prepared for scenario in scenarios], folder, options)
     run_id = kept.run
+    workers = 1 if engine is not None else number_of_workers(options.workers, len(scenarios))
+    if options.threads is None and workers > 1 and workers >= number_of_cores():
+        options.threads = 1  # each core has its scenario
     results: list[RunResult] = []
-    stopped: tuple[str, BaseException] | None = None
-    with progress_bar(console) as bar:
-        for scenario in scenarios:
-            task = bar.add_task(scenario.title, total=None)
+    stopped: dict[str, BaseException] = {}
 
-            def report(done: int, total: int, task: Any = task) -> None:
-                bar.update(task, completed=done, total=total)
+    def work(index: int, report: Report) -> Outcome:
+        place = ScenarioFolder(folder, scenarios[index].name, run_id)
+        return _outcome(place, scenarios[index], Progress(report), kept, options, engine)
 
-            place = ScenarioFolder(folder, scenario.name, run_id)
-            try:
-                result = _run_into(place, scenario, Progress(report), kept, options, engine)
-                results.append(result)
-                if isinstance(result.failure, ResultsError):
-                    place.discard()
-                else:
-                    save_run(result, place, csv=options.csv)
-            except (CosimError, KeyboardInterrupt) as error:
-                place.discard()
-                if not results:
-                    if isinstance(error, CosimError):
-                        kept.end(whole=False)
-                    raise
-                stopped = (scenario.name, error)
-                break
-            print_warnings([result.modes])
-            print_findings([result])
-            if result.failure:
-                stopped = (scenario.name, result.failure)
-                break
-    early_end = None if stopped is None else _early_end(*stopped, scenarios, results)
+    done = _one_after_the_other if workers == 1 else _side_by_side
+    for index, outcome in done(scenarios, work, console, workers):
+        if isinstance(outcome, BaseException):
+            stopped[scenarios[index].name] = outcome
+            continue
+        if workers > 1 and not isinstance(outcome.failure, ResultsError):
+            outcome.dataset = open_whole(folder / scenarios[index].name / TRAJECTORY)
+        results.append(outcome)
+        print_warnings([outcome.modes])
+        print_findings([outcome])
+        if outcome.failure:
+            stopped[scenarios[index].name] = outcome.failure
+    if stopped and not results:
+        error = next(iter(stopped.values()))
+        if isinstance(error, CosimError):
+            kept.end(whole=False)
+        raise error
+    early_end = _early_end(stopped, scenarios, results) if stopped else None
     plots = _save_together(results, folder, run_id, stopped, early_end)
     if options.json:
         print_json([summary_of(r) for r in results])
@@ -138,13 +141,71 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
         )
         console.print(escape(words), soft_wrap=True)
     if stopped:
-        code = _end(*stopped, folder)
+        code = _end(stopped, folder)
         kept.end(whole=False, interrupted=code == INTERRUPTED)
         return code
     calls.over = True
     kept.end(whole=True)
     unsound = options.fail_unstable and not all(r.stable_in_simulation for r in results)
     return int(unsound) or exit_code(options, [r.modes.stability for r in results])
+
+
+def _one_after_the_other(
+    scenarios: Sequence[Scenario], work: Callable[[int, Report], Outcome], console: Console, _: int
+) -> Iterator[tuple[int, Outcome]]:
+    """What comes of each scenario, until one fails."""
+    with progress_bar(console) as bar:
+        for index, scenario in enumerate(scenarios):
+            task = bar.add_task(scenario.title, total=None)
+            outcome = work(index, lambda done, total, task=task: bar.update(task, completed=done, total=total))  # type: ignore[misc]
+            yield index, outcome
+            if isinstance(outcome, BaseException) or outcome.failure:
+                return
+
+
+def _side_by_side(
+    scenarios: Sequence[Scenario], work: Callable[[int, Report], Outcome], console: Console, workers: int
+) -> Iterator[tuple[int, Outcome]]:
+    """What came of all scenarios that were begun, each in another process; their recordings stay on the disk."""
+
+    def without_recording(index: int, report: Report) -> Outcome:
+        report(0, 0)
+        outcome = work(index, report)
+        if isinstance(outcome, RunResult) and not isinstance(outcome.failure, ResultsError):
+            outcome.dataset = xr.Dataset()
+        return outcome
+
+    with SideBySide(workers, without_recording) as copies, progress_bar(console) as bar:
+        tasks: dict[int, Any] = {}
+
+        def report(index: int, done: int, total: int) -> None:
+            if index not in tasks:
+                tasks[index] = bar.add_task(scenarios[index].title, total=None)
+            bar.update(tasks[index], completed=done, total=total or None)
+
+        outcomes = copies.outcomes(len(scenarios), report)
+    yield from outcomes
+
+
+def _outcome(
+    place: ScenarioFolder,
+    scenario: Scenario,
+    bar: Progress,
+    kept: checkpoints.StudyCheckpoints,
+    options: argparse.Namespace,
+    engine: Federates | None,
+) -> Outcome:
+    """Run a scenario and write what belongs to it; an error that ended it before anything was there is returned."""
+    try:
+        result = _run_into(place, scenario, bar, kept, options, engine)
+        if isinstance(result.failure, ResultsError):
+            place.discard()
+        else:
+            save_run(result, place, csv=options.csv)
+    except (CosimError, KeyboardInterrupt) as error:
+        place.discard()
+        return error
+    return result
 
 
 def _say_unfinished(folder: Path) -> None:
@@ -180,13 +241,13 @@ def _run_into(
 
 
 def _early_end(
-    name: str, error: BaseException, scenarios: Sequence[Scenario], results: Sequence[RunResult]
+    stopped: Mapping[str, BaseException], scenarios: Sequence[Scenario], results: Sequence[RunResult]
 ) -> EarlyEnd:
-    titles = {scenario.name: scenario.title for scenario in scenarios}
-    names = list(titles)
-    never = {later: titles[later] for later in names[names.index(name) + 1 :]}
-    kept = any(r.modes.prepared.name == name and not isinstance(r.failure, ResultsError) for r in results)
-    return EarlyEnd(titles[name], _is_interrupt(error), kept, never)
+    begun = {r.modes.prepared.name for r in results} | set(stopped)
+    never = {scenario.name: scenario.title for scenario in scenarios if scenario.name not in begun}
+    kept = any(r.modes.prepared.name in stopped and not isinstance(r.failure, ResultsError) for r in results)
+    places = ", ".join(scenario.title for scenario in scenarios if scenario.name in stopped)
+    return EarlyEnd(places, any(map(_is_interrupt, stopped.values())), kept, never)
 
 
 def _is_interrupt(error: BaseException) -> bool:
@@ -197,7 +258,7 @@ def _save_together(
     results: Sequence[RunResult],
     folder: Path,
     run_id: str,
-    stopped: tuple[str, BaseException] | None,
+    stopped: Mapping[str, BaseException],
     early_end: EarlyEnd | None,
 ) -> list[Path]:
     """Write what concerns all scenarios; return the plots."""
@@ -207,17 +268,19 @@ def _save_together(
         with staged(folder, run_id, [name for name in names if (folder / name).is_dir()]) as staging:
             return save_study(results, staging, early_end)
     except ResultsError:
-        if stopped is None or not isinstance(stopped[1], ResultsError):
+        if not any(isinstance(error, ResultsError) for error in stopped.values()):
             raise
         return []
 
 
-def _end(scenario: str, error: BaseException, folder: Path) -> int:
+def _end(stopped: Mapping[str, BaseException], folder: Path) -> int:
     """Say where a study ended before its time, and what is left of it."""
-    interrupted = _is_interrupt(error)
-    head = "" if interrupted else "[bold red]error:[/bold red] "
-    begun = [path.name for path in unfinished(folder) if path.name.startswith(scenario + PARTIAL)]
-    where = f" ({', '.join(begun)})" if begun and isinstance(error, ResultsError) else ""
-    text = f"scenario {scenario!r}: {str(error) or calls.how}\nWhat was computed until then is in {folder}{where}"
-    make_errors().print(f"{head}{escape(text)}")
-    return INTERRUPTED if interrupted else 1
+    where, text = "", ""
+    for scenario, error in stopped.items():
+        if isinstance(error, ResultsError):
+            begun = [path.name for path in unfinished(folder) if path.name.startswith(scenario + PARTIAL)]
+            where += f" ({', '.join(begun)})" if begun else ""
+        head = "" if _is_interrupt(error) else "[bold red]error:[/bold red] "
+        text += f"{head}{escape(f'scenario {scenario!r}: {str(error) or calls.how}')}\n"
+    make_errors().print(f"{text}{escape(f'What was computed until then is in {folder}{where}')}")
+    return INTERRUPTED if any(map(_is_interrupt, stopped.values())) else 1

@@ -47,7 +47,7 @@ class _Calls:
         """
         here = threading.current_thread() is threading.main_thread()
         if here and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, self._take)
+            signal.signal(signal.SIGINT, self.take)
         if here and sys.unraisablehook is not self._hook:
             self._hook = self._swallowed(sys.unraisablehook)
             sys.unraisablehook = self._hook
@@ -71,7 +71,7 @@ class _Calls:
             return
         unraisable = sys.unraisablehook
         self.watch()
-        before = signal.signal(signal.SIGTERM, self._take)
+        before = signal.signal(signal.SIGTERM, self.take)
         try:
             yield
         finally:
@@ -100,7 +100,8 @@ class _Calls:
         self._kind = SystemExit
         self._ask(frame)
 
-    def _take(self, number: int, frame: FrameType | None) -> None:
+    def take(self, number: int, frame: FrameType | None) -> None:
+        """The handler of signals that end a command."""
         if self.over or self._deferral.too_late():
             return
         self.taken = True

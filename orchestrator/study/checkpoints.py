@@ -81,7 +81,7 @@ class Checkpoints:
 
     @property
     def exist(self) -> bool:
-        return self._written or self._kept is not None
+        return self._path.exists() or self._kept is not None  # perhaps written by a copy of this process
 
     def recording(self, prepared: PreparedScenario) -> RecordingFolder:
         """A recording beside the checkpoints, which has what was recorded until the newest."""

@@ -14,7 +14,8 @@ from orchestrator.errors import AnalysisError
 from orchestrator.study import run as study
 from orchestrator.study.run import run_scenario
 
-WORDS = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--scenario", "pod_p", "--stop", "2")
+WORDS = ("run", "two_area", "--scenario", "base", "--scenario", "gfor", "--scenario", "pod_p", "--stop", "2",
+         "--workers", "1")  # fmt: skip
 NEVER = "SG + GFOR; never begun: SG + GFOR POD-P"
 
 
