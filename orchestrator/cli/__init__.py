@@ -33,6 +33,7 @@ COMMANDS = {
     "interactions": "modes that several vendors' converters share, and the pair that does not agree",
     "site": "where a converter helps: the shift of each mode by support at each bus",
     "screen": "critical modes of many operating points and outages",
+    "explore": "a case in the browser: map of modes, sliders, single-line diagram, responses",
     "compare": "two recorded runs: differences, and what each rings with",
     "source": "where the oscillations of a run or recording come from: which unit drives them",
     "identify": "the modes in a recorded signal (matrix pencil)",
@@ -62,6 +63,7 @@ examples:
   gfor export-ssp two_area --scenario pod_p      for FMI tools that read SSP; gfor itself runs it as well
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9  modes followed along the line's reactance
   gfor sweep two_area --vary grid.X_L=0.1:3 --until unstable   how far it may grow
+  gfor explore two_area                          modes, network and responses in the browser, with sliders
   gfor scr my_case.toml                          how weak the grid is at each bus
   gfor sensitivities two_area --scenario pod_p   which parameters move the mode, and how far
   gfor screen ieee39 --points year.csv --outages lines   critical modes hour by hour, outage by outage
@@ -99,6 +101,7 @@ Is the network stable, and which swing is damped least?
   gfor report results/two_area                        all that as one page for a browser
 
 What makes it better or worse?
+  gfor explore two_area                               all that in the browser: drag a value and see the modes move
   gfor design two_area --controller pod_p             settings of a damping controller
   gfor sensitivities two_area --scenario pod_p        which parameter moves the mode, and how far
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9       modes along a parameter
