@@ -29,6 +29,7 @@ FLOORS = (
     ("orchestrator.screening", "orchestrator.sensitivities", "orchestrator.interactions", "orchestrator.immittance"),
     ("orchestrator.certification", "orchestrator.coordinated_design", "orchestrator.siting"),
     ("orchestrator.api",),
+    ("orchestrator.explore",),
     ("orchestrator.cli",),
 )
 """Lowest first; those on one floor do not know each other."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from orchestrator.api.values import Time
 from orchestrator.errors import CosimError, InputError
 from orchestrator.late import pd, xr
 from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
+from orchestrator.safe_files import made_folder
 from orchestrator.study.comparison import recorded
 
 if TYPE_CHECKING:
@@ -279,6 +282,26 @@ class Run:
         from orchestrator.study.files import summary_of  # noqa: PLC0415 - plots: a second to import
 
         return summary_of(self.result)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write what ``gfor run`` leaves of this scenario in its folder, for `compare`, ``gfor report`` and others.
+
+        Parameters
+        ----------
+        folder
+            Other scenarios' results that are in it stay, but for the tables of all together.
+        """
+        from orchestrator.results.recording import TRAJECTORY  # noqa: PLC0415 - as below
+        from orchestrator.results.storage import save_netcdf  # noqa: PLC0415 - as below
+        from orchestrator.study.files import save_run, save_study  # noqa: PLC0415 - plots: a second to import
+
+        place, run_id, name = made_folder(Path(folder), "folder"), new_run_id(), self.result.modes.prepared.name
+        scenario = ScenarioFolder(place, name, run_id)
+        save_netcdf(self.result.dataset, scenario.path / TRAJECTORY)
+        save_run(self.result, scenario, csv=False)
+        with staged(place, run_id, [name]) as staging:
+            save_study([self.result], staging)
+        return place
 
     def plot(self, signal: str | None = None, ax: Axes = None) -> Axes:
         """A signal over the time; dashed, the linear model's response where it was asked for.

@@ -33,7 +33,7 @@ from orchestrator.coupling.progress import Progress
 from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
-from orchestrator.late import pd
+from orchestrator.late import pd, xr
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
@@ -111,6 +111,29 @@ class Scenario:
     def values(self) -> dict[str, float | bool]:
         """Every value that the case, its parameter files or the caller set, by ``component.variable``."""
         return dict(self.prepared.values)
+
+    def parameters(self) -> pd.DataFrame:
+        """Every parameter of every component by ``component.variable``, as ``values`` and ``--set`` take it.
+
+        Columns: its value here, unit, type, variability (``tunable`` or ``fixed``), bounds, and the FMU's own words.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> gfor.load("two_area").scenario("pod_p").parameters().loc["gfor.pod_p.K", "value"]
+        200.0
+        """
+        rows = [
+            {
+                "parameter": f"{name}.{info.name}", "value": plan.value(info.name), "unit": info.unit or "1",
+                "type": info.type, "variability": info.variability, "minimum": info.minimum, "maximum": info.maximum,
+                "description": info.description,
+            }
+            for name, plan in self.prepared.system.components.items()
+            for info in plan.description.variables.values()
+            if info.causality == "parameter"
+        ]  # fmt: skip
+        return pd.DataFrame(rows, dtype=object).set_index("parameter")
 
     @property
     def questions(self) -> list[str]:
@@ -268,6 +291,32 @@ class Scenario:
         if result.failure is not None:
             warnings.warn(f"scenario {self.name!r}: {result.failure}", RunEndedWarning, stacklevel=2)
         return Run(result)
+
+    def response(self, stop: Time | None = None) -> xr.Dataset:
+        """The linear model's response to the scenario's events, over the time [s]; no FMU is stepped for it.
+
+        Parameters
+        ----------
+        stop
+            Time at which it ends [s]; the case's by default.
+
+        Raises
+        ------
+        InputError
+            If there is no event, or one that a linear model cannot follow, such as a fault.
+        AnalysisError
+            If no steady state is found, or the system cannot be linearised.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> response = gfor.load("two_area").scenario("pod_p").response(stop=5.0)
+        >>> float(response["time"][-1])
+        5.0
+        """
+        from orchestrator.study.linear import response_at_steady_state  # noqa: PLC0415 - only responses need it
+
+        return response_at_steady_state(self._until(in_seconds(stop, "stop")))
 
     def _until(self, stop_time: float | None) -> PreparedScenario:
         """The scenario with another stop time [s]: events after it are left out, and it must fit the step."""

@@ -79,6 +79,13 @@ def linear_model(
         return space, point, Examination(own, warnings)
 
 
+def response_at_steady_state(prepared: PreparedScenario) -> xr.Dataset:
+    """`linear_response` of a scenario that does not run yet."""
+    with running(prepared) as master:
+        find_operating_point(master)
+        return linear_response(master, prepared)
+
+
 def linear_response(master: Master, prepared: PreparedScenario) -> xr.Dataset:
     """Response of the linear step map to the scenario's events, at the recorded times and for all recorded signals."""
     switching = [

@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import shortest_path
 
 from orchestrator.arrays import Matrix
 
-_WIDTH, _HEIGHT, _MARGIN = 720, 480, 46
+WIDTH, HEIGHT, _MARGIN = 720, 480, 46
 _ROUNDS = 300
 _LABELS = 60  # so many buses at most have their names beside them; the pointer shows all
 
@@ -21,12 +21,11 @@ def network_map(
     shows.
     """
     buses = list(heat)
-    places = dict(zip(buses, _places(buses, branches).tolist(), strict=True))
+    at = dict(zip(buses, places(buses, branches).tolist(), strict=True))
     parts = [
-        f'<path stroke="#999" d="M{places[a][0]:.1f} {places[a][1]:.1f}L{places[b][0]:.1f} {places[b][1]:.1f}"/>'
-        for a, b in branches
+        f'<path stroke="#999" d="M{at[a][0]:.1f} {at[a][1]:.1f}L{at[b][0]:.1f} {at[b][1]:.1f}"/>' for a, b in branches
     ]
-    for bus, (x, y) in places.items():
+    for bus, (x, y) in at.items():
         share = min(max(heat[bus], 0.0), 1.0)
         colour = f"rgb({255 - 40 * share:.0f},{240 - 190 * share:.0f},{220 - 180 * share:.0f})"
         parts.append(
@@ -36,12 +35,12 @@ def network_map(
         if len(buses) <= _LABELS:
             parts.append(f'<text x="{x + 8 + 6 * share:.1f}" y="{y - 6:.1f}">{escape(bus)}</text>')
     return (
-        f'<svg class="chart" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{escape(name)}">'
+        f'<svg class="chart" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(name)}">'
         f"{''.join(parts)}</svg>"
     )
 
 
-def _places(buses: Sequence[str], branches: Sequence[tuple[str, str]]) -> Matrix:
+def places(buses: Sequence[str], branches: Sequence[tuple[str, str]]) -> Matrix:
     """Points whose distances are like the numbers of branches between buses, by stress majorisation from a circle."""
     n, row = len(buses), {bus: k for k, bus in enumerate(buses)}
     ends = np.array([[row[a], row[b]] for a, b in branches], dtype=int).reshape(-1, 2)
@@ -62,5 +61,5 @@ def _places(buses: Sequence[str], branches: Sequence[tuple[str, str]]) -> Matrix
     main = np.linalg.svd(points - points.mean(axis=0))[2] if n > 1 else np.eye(2)
     points = (points - points.mean(axis=0)) @ main.T
     span = np.maximum(np.ptp(points, axis=0), 1e-9)
-    room = np.array([_WIDTH - 2 * _MARGIN, _HEIGHT - 2 * _MARGIN])
+    room = np.array([WIDTH - 2 * _MARGIN, HEIGHT - 2 * _MARGIN])
     return np.asarray(_MARGIN + room * (points - points.min(axis=0)) / span)

@@ -1,0 +1,1 @@
+"""``gfor explore``: a study in the browser, with the figures of the commands."""

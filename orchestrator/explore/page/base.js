@@ -1,0 +1,136 @@
+"use strict";
+// What all parts of the page share: its state, elements that are made from text alone, and questions to the server.
+const PAGE_ID = [...crypto.getRandomValues(new Uint8Array(9))].map(x => x.toString(36)).join("");
+const SAVED = document.getElementById("saved") ? JSON.parse(document.getElementById("saved").textContent) : null;
+const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c6d31", "#7f7f7f"];
+const SVG = "http://www.w3.org/2000/svg";
+
+// What the address holds; everything else follows from it.
+const state = { scenario: "", values: {}, range: [0.1, 2], controls: [], mode: null, pin: null, tab: "map", signals: "" };
+// What was answered to it.
+const seen = { titles: {}, answer: null, modes: [], info: null, pinned: null, estimate: null, slopes: {}, trails: [], curves: {}, pinnedCurves: {}, stamp: null, timing: {} };
+
+const $ = id => document.getElementById(id);
+const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);
+const copyOf = x => JSON.parse(JSON.stringify(x));
+
+function make(name, attributes = {}, ...children) {
+  const element = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) if (value !== null && value !== undefined) element.setAttribute(key, value);
+  element.append(...children.filter(child => child !== null));
+  return element;
+}
+function draw(name, attributes = {}, ...children) {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) if (value !== null && value !== undefined) element.setAttribute(key, value);
+  element.append(...children.filter(child => child !== null));
+  return element;
+}
+function number(x, digits = 4) {
+  if (x === null || x === undefined || Number.isNaN(x)) return "–";
+  return (typeof x === "number" ? (Math.abs(x) >= 1e5 || (x && Math.abs(x) < 1e-3) ? x.toExponential(3) : String(+x.toPrecision(digits))) : String(x)).replace("-", "−");
+}
+function fixed(x, digits) { return x === null || x === undefined || Number.isNaN(x) ? "–" : x.toFixed(digits).replace("-", "−"); }
+
+function showTip(event, text) {
+  const tip = $("tip");
+  tip.textContent = text;
+  tip.hidden = false;
+  const box = tip.getBoundingClientRect();
+  tip.style.left = `${Math.max(4, Math.min(event.clientX + 14, innerWidth - box.width - 8))}px`;
+  tip.style.top = `${Math.max(4, Math.min(event.clientY + 14, innerHeight - box.height - 8))}px`;
+}
+function hideTip() { $("tip").hidden = true; }
+
+// -- questions ------------------------------------------------------------------------------------------------------
+
+const atWork = new Map();
+function working(what, on) {
+  on ? atWork.set(what, performance.now()) : atWork.delete(what);
+  $("cancel").hidden = !atWork.size;
+  tick();
+}
+function tick() {
+  if (!atWork.size) { $("work").textContent = seen.timing.text || ""; return; }
+  $("work").textContent = [...atWork].map(([what, begin]) => {
+    const usual = seen.timing[what], since = (performance.now() - begin) / 1000;
+    return `${what} … ${since.toFixed(1)} s${usual > 1 ? ` of about ${usual.toFixed(0)} s` : ""}${seen.timing[`said ${what}`] ? `, ${seen.timing[`said ${what}`]}` : ""}`;
+  }).join("; ");
+}
+setInterval(tick, 200);
+
+// The answer; null where nobody wants it any more or it failed, which is said at `place` or at the top.
+async function ask(what, question, place = null) {
+  if (SAVED) return savedAnswer(question);
+  working(what, true);
+  const begin = performance.now(), mine = atWork.get(what);
+  let found;
+  try {
+    const response = await fetch("ask", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ page: PAGE_ID, ...question }) });
+    found = response.ok ? await response.json() : { error: `the server refused the question (${response.status}); open the address that gfor explore printed` };
+  } catch {
+    found = { error: "the server does not answer; it ended, or was ended by Ctrl-C: start gfor explore again" };
+  }
+  if (found.superseded) return null;
+  if (atWork.get(what) === mine) working(what, false);
+  delete seen.timing[`said ${what}`];
+  if (found.cancelled || found.closed) { failed("the computation was cancelled; the figures are those before it", place); return null; }
+  if (found.error) { failed(found.error, place); return null; }
+  seen.timing[what] = (performance.now() - begin) / 1000;
+  const stamp = JSON.stringify(found.answer.stamp ?? null);
+  if (seen.stamp && found.answer.stamp && stamp !== seen.stamp) failed("the case file was changed on disk; the figures are of the new one");
+  if (found.answer.stamp) seen.stamp = stamp;
+  return found.answer;
+}
+function failed(text, place = null) {
+  const where = place ?? $("failure");
+  where.textContent = text ?? "";
+  where.hidden = !text;
+}
+
+// -- the state in the address ---------------------------------------------------------------------------------------
+
+function keepState() {
+  const kept = { s: state.scenario, v: state.values, r: state.range, c: state.controls, m: state.mode, t: state.tab, g: state.signals, p: state.pin };
+  history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify(kept))}`);
+}
+function readState(beginning) {
+  Object.assign(state, { scenario: beginning.scenario, values: beginning.values, range: beginning.range, controls: Object.keys(beginning.values) });
+  try {
+    const kept = JSON.parse(decodeURIComponent(location.hash.slice(1)));
+    Object.assign(state, { scenario: String(kept.s), values: kept.v ?? {}, range: kept.r ?? [0.1, 2], controls: kept.c ?? [], mode: kept.m ?? null, tab: kept.t ?? "map", signals: kept.g ?? "", pin: kept.p ?? null });
+  } catch { /* no state, or none that can be read: that of the command */ }
+}
+
+// -- files ----------------------------------------------------------------------------------------------------------
+
+function download(name, kind, content) {
+  const link = make("a", { download: name, href: URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type: kind })) });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+const LOOKS = ["stroke", "stroke-width", "stroke-dasharray", "fill", "opacity", "font-size", "font-family"];
+function pictureOf(svg) {
+  const copy = svg.cloneNode(true), box = svg.getBoundingClientRect();
+  const from = svg.querySelectorAll("*"), to = copy.querySelectorAll("*");
+  from.forEach((element, k) => { const style = getComputedStyle(element); for (const look of LOOKS) to[k].setAttribute(look, style.getPropertyValue(look)); });
+  copy.setAttribute("xmlns", SVG);
+  copy.setAttribute("width", box.width);
+  copy.setAttribute("height", box.height);
+  if (!copy.getAttribute("viewBox")) copy.setAttribute("viewBox", `0 0 ${box.width} ${box.height}`);
+  copy.prepend(draw("rect", { width: "100%", height: "100%", fill: getComputedStyle(document.documentElement).getPropertyValue("--paper") }));
+  return new XMLSerializer().serializeToString(copy);
+}
+function asPng(svg, name) {
+  const picture = new Image(), box = svg.getBoundingClientRect();
+  picture.onload = () => {
+    const canvas = make("canvas", { width: 2 * box.width, height: 2 * box.height });
+    canvas.getContext("2d").drawImage(picture, 0, 0, canvas.width, canvas.height);
+    canvas.toBlob(blob => download(name, "image/png", blob));
+  };
+  picture.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(pictureOf(svg))}`;
+}
+function asCsv(rows) {
+  const cell = x => { const text = String(x ?? ""); return /[",\n]/.test(text) || /^[=+@]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text; };
+  return rows.map(row => row.map(cell).join(",")).join("\n") + "\n";
+}

@@ -1,0 +1,123 @@
+"use strict";
+// The map of modes: 1/s to the right, Hz upwards, rays of equal damping.
+const view = { x0: null, x1: null, y0: 0, y1: 2 };
+const RAYS = [5, 10, 15, 20, 30, 50];
+const PAD = { left: 52, right: 14, top: 12, bottom: 38 };
+
+function frame() {
+  const box = $("map").getBoundingClientRect();
+  const w = Math.max(box.width, 200), h = Math.max(box.height, 200);
+  return {
+    w, h,
+    x: value => PAD.left + (value - view.x0) / (view.x1 - view.x0) * (w - PAD.left - PAD.right),
+    y: value => h - PAD.bottom - (value - view.y0) / (view.y1 - view.y0) * (h - PAD.top - PAD.bottom),
+    real: px => view.x0 + (px - PAD.left) / (w - PAD.left - PAD.right) * (view.x1 - view.x0),
+    hz: py => view.y0 + (h - PAD.bottom - py) / (h - PAD.top - PAD.bottom) * (view.y1 - view.y0),
+  };
+}
+// All that lies near the axis of damping; what decays at once would squeeze the rest together and is a zoom away.
+function fitMap() {
+  const all = [...seen.modes, ...(seen.pinned?.modes.scenarios[0].modes ?? [])];
+  const near = all.filter(m => m.damping_percent < 75), shown = near.length ? near : all;
+  const low = Math.min(-0.4, ...shown.map(m => m.real)), high = Math.max(0.15, ...shown.map(m => m.real));
+  const wide = high - low;
+  Object.assign(view, { x0: low - 0.12 * wide, x1: high + 0.12 * wide, y0: 0, y1: 1.15 * Math.max(0.3, ...shown.map(m => m.frequency_hz)) });
+}
+function ticks(low, high, count) {
+  const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map(k => k * power).find(x => x >= rough);
+  const found = [];
+  for (let x = Math.ceil(low / step) * step; x <= high + 1e-9; x += step) found.push(+x.toPrecision(8));
+  return found;
+}
+const cross = (x, y, r) => `M${x - r} ${y - r}L${x + r} ${y + r}M${x - r} ${y + r}L${x + r} ${y - r}`;
+
+function paintMap() {
+  const svg = $("map"), focused = document.activeElement?.dataset?.mode;
+  if (view.x0 === null) fitMap();
+  const f = frame(), parts = [];
+  svg.setAttribute("viewBox", `0 0 ${f.w} ${f.h}`);
+  for (const x of ticks(view.x0, view.x1, f.w / 90)) parts.push(draw("path", { class: x === 0 ? "zero" : "grid", d: `M${f.x(x)} ${PAD.top}V${f.h - PAD.bottom}` }), draw("text", { class: "faint", x: f.x(x), y: f.h - PAD.bottom + 15, "text-anchor": "middle" }, number(x)));
+  for (const y of ticks(view.y0, view.y1, f.h / 60)) parts.push(draw("path", { class: "grid", d: `M${PAD.left} ${f.y(y)}H${f.w - PAD.right}` }), draw("text", { class: "faint", x: PAD.left - 6, y: f.y(y) + 4, "text-anchor": "end" }, number(y)));
+  parts.push(draw("text", { class: "faint", x: f.w - PAD.right, y: f.h - 6, "text-anchor": "end" }, "Real part [1/s]"), draw("text", { class: "faint", x: 12, y: PAD.top + 2, transform: `rotate(-90 12 ${PAD.top + 2})`, "text-anchor": "end" }, "Frequency [Hz]"));
+  const clip = draw("g", { "clip-path": "url(#inside)" });
+  parts.push(draw("clipPath", { id: "inside" }, draw("rect", { x: PAD.left, y: PAD.top, width: f.w - PAD.left - PAD.right, height: f.h - PAD.top - PAD.bottom })), clip);
+  for (const percent of RAYS) {
+    const z = percent / 100, slope = -2 * Math.PI * z / Math.sqrt(1 - z * z);  // real part for one Hz
+    clip.append(draw("path", { class: "ray", d: `M${f.x(0)} ${f.y(0)}L${f.x(slope * view.y1)} ${f.y(view.y1)}` }));
+    const top = slope * view.y1 > view.x0 ? [slope * view.y1, view.y1] : [view.x0, view.x0 / slope];
+    if (top[1] > view.y0) clip.append(draw("text", { class: "faint", x: Math.max(f.x(top[0]) + 3, PAD.left + 3), y: Math.max(f.y(top[1]) + 12, PAD.top + 12) }, `${percent} %`));
+  }
+  if ($("trails").checked) {
+    for (const trail of seen.trails) {
+      if (trail.length > 1) clip.append(draw("path", { class: "trail", d: trail.map((m, k) => `${k ? "L" : "M"}${f.x(m.real)} ${f.y(m.hz)}`).join("") }));
+      for (const m of trail.slice(0, -1)) clip.append(draw("circle", { class: "trail-dot", cx: f.x(m.real), cy: f.y(m.hz), r: 2.2 }));
+    }
+  }
+  const partners = pinnedPartners();
+  for (const m of seen.pinned?.modes.scenarios[0].modes ?? []) clip.append(draw("rect", { class: "pinned", x: f.x(m.real) - 5, y: f.y(m.frequency_hz) - 5, width: 10, height: 10 }, draw("title", {}, `A: ${fixed(m.frequency_hz, 4)} Hz, ${fixed(m.damping_percent, 2)} %`)));
+  seen.modes.forEach((m, k) => {
+    const x = f.x(m.real), y = f.y(m.frequency_hz), big = m.name ? 7 : 4.5;
+    if (partners[k]) clip.append(draw("path", { class: "link", d: `M${f.x(partners[k].real)} ${f.y(partners[k].frequency_hz)}L${x} ${y}` }));
+    const mark = draw("g", { class: `mark${m.real > 0 ? " unstable" : ""}${k === chosenIndex() ? " chosen" : ""}${seen.estimate ? " stale" : ""}`, tabindex: 0, role: "button", "data-mode": k, "aria-label": sentenceOf(m) },
+      draw("circle", { cx: x, cy: y, r: 12 }), draw("path", { d: cross(x, y, big) }));
+    mark.addEventListener("pointerenter", () => highlight(k));
+    mark.addEventListener("pointermove", event => showTip(event, sentenceOf(m)));
+    mark.addEventListener("pointerleave", () => { highlight(null); hideTip(); });
+    mark.addEventListener("click", () => choose(k));
+    mark.addEventListener("keydown", event => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); choose(k); } });
+    clip.append(mark);
+    if (m.name) clip.append(draw("text", { x: x + 11, y: y - 8 }, m.name));
+  });
+  if (seen.estimate) seen.estimate.modes.forEach(m => { if (m) clip.append(draw("path", { class: "estimate", d: cross(f.x(m.real), f.y(m.hz), 7) })); });
+  if (seen.estimate) parts.push(draw("text", { class: "faint", x: PAD.left + 8, y: PAD.top + 14 }, "light: estimates from ∂λ/∂p, exact on release"));
+  svg.replaceChildren(...parts);
+  if (focused !== undefined) svg.querySelector(`[data-mode="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+}
+const sentenceOf = m => `${m.name ? `${m.name}: ` : ""}${fixed(m.frequency_hz, 4)} Hz, damping ${fixed(m.damping_percent, 2)} %, ${fixed(m.real, 4)} 1/s; ${Object.entries(m.components).slice(0, 3).map(([c, x]) => `${c} ${fixed(100 * x, 0)} %`).join(", ")}`;
+
+// Of each mode, the one of A that is the same: by name, else the nearest that nobody else has.
+function pinnedPartners() {
+  const pinned = seen.pinned?.modes.scenarios[0].modes;
+  return pinned ? partnersIn(seen.modes, pinned) : [];
+}
+function partnersIn(modes, others) {
+  const found = modes.map(m => (m.name && others.find(o => o.name === m.name)) || null), taken = new Set(found.filter(Boolean));
+  const pairs = [];
+  modes.forEach((m, k) => { if (!found[k]) others.forEach(o => { if (!taken.has(o) && !(m.name && o.name)) pairs.push([Math.hypot(m.real - o.real, m.imag - o.imag) / Math.hypot(m.real, m.imag), k, o]); }); });
+  for (const [apart, k, o] of pairs.sort((a, b) => a[0] - b[0])) if (apart < 0.6 && !found[k] && !taken.has(o)) { found[k] = o; taken.add(o); }
+  return found;
+}
+
+function zoomMap(factor, real = (view.x0 + view.x1) / 2, hz = (view.y0 + view.y1) / 2) {
+  Object.assign(view, { x0: real + (view.x0 - real) * factor, x1: real + (view.x1 - real) * factor, y0: hz + (view.y0 - hz) * factor, y1: hz + (view.y1 - hz) * factor });
+  paintMap();
+}
+function beginMap() {
+  const svg = $("map");
+  let from = null;
+  svg.addEventListener("wheel", event => {
+    event.preventDefault();
+    const box = svg.getBoundingClientRect(), f = frame();
+    zoomMap(event.deltaY > 0 ? 1.2 : 1 / 1.2, f.real(event.clientX - box.left), f.hz(event.clientY - box.top));
+  }, { passive: false });
+  svg.addEventListener("pointerdown", event => { if (!event.target.closest(".mark")) { from = { x: event.clientX, y: event.clientY, ...view }; svg.setPointerCapture(event.pointerId); } });
+  svg.addEventListener("pointermove", event => {
+    if (!from) return;
+    const f = frame(), dx = (event.clientX - from.x) / (f.w - PAD.left - PAD.right) * (from.x1 - from.x0), dy = (event.clientY - from.y) / (f.h - PAD.top - PAD.bottom) * (from.y1 - from.y0);
+    Object.assign(view, { x0: from.x0 - dx, x1: from.x1 - dx, y0: from.y0 + dy, y1: from.y1 + dy });
+    paintMap();
+  });
+  for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { from = null; });
+  svg.addEventListener("keydown", event => {
+    const marks = [...svg.querySelectorAll(".mark")], at = marks.indexOf(document.activeElement);
+    if (event.key === "+") zoomMap(1 / 1.3); else if (event.key === "-") zoomMap(1.3); else if (event.key === "0") { fitMap(); paintMap(); }
+    else if (event.key === "ArrowRight" || event.key === "ArrowDown") { event.preventDefault(); marks[(at + 1) % marks.length]?.focus(); }
+    else if (event.key === "ArrowLeft" || event.key === "ArrowUp") { event.preventDefault(); marks[(at - 1 + marks.length) % marks.length]?.focus(); }
+  });
+  $("fit").addEventListener("click", () => { if (state.tab === "network") fitNetwork(); else { fitMap(); paintMap(); } });
+  $("in").addEventListener("click", () => (state.tab === "network" ? zoomNetwork(1 / 1.3) : zoomMap(1 / 1.3)));
+  $("out").addEventListener("click", () => (state.tab === "network" ? zoomNetwork(1.3) : zoomMap(1.3)));
+  $("trails").addEventListener("change", paintMap);
+  new ResizeObserver(() => { if (seen.modes.length) paintMap(); }).observe(svg);
+}

@@ -1,0 +1,155 @@
+"use strict";
+// The single-line diagram: buses where the layout put them, elements that are set by a click.
+const lens = { x: 0, y: 0, w: 0, h: 0 };
+let element = null;  // kind and name of what was clicked
+
+function fitNetwork() {
+  const d = seen.info?.diagram;
+  if (d) Object.assign(lens, { x: -30, y: -30, w: d.width + 60, h: d.height + 60 });
+  paintNetwork();
+}
+function zoomNetwork(factor, x = lens.x + lens.w / 2, y = lens.y + lens.h / 2) {
+  Object.assign(lens, { x: x + (lens.x - x) * factor, y: y + (lens.y - y) * factor, w: lens.w * factor, h: lens.h * factor });
+  $("network").setAttribute("viewBox", `${lens.x} ${lens.y} ${lens.w} ${lens.h}`);
+}
+const flowOf = () => seen.answer?.modes.scenarios[0].power_flow ?? null;
+function things(kind, name, label, ...children) {
+  const group = draw("g", { class: `thing${element && element.kind === kind && element.name === name ? " chosen" : ""}`, tabindex: 0, role: "button", "aria-label": label, "data-thing": `${kind} ${name}` }, ...children);
+  const pick = () => { element = { kind, name }; paintNetwork(); paintElement(); };
+  group.addEventListener("click", pick);
+  group.addEventListener("keydown", event => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); pick(); } });
+  group.addEventListener("pointermove", event => showTip(event, label));
+  group.addEventListener("pointerleave", hideTip);
+  return group;
+}
+function paintNetwork() {
+  if (state.tab !== "network") return;
+  const svg = $("network"), d = seen.info?.diagram, flow = flowOf(), focused = document.activeElement?.dataset?.thing;
+  if (!d) { svg.replaceChildren(draw("text", { x: 20, y: 30 }, seen.info ? "this case has no network behind a power flow" : "loading …")); svg.setAttribute("viewBox", "0 0 500 300"); return; }
+  if (!lens.w) Object.assign(lens, { x: -30, y: -30, w: d.width + 60, h: d.height + 60 });
+  svg.setAttribute("viewBox", `${lens.x} ${lens.y} ${lens.w} ${lens.h}`);
+  const at = Object.fromEntries(d.buses.map(b => [b.name, b])), volts = Object.fromEntries((flow?.buses ?? []).map(b => [b.name, b]));
+  const branches = Object.fromEntries((flow?.branches ?? []).map(b => [b.name, b])), machines = Object.fromEntries((flow?.machines ?? []).map(m => [m.name, m]));
+  const most = Math.max(1, ...(flow?.branches ?? []).map(b => Math.abs(b.p_from_mw)));
+  const few = d.buses.length <= 45, parts = [], between = {};
+  const middle = { x: d.buses.reduce((s, b) => s + b.x, 0) / d.buses.length, y: d.buses.reduce((s, b) => s + b.y, 0) / d.buses.length };
+  for (const line of d.lines) {
+    const a = at[line.from], b = at[line.to], key = [line.from, line.to].sort().join("\u0000");
+    const nth = between[key] = (between[key] ?? -1) + 1, f = branches[line.name];
+    const closed = isOn(line.open) && (f?.closed ?? true), bend = nth ? 14 * Math.ceil(nth / 2) * (nth % 2 ? 1 : -1) : 0;
+    const length = Math.hypot(b.x - a.x, b.y - a.y) || 1, mx = (a.x + b.x) / 2 - bend * (b.y - a.y) / length, my = (a.y + b.y) / 2 + bend * (b.x - a.x) / length;
+    const path = `M${a.x} ${a.y}Q${mx} ${my} ${b.x} ${b.y}`, p = f ? f.p_from_mw : null;
+    const label = `${line.kind} ${line.name}, ${line.from} to ${line.to}: ${closed ? (f ? `${fixed(p, 1)} MW, ${fixed(f.q_from_mvar, 1)} Mvar` : "closed") : "open"}`;
+    const wire = draw("path", { class: `wire${closed ? "" : " open"}`, d: path });
+    if (p !== null && closed) wire.setAttribute("stroke-width", (1.2 + 4 * Math.abs(p) / most).toFixed(2));
+    const group = things("line", line.name, label, draw("path", { class: "hit", d: path }), wire);
+    if (line.kind === "branch") for (const s of [-1, 1]) group.append(draw("circle", { class: "unit", cx: mx + s * 3 * (b.x - a.x) / length, cy: my + s * 3 * (b.y - a.y) / length, r: 4.5, "fill-opacity": 0 }));
+    if (p !== null && closed && few) {
+      const way = p >= 0 ? 1 : -1, ux = way * (b.x - a.x) / length, uy = way * (b.y - a.y) / length;
+      group.append(draw("path", { class: "wire", d: arrow(mx - 5 * ux, my - 5 * uy, mx + 6 * ux, my + 6 * uy) }), draw("text", { class: "flow", x: mx + 6, y: my - 6 }, `${fixed(Math.abs(p), 0)} MW`));
+    }
+    parts.push(group);
+  }
+  const perBus = {};
+  const hang = (bus, k, all) => {  // around the bus, away from the middle of the picture
+    const out = Math.atan2(bus.y - middle.y, bus.x - middle.x), a = out + (k - (all - 1) / 2) * 0.75;
+    return { x: bus.x + 30 * Math.cos(a), y: bus.y + 30 * Math.sin(a) };
+  };
+  for (const one of [...d.units.map(u => ["unit", u]), ...d.loads.map(l => ["load", l])]) (perBus[one[1].bus] ??= []).push(one);
+  seen.unitPlaces = {};
+  for (const [name, all] of Object.entries(perBus)) all.forEach(([kind, thing], k) => {
+    const bus = at[name], p = hang(bus, k, all.length), stub = draw("path", { class: "wire", d: `M${bus.x} ${bus.y}L${p.x} ${p.y}` });
+    if (kind === "unit") {
+      const m = machines[thing.name], on = isOn(thing.out);
+      seen.unitPlaces[thing.name] = p;
+      const label = `unit ${thing.name} at ${name}: ${on ? (m ? `${fixed(m.p_mw, 1)} MW, ${fixed(m.q_mvar, 1)} Mvar, ${fixed(m.loading_percent, 0)} % of ${fixed(m.rating_mva, 0)} MVA` : "in service") : "out of service"}`;
+      parts.push(things(kind, thing.name, label, stub, thing.machine ? draw("circle", { class: `unit${on ? "" : " out"}`, cx: p.x, cy: p.y, r: 10 }) : draw("rect", { class: `unit${on ? "" : " out"}`, x: p.x - 9, y: p.y - 9, width: 18, height: 18 }), draw("path", { class: "wire", d: `M${p.x - 5} ${p.y}q2.5 -6 5 0t5 0` }), ...(d.units.length <= 40 ? [draw("text", { class: "flow", x: p.x + 12, y: p.y + 4 }, thing.name)] : [])));
+    } else {
+      const scale = thing.scale ? state.values[thing.scale] ?? 1 : 1;
+      const label = `load ${thing.name} at ${name}: ${fixed(thing.p_mw * scale, 1)} MW${scale !== 1 ? `, ${number(scale)} times the case's` : ""}`;
+      parts.push(things(kind, thing.name, label, stub, draw("path", { class: "load", d: `M${p.x - 6} ${p.y - 4}H${p.x + 6}L${p.x} ${p.y + 7}z` })));
+    }
+  });
+  for (const bus of d.buses) {
+    const v = volts[bus.name]?.v_pu, label = `bus ${bus.name}${v ? `: ${fixed(v, 4)} pu, ${fixed(volts[bus.name].angle_deg, 2)}°` : ""}`;
+    const dot = draw("circle", { class: `bus${v < 0.95 ? " low" : v > 1.05 ? " high" : ""}`, cx: bus.x, cy: bus.y, r: few ? 6 : 4.5 });
+    dot.addEventListener("pointermove", event => showTip(event, label));
+    dot.addEventListener("pointerleave", hideTip);
+    parts.push(dot);
+    if (d.buses.length <= 130) parts.push(draw("text", { class: "flow", x: bus.x + 8, y: bus.y + 14 }, few && v ? `${bus.name} ${fixed(v, 3)}` : bus.name));
+  }
+  parts.push(draw("g", { id: "arrows" }));
+  svg.replaceChildren(...parts);
+  paintArrows(1);
+  if (focused !== undefined) svg.querySelector(`[data-thing="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+}
+// The chosen mode's shape at the places of the machines; `part` of the swing, from -1 to 1.
+function paintArrows(part) {
+  const group = document.getElementById("arrows"), m = seen.modes[chosenIndex()];
+  if (!group) return;
+  const largest = Math.max(...(m?.shape ?? []).map(s => s.magnitude), 1e-12);
+  group.replaceChildren(...(m?.shape ?? []).flatMap((s, k) => {
+    const p = seen.unitPlaces?.[s.state.split(".")[0]], a = s.angle_deg * Math.PI / 180, r = 46 * s.magnitude / largest * part;
+    return p && Math.abs(r) > 1 ? [draw("path", { class: "arrow", stroke: COLOURS[k % COLOURS.length], d: arrow(p.x, p.y, p.x + r * Math.cos(a), p.y - r * Math.sin(a)) })] : [];
+  }));
+}
+const isOn = name => (name ? (state.values[name] ?? parameterOf(name)?.value ?? true) !== false : true);
+
+function paintElement() {
+  const place = $("element"), d = seen.info?.diagram;
+  if (!element || !d) { place.replaceChildren(make("p", { class: "soft" }, "Click a line, a unit or a load.")); return; }
+  const error = make("p", { class: "bad", role: "alert" }), parts = [make("h3", {}, `${element.kind} ${element.name}`)];
+  const onOff = (name, text) => {
+    const tick = make("input", { type: "checkbox" });
+    tick.checked = isOn(name);
+    tick.addEventListener("change", () => setOnes({ [name]: tick.checked ? null : false }, error));
+    return make("label", { class: "block" }, tick, ` ${text}`);
+  };
+  const times = (label, now, low, high, apply) => {
+    const slider = make("input", { type: "range", min: Math.log(low), max: Math.log(high), step: 0.01, "aria-label": label }), said = make("span", {}, `× ${number(now, 3)}`);
+    slider.value = Math.log(now);
+    slider.addEventListener("input", () => { said.textContent = `× ${number(Math.exp(+slider.value), 3)}`; });
+    slider.addEventListener("change", () => apply(Math.abs(+slider.value) < 0.006 ? 1 : +Math.exp(+slider.value).toPrecision(3)));
+    return make("label", { class: "block" }, `${label} `, said, slider);
+  };
+  if (element.kind === "line") {
+    const line = d.lines.find(l => l.name === element.name);
+    if (line.open) parts.push(onOff(line.open, "closed"));
+    if (line.length && parameterOf(line.length)) {
+      const now = (state.values[line.length] ?? original(line.length)) / original(line.length);
+      parts.push(times("Length, times the case's", now, 0.2, 5, factor => setOnes(Object.fromEntries([line.length, line.resistance, line.charging].filter(n => n && parameterOf(n) && original(n)).map(n => [n, factor === 1 ? null : original(n) * factor])), error)));
+    }
+  } else if (element.kind === "load") {
+    const load = d.loads.find(l => l.name === element.name);
+    if (load.scale) parts.push(times("Load, times the case's", state.values[load.scale] ?? 1, 0.2, 3, factor => setOnes({ [load.scale]: factor === 1 ? null : factor }, error)));
+  } else {
+    const unit = d.units.find(u => u.name === element.name), its = make("button", {}, "its values");
+    if (unit.out) parts.push(onOff(unit.out, "in service (what it feeds is shared by the others)"));
+    its.addEventListener("click", () => { $("search").value = `${unit.name}.`; paintFound(); $("search").focus(); });
+    parts.push(its);
+  }
+  place.replaceChildren(...parts, error);
+}
+async function setOnes(values, error) {
+  for (const [name, value] of Object.entries(values)) if (value === null) delete state.values[name]; else { state.values[name] = value; if (!state.controls.includes(name)) state.controls.push(name); }
+  keepState();
+  paintControls();
+  await compute(error);
+  if (error.textContent) paintElementAgain(error.textContent);
+}
+function paintElementAgain(text) { paintElement(); $("element").querySelector("[role=alert]").textContent = text; }
+
+function beginNetwork() {
+  const svg = $("network");
+  let from = null;
+  const scale = () => Math.max(lens.w / svg.clientWidth, lens.h / svg.clientHeight);
+  svg.addEventListener("wheel", event => {
+    event.preventDefault();
+    const p = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+    zoomNetwork(event.deltaY > 0 ? 1.2 : 1 / 1.2, p.x, p.y);
+  }, { passive: false });
+  svg.addEventListener("pointerdown", event => { if (!event.target.closest(".thing")) { from = { x: event.clientX, y: event.clientY, lx: lens.x, ly: lens.y }; svg.setPointerCapture(event.pointerId); } });
+  svg.addEventListener("pointermove", event => { if (from) { lens.x = from.lx - (event.clientX - from.x) * scale(); lens.y = from.ly - (event.clientY - from.y) * scale(); zoomNetwork(1); } });
+  for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { from = null; });
+  svg.addEventListener("keydown", event => { if (event.key === "+") zoomNetwork(1 / 1.3); else if (event.key === "-") zoomNetwork(1.3); else if (event.key === "0") fitNetwork(); });
+}

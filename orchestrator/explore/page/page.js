@@ -1,0 +1,148 @@
+"use strict";
+// What happens when: the page is opened, a value is set, a button pressed.
+
+// The exact modes of the state; `place` is where a refusal is said.
+async function compute(place = null) {
+  const begin = performance.now(), asked = copyOf({ ask: "modes", scenario: state.scenario, values: state.values, range: state.range });
+  failed("");
+  document.querySelectorAll(".control .error").forEach(one => { one.textContent = ""; });
+  const found = await ask("modes", asked, place);
+  if (!found) return;
+  const before = seen.modes, after = found.modes.scenarios[0].modes;
+  const partners = partnersIn(after, before);
+  const trails = after.map((m, k) => {
+    const old = seen.answer && seen.trailOf === state.scenario && partners[k] ? seen.trails[before.indexOf(partners[k])] ?? [] : [];
+    return [...old.slice(-30), { real: m.real, hz: m.frequency_hz }];
+  });
+  const first = !seen.answer || seen.trailOf !== state.scenario || !same(seen.fittedRange, state.range);
+  Object.assign(seen, { answer: found, modes: after, trails, trailOf: state.scenario, fittedRange: state.range, estimate: null });
+  if (first) fitMap();
+  paintVerdict();
+  paintMap(); paintTable(); paintChosen(); paintNetwork();
+  if (state.tab === "network") paintElement();
+  keepState();
+  painted(begin, "exact");
+  if (seen.infoOf !== state.scenario) await loadInfo();
+}
+function paintVerdict() {
+  const one = seen.answer.modes.scenarios[0];
+  $("verdict").className = one.stable === true ? "good" : one.stable === false ? "bad" : "";
+  $("verdict").textContent = `${seen.answer.title}: ${seen.answer.verdict}`;
+  $("outside").querySelector("span").textContent = [seen.answer.outside, ...one.warnings.map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
+  $("wider").hidden = !seen.answer.outside || state.range[1] >= 1000;
+}
+async function loadInfo() {
+  const asked = state.scenario, empty = await ask("parameters", { ask: "parameters", scenario: asked, values: {} });
+  if (!empty || asked !== state.scenario) return;
+  seen.info = empty;
+  seen.originals = Object.fromEntries(empty.parameters.map(p => [p.parameter, p.value]));
+  seen.infoOf = asked;
+  lens.w = 0;
+  paintControls(); paintFound(); paintSignals(); paintNetwork(); paintElement();
+}
+async function pin() {
+  if (state.pin) { state.pin = null; seen.pinned = null; seen.pinnedCurves = {}; }
+  else { state.pin = copyOf({ scenario: state.scenario, values: state.values, range: state.range }); seen.pinned = seen.answer; seen.pinnedCurves = copyOf(seen.curves); }
+  paintPin();
+  keepState();
+  paintMap(); paintTable(); paintPlots();
+}
+function paintPin() {
+  $("pin").setAttribute("aria-pressed", String(Boolean(state.pin)));
+  $("pin").textContent = state.pin ? "Unpin A" : "Pin as A";
+  $("pin").title = state.pin ? `A: ${state.pin.scenario}${Object.entries(state.pin.values).map(([n, v]) => `, ${n} = ${v}`).join("")}` : "Keep this state; the next ones are drawn against it";
+}
+function showCopies() {
+  const names = { command: "As a command", toml: "As a scenario: put it at the end of the case file", python: "As Python" };
+  $("dialog").querySelector("div").replaceChildren(...Object.entries(seen.answer?.copied ?? {}).flatMap(([kind, text]) => {
+    const copy = make("button", {}, "Copy");
+    copy.addEventListener("click", async () => { await navigator.clipboard.writeText(text); copy.textContent = "Copied"; });
+    return [make("h3", {}, names[kind] ?? kind), make("pre", { "data-kind": kind }, text), copy];
+  }));
+  $("dialog").showModal();
+}
+function openTab(name) {
+  state.tab = name;
+  for (const one of ["map", "network", "response"]) {
+    $(`panel-${one}`).hidden = one !== name;
+    $(`tab-${one}`).setAttribute("aria-selected", String(one === name));
+    $(`tab-${one}`).tabIndex = one === name ? 0 : -1;
+  }
+  $("trails-label").hidden = name !== "map";
+  for (const id of ["fit", "in", "out"]) $(id).hidden = name === "response";
+  keepState();
+  if (name === "network") { paintNetwork(); paintElement(); }
+  if (name === "response") paintPlots();
+  if (name === "map" && seen.modes.length) paintMap();
+}
+function setRange(low, high) {
+  if (!(low >= 0 && high > low && high < 1e6)) { failed(`range ${low} to ${high} Hz: give two frequencies, the first of at least 0 and below the second`); return; }
+  state.range = [low, high];
+  $("low").value = low; $("high").value = high;
+  compute();
+}
+function listen() {
+  const source = new EventSource(`events?page=${PAGE_ID}`);
+  source.onmessage = event => {
+    const told = JSON.parse(event.data);
+    if (told.part) streamed(told.part);
+    if (told.progress) seen.timing["said ∂λ/∂p"] = told.progress;
+  };
+}
+// Of a saved page, the answer that lies nearest in its grid.
+function savedAnswer(question) {
+  if (question.ask === "open") return SAVED.open;
+  if (question.ask === "parameters") return SAVED.parameters[question.scenario];
+  if (question.ask !== "modes") return null;
+  const snapped = {};
+  for (const [name, values] of Object.entries(SAVED.grid)) {
+    const wanted = question.values[name] ?? SAVED.beginning.values[name] ?? original(name) ?? values[0];
+    snapped[name] = values.reduce((best, v) => (Math.abs(v - wanted) < Math.abs(best - wanted) ? v : best));
+    if (name in state.values) state.values[name] = snapped[name];
+  }
+  return SAVED.answers.find(one => one.scenario === question.scenario && Object.entries(snapped).every(([n, v]) => one.values[n] === v))?.answer ?? null;
+}
+
+async function begin() {
+  beginMap(); beginNetwork(); beginResponse();
+  seen.beginning = SAVED ? SAVED.beginning : await (await fetch("beginning")).json();
+  readState(seen.beginning);
+  if (!SAVED) listen(); else for (const name of Object.keys(SAVED.grid)) if (!state.controls.includes(name)) state.controls.push(name);
+  $("low").value = state.range[0]; $("high").value = state.range[1];
+  for (const id of ["low", "high"]) { $(id).disabled = Boolean(SAVED); $(id).addEventListener("change", () => setRange(+$("low").value, +$("high").value)); }
+  $("wider").addEventListener("click", () => setRange(0, 1000));
+  if (SAVED) $("wider").classList.add("saved");
+  $("search").addEventListener("input", paintFound);
+  $("pin").addEventListener("click", pin);
+  $("copy").addEventListener("click", showCopies);
+  $("dialog").querySelector("p button").addEventListener("click", () => $("dialog").close());
+  $("cancel").addEventListener("click", () => { ask("cancel", { ask: "cancel" }); atWork.clear(); working("cancel", false); });
+  const picture = () => (state.tab === "network" ? $("network") : state.tab === "response" ? $("plots").querySelector("svg") ?? $("map") : $("map"));
+  $("svg").addEventListener("click", () => download("explore.svg", "image/svg+xml", pictureOf(picture())));
+  $("png").addEventListener("click", () => asPng(picture(), "explore.png"));
+  $("csv").addEventListener("click", () => download("modes.csv", "text/csv", asCsv([["real [1/s]", "imag [rad/s]", "frequency [Hz]", "damping [%]", "name"], ...seen.modes.map(m => [m.real, m.imag, m.frequency_hz, m.damping_percent, m.name])])));
+  for (const name of ["map", "network", "response"]) {
+    $(`tab-${name}`).addEventListener("click", () => openTab(name));
+    $(`tab-${name}`).addEventListener("keydown", event => {
+      const names = ["map", "network", "response"], step = { ArrowRight: 1, ArrowLeft: 2 }[event.key];
+      if (step) { openTab(names[(names.indexOf(state.tab) + step) % 3]); $(`tab-${state.tab}`).focus(); }
+    });
+  }
+  openTab(["map", "network", "response"].includes(state.tab) ? state.tab : "map");
+  paintControls(); paintChosen(); paintPlots(); paintPin();
+  const opened = await ask("case", { ask: "open" });
+  if (!opened) { $("verdict").textContent = ""; return; }
+  seen.titles = opened.scenarios;
+  $("title").textContent = opened.title;
+  document.title = `${opened.case}: gfor explore`;
+  if (!(state.scenario in opened.scenarios)) state.scenario = seen.beginning.scenario;
+  $("scenario").replaceChildren(...Object.entries(opened.scenarios).map(([name, title]) => make("option", { value: name }, `${name}: ${title}`)));
+  $("scenario").value = state.scenario;
+  $("scenario").addEventListener("change", () => { state.scenario = $("scenario").value; seen.slopes = {}; compute(); });
+  if (state.pin) {
+    const was = await ask("A", { ask: "modes", ...state.pin });
+    seen.pinned = was; paintPin();
+  }
+  await compute();
+}
+begin();

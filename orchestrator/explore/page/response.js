@@ -1,0 +1,99 @@
+"use strict";
+// Time responses: dashed, the linear model's; solid, the co-simulation's, while it runs. Plots share their time axis.
+const span = { from: null, to: null };
+const wantedSignals = () => state.signals.split(",").map(s => s.trim()).filter(Boolean);
+
+function paintSignals() {
+  const info = seen.info;
+  $("signal-names").replaceChildren(...(info?.signals ?? []).slice(0, 400).map(name => make("option", { value: name })));
+  $("events").textContent = info ? `Events: ${info.events.join("; ") || "none"}` : "";
+  $("signals").value = state.signals;
+  for (const id of ["linear", "run"]) $(id).disabled = Boolean(SAVED);
+}
+async function linearResponse() {
+  const found = await ask("linear response", { ask: "response", scenario: state.scenario, values: state.values, signals: wantedSignals() }, $("run-said"));
+  if (!found) { $("run-said").classList.add("bad"); return; }
+  $("run-said").textContent = "";
+  seen.curves = { ...Object.fromEntries(Object.entries(seen.curves).map(([k, c]) => [k, { ...c, linear: undefined }])) };
+  for (const [name, curve] of Object.entries(found.curves)) (seen.curves[name] ??= {}).linear = curve;
+  seen.curves = Object.fromEntries(Object.entries(seen.curves).filter(([, c]) => c.linear || c.run));
+  paintPlots();
+}
+async function coSimulation() {
+  for (const c of Object.values(seen.curves)) delete c.run;
+  $("run-said").classList.remove("bad");
+  $("run-said").textContent = "the FMUs are started …";
+  const found = await ask("co-simulation", { ask: "run", scenario: state.scenario, values: state.values, signals: wantedSignals() }, $("run-said"));
+  if (!found) { $("run-said").classList.add("bad"); return; }
+  for (const [name, curve] of Object.entries(found.curves)) (seen.curves[name] ??= {}).run = curve;
+  const ring = found.ring_down ? `; it rings with ${fixed(found.ring_down.frequency_hz, 4)} Hz, ${fixed(found.ring_down.damping_percent, 2)} %` : "";
+  $("run-said").textContent = `kept in ${found.folder}${ring}${found.ended_early ? `; ended early: ${found.ended_early}` : ""}${found.findings.map(text => `; found: ${text}`).join("")}`;
+  paintPlots();
+}
+// A part of a run that goes on.
+function streamed(part) {
+  for (const [name, values] of Object.entries(part.signals)) {
+    const curve = (seen.curves[name] ??= {}).run ??= [[], []];
+    curve[0].push(...part.time);
+    curve[1].push(...values);
+  }
+  seen.timing["said co-simulation"] = `at ${fixed(part.time.at(-1), 2)} of ${number(part.until)} s`;
+  if (state.tab === "response") paintPlots();
+}
+function paintPlots() {
+  if (state.tab !== "response") return;
+  const names = Object.keys(seen.curves);
+  $("plots").replaceChildren(...(names.length ? names.map(plotOf) : [make("p", { class: "soft" }, SAVED ? "A saved page computes nothing; start gfor explore for responses." : "Ask for the linear response (at once), or run the co-simulation.")]));
+}
+function plotOf(name) {
+  const kinds = [["run", "", "co-simulation", "#0072b2"], ["linear", " linear", "linear model", "#d55e00"]];
+  const curves = kinds.filter(([kind]) => seen.curves[name][kind]?.[0].length).map(([kind, look, text, colour]) => ({ data: seen.curves[name][kind], look, text, colour }));
+  for (const [kind, , text] of kinds) if (seen.pinnedCurves[name]?.[kind]) curves.push({ data: seen.pinnedCurves[name][kind], look: " pinned-curve", text: `A, ${text}`, colour: "#e69f00" });
+  const W = 760, H = 210, L = 64, R = 10, T = 8, B = 26;
+  const x0 = span.from ?? Math.min(...curves.map(c => c.data[0][0])), x1 = span.to ?? Math.max(...curves.map(c => c.data[0].at(-1)), x0 + 1e-6);
+  let low = Infinity, high = -Infinity;
+  for (const c of curves) c.data[0].forEach((t, k) => { if (t >= x0 && t <= x1) { low = Math.min(low, c.data[1][k]); high = Math.max(high, c.data[1][k]); } });
+  const room = Math.max((high - low) * 0.06, Math.abs(high) * 1e-7, 1e-12);
+  low -= room; high += room;
+  const x = t => L + (t - x0) / (x1 - x0) * (W - L - R), y = v => H - B - (v - low) / (high - low) * (H - T - B);
+  const svg = draw("svg", { class: "chart", viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${name} over the time`, tabindex: 0 });
+  for (const t of ticks(x0, x1, 8)) svg.append(draw("path", { class: "grid", d: `M${x(t)} ${T}V${H - B}` }), draw("text", { class: "faint", x: x(t), y: H - 10, "text-anchor": "middle" }, number(t)));
+  for (const v of ticks(low, high, 4)) svg.append(draw("path", { class: "grid", d: `M${L} ${y(v)}H${W - R}` }), draw("text", { class: "faint", x: L - 5, y: y(v) + 4, "text-anchor": "end" }, number(v, 6)));
+  for (const c of curves) svg.append(draw("path", { class: `curve${c.look}`, stroke: c.colour, d: c.data[0].map((t, k) => [t, c.data[1][k]]).filter(([t]) => t >= x0 && t <= x1).map(([t, v], k) => `${k ? "L" : "M"}${x(t).toFixed(1)} ${y(v).toFixed(1)}`).join("") }));
+  const line = draw("path", { class: "cursor" });
+  svg.append(line);
+  let from = null;
+  const timeAt = event => { const p = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse()); return x0 + (Math.min(Math.max(p.x, L), W - R) - L) / (W - L - R) * (x1 - x0); };
+  svg.addEventListener("pointermove", event => {
+    const t = timeAt(event);
+    line.setAttribute("d", `M${x(t)} ${T}V${H - B}${from !== null ? `M${x(from)} ${T}V${H - B}` : ""}`);
+    showTip(event, `${name}\n${fixed(t, 3)} s\n${curves.map(c => `${c.text}: ${number(c.data[1][nearestIn(c.data[0], t)], 6)}`).join("\n")}`);
+  });
+  svg.addEventListener("pointerdown", event => { from = timeAt(event); });
+  svg.addEventListener("pointerup", event => { const to = timeAt(event); if (from !== null && Math.abs(to - from) > 0.01 * (x1 - x0)) { Object.assign(span, { from: Math.min(from, to), to: Math.max(from, to) }); paintPlots(); } from = null; });
+  svg.addEventListener("dblclick", () => { Object.assign(span, { from: null, to: null }); paintPlots(); });
+  svg.addEventListener("pointerleave", () => { hideTip(); line.removeAttribute("d"); });
+  svg.addEventListener("keydown", event => {
+    const wide = x1 - x0, move = { ArrowLeft: -0.2 * wide, ArrowRight: 0.2 * wide }[event.key];
+    if (move) { event.preventDefault(); Object.assign(span, { from: x0 + move, to: x1 + move }); paintPlots(); }
+    if (event.key === "+" || event.key === "-") { const part = event.key === "+" ? 0.15 : -0.2; Object.assign(span, { from: x0 + part * wide, to: x1 - part * wide }); paintPlots(); }
+    if (event.key === "0") { Object.assign(span, { from: null, to: null }); paintPlots(); }
+  });
+  const key = make("div", { class: "key" }, make("b", {}, name), ...curves.map(c => { const sign = make("i"); sign.style.background = c.colour; return make("span", {}, sign, c.text); }));
+  return make("div", {}, key, svg);
+}
+function nearestIn(times, t) {
+  let low = 0, high = times.length - 1;
+  while (high - low > 1) { const middle = (low + high) >> 1; if (times[middle] <= t) low = middle; else high = middle; }
+  return t - times[low] <= times[high] - t ? low : high;
+}
+function beginResponse() {
+  $("signals").addEventListener("change", () => { state.signals = $("signals").value; keepState(); });
+  $("linear").addEventListener("click", linearResponse);
+  $("run").addEventListener("click", coSimulation);
+  $("signals-csv").addEventListener("click", () => {
+    const rows = [["signal", "kind", "time [s]", "value"]];
+    for (const [name, kinds] of Object.entries(seen.curves)) for (const [kind, curve] of Object.entries(kinds)) if (curve) curve[0].forEach((t, k) => rows.push([name, kind, t, curve[1][k]]));
+    download("responses.csv", "text/csv", asCsv(rows));
+  });
+}

@@ -1,0 +1,124 @@
+"""Time responses for the page: the linear model's at once, and the co-simulation's while it runs."""
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from orchestrator.api.results import Run
+from orchestrator.api.scenario import Scenario
+from orchestrator.arrays import Numbers
+from orchestrator.cases.names import variables_of
+from orchestrator.coupling.observers import ObservedRun
+from orchestrator.report.html.charts import thinned
+from orchestrator.results.signals import signal
+from orchestrator.safe_files import made_folder
+
+_POINTS = 1000  # of a streamed curve
+_PAUSE = 0.25  # between two parts of a streamed curve [s]
+_MOST = 24  # signals that one question may ask for
+
+Say = Callable[[dict[str, Any]], None]
+
+
+def plotted(scenario: Scenario) -> list[str]:
+    """What the case plots, as far as the scenario records it: signals ``a.b`` or ``a.b - c.d``."""
+    recorded = set(scenario.prepared.record)
+    listed = [str(panel.signal) for plot in scenario.prepared.case.table.plots for panel in plot.panels]
+    return [one for one in dict.fromkeys(listed) if set(variables_of(one)) <= recorded]
+
+
+def chosen(scenario: Scenario, wanted: Sequence[str]) -> list[str]:
+    """Recorded signals by name, pattern, or difference of two; those that the case plots where none is given."""
+    found: list[str] = []
+    for one in wanted:
+        fits = [name for name in scenario.prepared.record if fnmatchcase(name, one)]
+        found += fits or ([one] if set(variables_of(one)) <= set(scenario.prepared.record) else [])
+    return list(dict.fromkeys(found or plotted(scenario) or scenario.prepared.record))[:_MOST]
+
+
+def curves(dataset: xr.Dataset, names: Sequence[str]) -> dict[str, list[list[float]]]:
+    """By signal its times and values, thinned so that peaks stay."""
+    times: Numbers = dataset["time"].values
+    found = {}
+    for name in names:
+        values = signal(dataset, name)
+        if values is not None:
+            found[name] = [part.tolist() for part in thinned(times, np.asarray(values.values, dtype=float))]
+    return found
+
+
+class Streamed:
+    """Observes a run, and says from time to time what came since: ``{"time": …, "signals": …}``."""
+
+    def __init__(self, scenario: Scenario, names: Sequence[str], say: Say) -> None:
+        steps = max(1, round(scenario.prepared.stop_time / scenario.prepared.step_size))
+        self.every = max(scenario.prepared.record_every, steps // _POINTS)
+        self._names, self._say = names, say
+        self._needed = list(dict.fromkeys(name for one in names for name in variables_of(one)))
+        self._rows: list[list[float]] = []
+        self._said = time.monotonic()
+        self._stop = scenario.prepared.stop_time
+
+    def begin(self, run: ObservedRun, stop_index: int) -> None:
+        """See `Observer.begin`."""
+
+    def observe(self, run: ObservedRun) -> None:
+        """See `Observer.observe`."""
+        values = []
+        for name in self._needed:
+            component, _, variable = name.partition(".")
+            values.append(float(run.components[component].get([variable])[variable]))
+        self._rows.append([run.time, *values])
+        if time.monotonic() - self._said > _PAUSE:
+            self._flush()
+
+    def end(self, run: ObservedRun) -> None:
+        """See `Observer.end`."""
+        self._flush()
+
+    def _flush(self) -> None:
+        if self._rows:
+            columns = dict(zip(["time", *self._needed], np.array(self._rows).T, strict=True))
+            seen = {one: _value(columns, one).tolist() for one in self._names}
+            self._say({"time": columns["time"].tolist(), "signals": seen, "until": self._stop})
+            self._rows = []
+        self._said = time.monotonic()
+
+
+def _value(columns: dict[str, Numbers], expression: str) -> Numbers:
+    first, *rest = (columns[name] for name in variables_of(expression))
+    return first - rest[0] if rest else first
+
+
+def kept_folder(case: str) -> Path:
+    """A new folder below ``results/explore``."""
+    for number in range(1, 10_000):
+        place = Path("results") / "explore" / f"{case}_{number}"
+        with suppress(FileExistsError):
+            made_folder(place.parent, "results")
+            place.mkdir()
+            return place
+    return Path("results") / "explore"
+
+
+def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, Any]:
+    """Run the co-simulation and keep it as ``gfor run`` does: ``folder``, ``curves``, ``findings``, ``ended_early``."""
+    names = chosen(scenario, wanted)
+    run: Run = scenario.run(observers=[Streamed(scenario, names, say)])
+    folder = kept_folder(scenario.prepared.case.name)
+    run.save(folder)
+    return {
+        "folder": str(folder),
+        "curves": curves(run.dataset, names),
+        "findings": [finding.message for finding in run.findings],
+        "ended_early": None if run.failure is None else str(run.failure),
+        "ring_down": None if run.ring_down is None else {
+            "frequency_hz": run.ring_down.frequency_hz, "damping_percent": run.ring_down.damping_percent,
+        },
+    }  # fmt: skip

@@ -1,0 +1,144 @@
+"""The process that computes for the page: a line of JSON for each question, lines of JSON for its answer.
+
+It has a process of its own so that an FMU that dies or hangs ends a computation, and not the page.
+"""
+
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from orchestrator.api.case import Case, load
+from orchestrator.api.scenario import Scenario
+from orchestrator.cases.schema import Value
+from orchestrator.errors import CosimError
+from orchestrator.explore.copied import copied
+from orchestrator.explore.diagram import diagram
+from orchestrator.explore.responses import chosen, curves, plotted, simulated
+from orchestrator.explore.slopes import slopes
+from orchestrator.fmi.interrupts import calls
+
+Say = Callable[[dict[str, Any]], None]
+
+
+class Desk:
+    """Answers the questions about one case, which it reads again where its file has changed."""
+
+    def __init__(self, word: str, trust_fmus: bool) -> None:
+        self._word, self._trust = word, trust_fmus
+        self._case: Case | None = None
+        self._stamp: list[float] = []
+
+    def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
+        """What is asked for under ``ask``: open, parameters, modes, slopes, response or run."""
+        ask = str(question["ask"])
+        case = self._read()
+        if ask == "open":
+            titles = {name: table.title or name for name, table in case.file.scenarios.items()}
+            named = case.file.table.title or case.name
+            return {"case": case.name, "title": named, "scenarios": titles, "stamp": self._stamp}
+        scenario = partial(self._scenario, case, question["scenario"])
+        values: dict[str, Value] = dict(question.get("values") or {})
+        low, high = question.get("range") or (0.1, 2.0)
+        answers: dict[str, Callable[[], dict[str, Any]]] = {
+            "parameters": lambda: _parameters(scenario(values)),
+            "modes": lambda: self._modes(case, scenario(values), values, (low, high)),
+            "slopes": lambda: slopes(
+                scenario, values, str(question["parameter"]), (low, high), lambda text: say({"progress": text})
+            ),
+            "response": lambda: _response(scenario(values), question.get("signals") or ()),
+            "run": lambda: simulated(scenario(values), question.get("signals") or (), lambda part: say({"part": part})),
+        }
+        if ask not in answers:
+            raise CosimError(f"ask = {ask!r}; ask for one of open, {', '.join(answers)}")
+        return {**answers[ask](), "stamp": self._stamp}
+
+    def _read(self) -> Case:
+        stamp = _stamp(self._case.file.path) if self._case else []
+        if self._case is None or stamp != self._stamp:
+            self._case = load(self._word, trust_fmus=self._trust)
+            self._stamp = _stamp(self._case.file.path)
+        return self._case
+
+    def _scenario(self, case: Case, name: str, values: Mapping[str, Value]) -> Scenario:
+        return case.scenario(name, values)
+
+    def _modes(
+        self, case: Case, scenario: Scenario, values: Mapping[str, Value], frequencies: tuple[float, float]
+    ) -> dict[str, Any]:
+        """The JSON of ``gfor modes``, the verdict in its words, and what reproduces it."""
+        modes = scenario.modes(frequencies)
+        hidden = modes.result.hidden
+        return {
+            "modes": modes.as_json(),
+            "title": scenario.title,
+            "verdict": modes.stability.sentence(),
+            "outside": None if hidden is None else hidden.sentence(),
+            "swings": [modes.result.swing_of(mode) for mode in modes],
+            "copied": copied(case.file, self._word, scenario.name, values, frequencies),
+        }
+
+
+def _parameters(scenario: Scenario) -> dict[str, Any]:
+    """The parameters that a slider or a switch can set, the signals that can be drawn, and the diagram."""
+    listed = scenario.parameters().reset_index().to_dict("records")
+    return {
+        "parameters": [row for row in listed if row["type"] in ("Real", "Integer", "Boolean")],
+        "signals": list(scenario.prepared.record),
+        "plotted": plotted(scenario),
+        "events": [str(event) for event in scenario.prepared.events],
+        "diagram": diagram(scenario),
+    }
+
+
+def _response(scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
+    return {"curves": curves(scenario.response(), chosen(scenario, wanted))}
+
+
+def _stamp(path: Path) -> list[float]:
+    try:
+        found = path.stat()
+    except OSError:
+        return []
+    return [found.st_mtime, found.st_size]
+
+
+def main() -> None:
+    """Answer line by line until nobody asks any more; what FMUs print goes to standard error."""
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    given = json.loads(sys.stdin.readline())
+    desk = Desk(given["case"], given["trust_fmus"])
+
+    def say(content: dict[str, Any]) -> None:
+        out.write(json.dumps(content) + "\n")
+        out.flush()
+
+    warnings.simplefilter("ignore")  # the answers have them
+    for line in sys.stdin:
+        try:
+            say({"answer": desk.answer(json.loads(line), say)})
+        except CosimError as error:
+            say({"error": str(error), "kind": error.kind})
+        except (
+            ArithmeticError,
+            AttributeError,
+            LookupError,
+            MemoryError,
+            RuntimeError,
+            TypeError,
+            ValueError,
+        ) as error:
+            say({"error": f"it failed in a way that nobody expected: {error!r}; the command may say more", "kind": ""})
+
+
+if __name__ == "__main__":
+    with calls.terminable(ending=True):
+        try:
+            main()
+        except (KeyboardInterrupt, BrokenPipeError):
+            os._exit(1)
