@@ -5,7 +5,7 @@ from dataclasses import replace
 import casadi as ca
 
 from fmus.toolchain import port_variables
-from fmus.toolchain.frames import Phasor
+from fmus.toolchain.frames import Phasor, phasor_derivative
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import SourceEmf, declare_phasor_outputs, phasor_builder
@@ -27,8 +27,7 @@ def external_grid() -> Model:
     )
     closed = (e - port.v - Z * i) * (port.omega_b / Z.im)
     rate = port.through_breaker(closed, i * (-1 / BREAKER_TIME))
-    m.derivative(ca.SX(i.re), rate.re)
-    m.derivative(ca.SX(i.im), rate.im)
+    phasor_derivative(m, i, rate)
     declare_port_outputs(m, port, i)
     return m.build()
 

@@ -7,7 +7,7 @@ import casadi as ca
 
 from fmus.grid.names import injection_names
 from fmus.grid.network import OPEN_CHARGING, SMALLEST_REACTANCE, Line, Load, Network, Port, Shunt
-from fmus.toolchain.frames import ZERO, Phasor, polar, power
+from fmus.toolchain.frames import ZERO, Phasor, phasor_derivative, phasor_state, polar, power
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 from fmus.toolchain.port import BREAKER_TIME
 from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
@@ -291,8 +291,7 @@ def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omeg
     else:
         fading = (1 - branch.connected) / BREAKER_TIME
         rate = rate * (branch.connected * omega_b / branch.X) - branch.current * fading
-    m.derivative(ca.SX(branch.current.re), rate.re)
-    m.derivative(ca.SX(branch.current.im), rate.im)
+    phasor_derivative(m, branch.current, rate)
 
 
 def _capacitor_equation(m: ModelBuilder, branch: Branch, omega_b: ca.SX) -> None:
@@ -302,8 +301,7 @@ def _capacitor_equation(m: ModelBuilder, branch: Branch, omega_b: ca.SX) -> None
     v, X_C = branch.capacitor
     rate = (branch.current * X_C - v.times_j()) * (omega_b * branch.connected)
     rate -= v * ((1 - branch.connected) / BREAKER_TIME)
-    m.derivative(ca.SX(v.re), rate.re)
-    m.derivative(ca.SX(v.im), rate.im)
+    phasor_derivative(m, v, rate)
 
 
 def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active: str, reactive: str) -> None:
@@ -320,14 +318,8 @@ def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active
 
 def _capacitor_state(m: ModelBuilder, initial: Phasor) -> Phasor:
     text = "Voltage of the series capacitor"
-    return Phasor(
-        m.state("v_C_re", initial.re, "pu", f"{text}, real part", "bus"),
-        m.state("v_C_im", initial.im, "pu", f"{text}, imaginary part", "bus"),
-    )
+    return phasor_state(m, "v_C", initial, text, "bus")
 
 
 def _current_state(m: ModelBuilder, initial: Phasor, text: str) -> Phasor:
-    return Phasor(
-        m.state("i_re", initial.re, "pu", f"{text}, real part", SYSTEM_BASE),
-        m.state("i_im", initial.im, "pu", f"{text}, imaginary part", SYSTEM_BASE),
-    )
+    return phasor_state(m, "i", initial, text, SYSTEM_BASE)

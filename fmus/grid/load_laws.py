@@ -21,7 +21,7 @@ import casadi as ca
 
 from fmus.grid.element_data import LEAST_LOW_VOLTAGE, Load, Zip
 from fmus.grid.elements import Bus, DeclaredLoad
-from fmus.toolchain.frames import ZERO, Phasor, power
+from fmus.toolchain.frames import ZERO, Phasor, phasor_derivative, phasor_state, power
 from fmus.toolchain.model_builder import ModelBuilder, Scalar
 from fmus.toolchain.port_variables import SYSTEM_BASE
 
@@ -106,10 +106,7 @@ def declare_following_load(
             m.require(bus.v_0.magnitude() - v_min, f"{rule}; lower {load.name}.v_min")
         start = _missing(load, declared, bus.v_0)
         text = "Correction of the load's current at scale 1"
-        correction = Phasor(
-            m.state("c_re", start.re, "pu", f"{text}, real part", SYSTEM_BASE),
-            m.state("c_im", start.im, "pu", f"{text}, imaginary part", SYSTEM_BASE),
-        )
+        correction = phasor_state(m, "c", start, text, SYSTEM_BASE)
         delayed = _delayed_voltage(m, bus) if load.k_pf or load.k_qf else None
     bus.injected -= correction * declared.scale
     return FollowingLoad(load, bus, declared, correction, tau, v_min, delayed, omega_b)
@@ -120,13 +117,11 @@ def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
     v, declared = load.bus.v, load.load
     rate = (_wanted(m, load) - load.correction) * (1 / load.tau)
     implicit = load.correction * (-1 / load.tau)
-    m.derivative(ca.SX(load.correction.re), rate.re, implicit.re)
-    m.derivative(ca.SX(load.correction.im), rate.im, implicit.im)
+    phasor_derivative(m, load.correction, rate, implicit)
     if load.delayed is not None:
         delayed, lag = load.delayed
         moved = (v - delayed) * (1 / lag)
-        m.derivative(ca.SX(delayed.re), moved.re)
-        m.derivative(ca.SX(delayed.im), moved.im)
+        phasor_derivative(m, delayed, moved)
     own = v * declared.G
     if load.data.reactive_follows:
         own = v * Phasor(declared.G, declared.B_0 if load.data.susceptance_mvar and not declared.branches else 0.0)
@@ -184,10 +179,7 @@ def _delayed_voltage(m: ModelBuilder, bus: Bus) -> tuple[Phasor, ca.SX]:
         "T_f", FREQUENCY_TIME, "s", "Time constant of the frequency that the load feels", minimum=5e-3, maximum=10.0
     )
     text = "Bus voltage behind the lag of the frequency"
-    return Phasor(
-        m.state("z_re", bus.v_0.re, "pu", f"{text}, real part", "bus"),
-        m.state("z_im", bus.v_0.im, "pu", f"{text}, imaginary part", "bus"),
-    ), lag
+    return phasor_state(m, "z", bus.v_0, text, "bus"), lag
 
 
 def _frequency_deviation(load: FollowingLoad) -> Scalar:

@@ -14,7 +14,7 @@ import casadi as ca
 from fmus.grid.element_data import ThreeWinding
 from fmus.grid.elements import Bus, declare_power
 from fmus.grid.nodal import Admittances, add_admittance
-from fmus.toolchain.frames import Phasor, polar
+from fmus.toolchain.frames import Phasor, phasor_derivative, polar
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME
 from fmus.toolchain.port_variables import SYSTEM_BASE
@@ -91,8 +91,7 @@ def transformer_equations(m: ModelBuilder, windings: Windings, buses: dict[str, 
         (windings.currents[1], over[1], over[0], a + c),
     ):
         rate = (own * X - other * c) * factor - current * fading
-        m.derivative(ca.SX(current.re), rate.re)
-        m.derivative(ca.SX(current.im), rate.im)
+        phasor_derivative(m, current, rate)
 
 
 def add_windings(Y: Admittances, windings: Windings) -> None:

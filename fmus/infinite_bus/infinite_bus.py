@@ -7,7 +7,7 @@ because a running clock is a state that never stands still.
 
 import casadi as ca
 
-from fmus.toolchain.frames import Phasor, current_of_power, polar, power
+from fmus.toolchain.frames import Phasor, current_of_power, phasor_derivative, phasor_state, polar, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
@@ -41,10 +41,10 @@ def infinite_bus() -> Model:
     line_0 = Phasor(G_0, B) * v_0 - i_0
     source_0 = v_0 + Phasor(R, X) * line_0
     source = _source(m, source_0, clock, omega_b)
-    line = _state(m, "line.i", line_0, "Current from the source", SYSTEM_BASE)
-    v = _state(m, "bus.v", v_0, "Bus voltage, network frame", "bus")
-    _differentiate(m, line, (source - v - Phasor(R, X) * line) * (omega_b / X))
-    _differentiate(m, v, (line + injected - Phasor(G, B) * v) * (omega_b / B))
+    line = phasor_state(m, "line.i", line_0, "Current from the source", SYSTEM_BASE)
+    v = phasor_state(m, "bus.v", v_0, "Bus voltage, network frame", "bus")
+    phasor_derivative(m, line, (source - v - Phasor(R, X) * line) * (omega_b / X))
+    phasor_derivative(m, v, (line + injected - Phasor(G, B) * v) * (omega_b / B))
 
     m.output("v_re", v.re, "pu", "Bus voltage, real part, network frame", base="bus")
     m.output("v_im", v.im, "pu", "Bus voltage, imaginary part, network frame", base="bus")
@@ -105,15 +105,3 @@ def _source(m: ModelBuilder, start: Phasor, t: ca.SX, omega_b: ca.SX) -> Phasor:
     m.derivative(theta, omega_b * deviation)
     dipped = _reached(t, start_time) * (1 - _reached(t, start_time + duration))
     return polar(E * (1 - depth) * (1 - own_depth * dipped), theta)
-
-
-def _state(m: ModelBuilder, name: str, initial: Phasor, text: str, base: str) -> Phasor:
-    return Phasor(
-        m.state(f"{name}_re", initial.re, "pu", f"{text}, real part", base=base),
-        m.state(f"{name}_im", initial.im, "pu", f"{text}, imaginary part", base=base),
-    )
-
-
-def _differentiate(m: ModelBuilder, state: Phasor, rate: Phasor) -> None:
-    m.derivative(ca.SX(state.re), rate.re)
-    m.derivative(ca.SX(state.im), rate.im)

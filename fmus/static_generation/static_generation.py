@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
-from fmus.toolchain.frames import ZERO, Phasor
+from fmus.toolchain.frames import ZERO, Phasor, phasor_derivative
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, phasor_builder
@@ -45,8 +45,7 @@ class Following:
         error = (_wanted(port, v) - self.current) * self.omega_0
         turning = port.through_breaker(error, self.turning * (-1 / BREAKER_TIME))
         for state, its in ((self.current, rate), (self.turning, turning)):
-            m.derivative(ca.SX(state.re), its.re)
-            m.derivative(ca.SX(state.im), its.im)
+            phasor_derivative(m, state, its)
 
 
 def static_generation() -> Model:

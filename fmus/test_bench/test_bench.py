@@ -6,7 +6,7 @@ machine asks for; without one its inputs stay 0.
 
 import casadi as ca
 
-from fmus.toolchain.frames import Phasor, current_of_power, polar, power
+from fmus.toolchain.frames import Phasor, current_of_power, phasor_derivative, phasor_state, polar, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME
@@ -35,14 +35,14 @@ def test_bench() -> Model:
     load_0 = v_0 * Phasor(0.0, -1.0) * B_load
     line_0 = Phasor(G, B) * v_0 + load_0 - i_0
     source, closed = _source(m, v_0 + Phasor(R_0, X_0) * line_0, omega_b)
-    line = _state(m, "line.i", line_0, "Current from the source", SYSTEM_BASE)
-    load = _state(m, "load.i", load_0, "Current of the load's inductor", SYSTEM_BASE)
-    v = _state(m, "bus.v", v_0, "Bus voltage, network frame", "bus")
+    line = phasor_state(m, "line.i", line_0, "Current from the source", SYSTEM_BASE)
+    load = phasor_state(m, "load.i", load_0, "Current of the load's inductor", SYSTEM_BASE)
+    v = phasor_state(m, "bus.v", v_0, "Bus voltage, network frame", "bus")
     passive = (-v - Phasor(R, X) * line) * (omega_b / X * closed) - line * ((1 - closed) / BREAKER_TIME)
-    _differentiate(m, line, passive + source * (omega_b / X * closed), passive)
-    _differentiate(m, load, v * (omega_b * B_load) - load.times_j() * omega_b)
+    phasor_derivative(m, line, passive + source * (omega_b / X * closed), passive)
+    phasor_derivative(m, load, v * (omega_b * B_load) - load.times_j() * omega_b)
     currents = line + plant + duplicate - load - Phasor(G + fault, B) * v
-    _differentiate(m, v, currents * (omega_b / B))
+    phasor_derivative(m, v, currents * (omega_b / B))
 
     m.output("v_re", v.re, "pu", "Bus voltage, real part, network frame", base="bus")
     m.output("v_im", v.im, "pu", "Bus voltage, imaginary part, network frame", base="bus")
@@ -112,16 +112,3 @@ def _declare_power(m: ModelBuilder, scope: str, v: Phasor, current: Phasor, of: 
     s = power(v, current)
     m.output(f"{scope}p", s.re, "pu", f"Active power {of} into the bus", base=SYSTEM_BASE)
     m.output(f"{scope}q", s.im, "pu", f"Reactive power {of} into the bus", base=SYSTEM_BASE)
-
-
-def _state(m: ModelBuilder, name: str, initial: Phasor, text: str, base: str) -> Phasor:
-    return Phasor(
-        m.state(f"{name}_re", initial.re, "pu", f"{text}, real part", base=base),
-        m.state(f"{name}_im", initial.im, "pu", f"{text}, imaginary part", base=base),
-    )
-
-
-def _differentiate(m: ModelBuilder, state: Phasor, rate: Phasor, implicit: Phasor | None = None) -> None:
-    """Give a rate; ``implicit`` is its part that is linear in the states, where that is not all of it."""
-    m.derivative(ca.SX(state.re), rate.re, None if implicit is None else implicit.re)
-    m.derivative(ca.SX(state.im), rate.im, None if implicit is None else implicit.im)

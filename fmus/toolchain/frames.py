@@ -126,3 +126,17 @@ def qd_state(m: ModelBuilder, name: str, initial: Phasor, description: str) -> Q
     q = m.state(f"{name}_q", initial.re, "pu", f"{description}, q component", base="S_n")
     d = m.state(f"{name}_d", -initial.im, "pu", f"{description}, d component", base="S_n")
     return QdState(q, d)
+
+
+def phasor_state(m: ModelBuilder, name: str, initial: Phasor, text: str, base: str) -> Phasor:
+    """Declare ``name_re`` and ``name_im`` [pu] of the network frame."""
+    return Phasor(
+        m.state(f"{name}_re", initial.re, "pu", f"{text}, real part", base),
+        m.state(f"{name}_im", initial.im, "pu", f"{text}, imaginary part", base),
+    )
+
+
+def phasor_derivative(m: ModelBuilder, state: Phasor, rate: Phasor, implicit: Phasor | None = None) -> None:
+    """Give a rate; ``implicit`` is its part that is linear in the states, where that is not all of it."""
+    m.derivative(ca.SX(state.re), rate.re, None if implicit is None else implicit.re)
+    m.derivative(ca.SX(state.im), rate.im, None if implicit is None else implicit.im)

@@ -50,7 +50,8 @@ def outside(
     given, value = value, value * scale
     if wanted.fits(value):
         return
-    declared = unit_of(draft.system.components[component], variable)
+    info = draft.system.components[component].description.variables.get(variable)
+    declared = "pu" if info is None else info.unit  # a sum of variables, such as of two windings, is none itself
     unit = f" {declared}" if declared != "1" else ""
     slip = f"; is it {wanted.slip}?" if wanted.slip else ""
     ratio = declared in ("pu", "1")

@@ -12,6 +12,7 @@ from pathlib import Path
 from platform import machine as machine_of
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
 
+from orchestrator.coupling.run_state import state_as_bytes
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import open_component
@@ -68,7 +69,7 @@ def _run(description: FmuDescription) -> tuple[bytes, bytes, bytes]:
         component.enter_initialization_mode()
         component.set(dict(inputs))
         component.exit_initialization_mode()
-        state = _serialised(component) if description.can_serialize_state else b""
+        state = state_as_bytes(component) if description.can_serialize_state else b""
         seen.append(_row(0.0, component, outputs))
         for k in range(_STEPS):
             time = k * _STEP
@@ -80,14 +81,6 @@ def _run(description: FmuDescription) -> tuple[bytes, bytes, bytes]:
             component.step(time, _STEP)
             seen.append(_row((k + 1) * _STEP, component, outputs))
     return _csv(given), _csv(seen), state
-
-
-def _serialised(component: Component) -> bytes:
-    state = component.save_state()
-    try:
-        return component.serialize_state(state)
-    finally:
-        component.free_state(state)
 
 
 def _row(time: float, component: Component, names: list[str]) -> list[str]:

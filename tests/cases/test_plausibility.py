@@ -1,6 +1,8 @@
 """Data that cannot be are refused, data that are most unusual are questioned; each with file and line, and once."""
 
 import re
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -9,14 +11,16 @@ from fmus.regfm_a1.model import USUAL
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
 from fmus.synchronous_generator.usual import MACHINE
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, sketch_model
+from fmus.toolchain.description import model_description
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import RATED
 from fmus.toolchain.variables import Usual
 from gfor_fmu.usual import FORMING
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.data_rules import RULES
+from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import CaseError
-from orchestrator.fmi import description
-from orchestrator.fmi.description import read_description
+from orchestrator.fmi.description import parse_description, read_description
 from tests.binding.test_binding import OURS
 
 CASE = """\
@@ -137,17 +141,24 @@ def test_every_model_says_what_it_is_and_its_fmu_tells(name, fmu_path):
         assert told == v.usual or (v.usual is None and v.name in {r.name for r in RATED}), v.name
 
 
-def test_what_a_foreign_fmu_declares_of_itself_is_taken(monkeypatch, questions):
-    """A range of a parameter that none of our models has, and a range that is no number."""
-    read = description._component
+def test_what_an_fmu_declares_of_itself_is_read_and_a_bound_that_is_no_number_left_out():
+    usual = Usual(2, 3, "their own data")
+    m = ModelBuilder("own", "A load of somebody else", kind="load", usual={"machine.D": usual})
+    with m.scope("machine"):
+        D = m.parameter("D", 0.0, "pu", "Damping", base="S_n")
+    m.output("y", D, "pu", "The same", base="S_n")
+    text = model_description(m.build(), "{guid}", "own", "a tool")
+    found = parse_description(Path("own.fmu"), text)
+    assert (found.kind, found.variables["machine.D"].usual) == ("load", usual)
+    wrong = parse_description(Path("own.fmu"), text.replace(b'low="2.0"', b'low="two"'))
+    assert (wrong.kind, wrong.variables["machine.D"].usual) == ("load", None)
 
-    def changed(root, version):
-        kind, usual = read(root, version)
-        return kind, usual | {"machine.D": Usual(2, 3, "their own data")}
 
-    monkeypatch.setattr(description, "_component", changed)
-    description.read_description.cache_clear() if hasattr(description.read_description, "cache_clear") else None
-    assert any("machine.D = 0 pu is outside of 2 to 3 pu (their own data)" in q for q in questions())
+def test_a_port_that_does_not_say_what_it_is_is_a_converters(fmu_path):
+    described = read_description(fmu_path("synchronous_generator_st1"))
+    assert ComponentPlan(described).kind == "machine"
+    assert ComponentPlan(replace(described, kind="")).kind == "converter"
+    assert ComponentPlan(replace(read_description(fmu_path("infinite_bus")), kind="")).kind == ""
 
 
 @pytest.mark.parametrize("value", [6500.0, 0.0999, 15.5])
