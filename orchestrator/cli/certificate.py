@@ -13,7 +13,6 @@ from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.certificate import Certificate, Judged
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
 from orchestrator.certification.codes.bench_case import rated_frequency
-from orchestrator.certification.codes.bench_point import BenchTask
 from orchestrator.certification.codes.certificate import CodeCertificate, certify_code
 from orchestrator.certification.codes.declared import checked
 from orchestrator.certification.codes.frequency_domain import (
@@ -25,7 +24,6 @@ from orchestrator.certification.codes.frequency_domain import (
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.devices import Device
 from orchestrator.certification.files import JSON, save
-from orchestrator.certification.point import CertificatePointTask
 from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
 from orchestrator.certification.study import certify
 from orchestrator.certification.verdict import exit_code
@@ -39,7 +37,6 @@ from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport
-from orchestrator.points.task import Task
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
@@ -107,20 +104,19 @@ def certified(
 ) -> tuple[Certificate[Judged], list[Path]]:
     """Compute a certificate with its acceptance tests, and write its files; points are kept as they come."""
     study: Callable[[Executor, CountReport], Certificate[Judged]]
-    task: type[Task]
     if key == NTS631:
-        request, task, what = _norm_request(options, device), CertificatePointTask, "points"
+        request, module, what = _norm_request(options, device), "point", "points"
         study = lambda executor, report: certify(request, executor, folder, report)  # noqa: E731
     else:
         code = code_for(key, dict(options.declare))
-        request, task, what = bench_request(device), BenchTask, "rows"
+        request, module, what = bench_request(device), "codes.bench_point", "rows"
         study = lambda executor, report: certify_code(request, code, executor, folder, report=report)  # noqa: E731
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
     made_folder(folder, "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        executor = choose_executor(options, task)
+        executor = choose_executor(options, [f"orchestrator.certification.{module}"])
         told = (f"{device.name}, {key}: computing", what)
         found = progress.compute(lambda report: study(executor, report), executor, console, told)
         if acceptance is not None:

@@ -7,10 +7,8 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.certification.codes.bench_point import BenchTask
 from orchestrator.certification.codes.rows_anew import chosen_rows, verify_rows
 from orchestrator.certification.form import NORM
-from orchestrator.certification.point import CertificatePointTask
 from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED, chosen_points, verify_points
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verification, read_certificate, verify_files
@@ -85,8 +83,8 @@ def _anew(
     options: argparse.Namespace, folder: Path, content: dict[str, Any], chosen: list[Any], console: Console, *,
     norm: bool,
 ) -> Verification:  # fmt: skip
-    verify = verify_points if norm else verify_rows
-    executor = choose_executor(options, CertificatePointTask if norm else BenchTask)
+    verify, module = (verify_points, "point") if norm else (verify_rows, "codes.bench_point")
+    executor = choose_executor(options, [f"orchestrator.certification.{module}"])
     with progress_bar(console) as bar:
         task = bar.add_task("Points" if norm else "Rows", total=len(chosen) * (2 if norm else 1))
         try:

@@ -13,7 +13,7 @@ from types import CodeType
 from fmus.toolchain.extras import installed_version
 
 _ROOT = Path(__file__).parents[1]
-_SHOWING = ("acceptance", "api", "cli", "interop", "report")
+_SHOWING = ("acceptance", "api", "cli", "explore", "interop", "report")
 """Packages whose code does not change the result of any point; a test checks that the code of a point never imports
 them."""
 
