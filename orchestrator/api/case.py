@@ -591,7 +591,7 @@ def _studied(
 ) -> Shown:
     """Plan a study and compute it; a folder that keeps its points is kept from other commands meanwhile."""
     workers, scheduler, tls = where
-    executor = choose_executor(workers, scheduler, study.task, tls)
+    executor = choose_executor(workers, scheduler, study.imports, tls)
     planned = plan()
     question(study.prepared(planned), above=1)
     kept = None if folder is None else _folder(folder)

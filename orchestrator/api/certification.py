@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from orchestrator.certification.verification import Verification
     from orchestrator.points.executor import Executor
     from orchestrator.points.points import CountReport
-    from orchestrator.points.task import Task
 
 
 class IssuedCertificate:
@@ -125,7 +124,7 @@ def certify(
     usual = Path("results") / f"certify_{file.stem}{'' if code == NTS631 else f'_{code}'}"
     place = made_folder(usual if folder is None else path_of(folder, "folder", "folder"), "folder")
     with held(place), shown_progress(f"Certificate, {code}", shown=progress) as report:
-        with closing(choose_executor(workers, None, issue.task)) as executor:
+        with closing(choose_executor(workers, None, [issue.worker])) as executor:
             found = issue.compute(executor, place, report)
         found.acceptance = run_checks(issue.request.fmu, issue.request.binding, place) if check else None
         save(found, place)
@@ -177,18 +176,15 @@ def verify(
     chosen = [] if wanted == () and not every else chosen_anew(folder, content, wanted or (), every=every)
     found = verify_files(folder, content)
     if chosen and found.holds:
-        with closing(choose_executor(workers, None, task_of(content))) as executor:
+        with closing(choose_executor(workers, None, [worker_of(content)])) as executor:
             again = verify_anew(folder, content, chosen, executor)
         found.faults, found.agreed = found.faults + again.faults, found.agreed + again.agreed
     return found
 
 
-def task_of(content: Mapping[str, Any]) -> "type[Task]":
-    """What computes a part of a certificate anew."""
-    from orchestrator.certification.codes.bench_point import BenchTask  # noqa: PLC0415 - as above
-    from orchestrator.certification.point import CertificatePointTask  # noqa: PLC0415 - as above
-
-    return CertificatePointTask if is_of_norm(content) else BenchTask
+def worker_of(content: Mapping[str, Any]) -> str:
+    """The module that a process imports to compute a part of a certificate anew."""
+    return f"orchestrator.certification.{'point' if is_of_norm(content) else 'codes.bench_point'}"
 
 
 def is_of_norm(content: Mapping[str, Any]) -> bool:

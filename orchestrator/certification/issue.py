@@ -7,16 +7,13 @@ from pathlib import Path
 from orchestrator.cases.schema import Value
 from orchestrator.certification.certificate import Certificate, Judged
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
-from orchestrator.certification.codes.bench_point import BenchTask
 from orchestrator.certification.codes.certificate import certify_code
-from orchestrator.certification.point import CertificatePointTask
 from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
 from orchestrator.certification.study import certify
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport
-from orchestrator.points.task import Task
 
 NTS631 = "nts631"
 WITH_VERDICT = (NTS631, *CODES, *BY_DECLARATION)  # codes that a converter passes or fails
@@ -25,7 +22,7 @@ WITH_VERDICT = (NTS631, *CODES, *BY_DECLARATION)  # codes that a converter passe
 @dataclass(frozen=True)
 class Issue:
     request: CertificationRequest
-    task: type[Task]  # of one of its rows
+    worker: str  # module that a process imports
     rows: str  # what its rows are called
     compute: Callable[[Executor, Path, CountReport], Certificate[Judged]]
 
@@ -45,7 +42,7 @@ def issue_of(
     if key != NTS631:
         code, bench = code_for(key, declared), bench_request(fmu, binding, values)
         return Issue(
-            bench, BenchTask, "rows",
+            bench, "orchestrator.certification.codes.bench_point", "rows",
             lambda executor, folder, report: certify_code(bench, code, executor, folder, report=report),
         )  # fmt: skip
     if declared:
@@ -55,7 +52,7 @@ def issue_of(
     own = {name: value for name, value in values.items() if name not in study}
     norm = CertificationRequest(as_device(fmu, binding), binding, own, pod, reactances, study, black_box)
     norm.check()
-    return Issue(norm, CertificatePointTask, "points",
+    return Issue(norm, "orchestrator.certification.point", "points",
                  lambda executor, folder, report: certify(norm, executor, folder, report))  # fmt: skip
 
 

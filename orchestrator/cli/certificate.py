@@ -89,7 +89,7 @@ def certified(
     made_folder(folder, "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        executor = choose_executor(options, issue.task)
+        executor = choose_executor(options, [issue.worker])
         told = (f"{device.name}, {key}: computing", issue.rows)
         found = progress.compute(lambda report: issue.compute(executor, folder, report), executor, console, told)
         if acceptance is not None:

@@ -1,13 +1,13 @@
 """Where points are computed: the options ``--workers``, ``--scheduler`` and ``--tls``."""
 
 import argparse
+from collections.abc import Sequence
 
 from orchestrator.asked import read_whole
 from orchestrator.cli.arguments import option
 from orchestrator.errors import InputError
 from orchestrator.points import study
 from orchestrator.points.executor import Executor
-from orchestrator.points.task import Task
 
 
 def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
@@ -16,7 +16,7 @@ def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
     option(parser, "--tls", "DIR", "folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")
 
 
-def choose_executor(options: argparse.Namespace, task: type[Task]) -> Executor:
+def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:
     if options.scheduler is not None and options.workers is not None:
         raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
-    return study.choose_executor(options.workers, options.scheduler, task, options.tls)
+    return study.choose_executor(options.workers, options.scheduler, imports, options.tls)

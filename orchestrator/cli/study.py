@@ -43,7 +43,7 @@ def working_in(
 
     Gives the plan and what computes it.
     """
-    executor, progress = choose_executor(options, study.task), Progressing(folder)
+    executor, progress = choose_executor(options, study.imports), Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on):
         planned = plan()
         print_questions(study.prepared(planned), as_json=options.json)

@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.api.certification import chosen_anew, is_of_norm, task_of, verify_anew
+from orchestrator.api.certification import chosen_anew, is_of_norm, worker_of, verify_anew
 from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verification, read_certificate, verify_files
@@ -68,7 +68,7 @@ def _anew(
     options: argparse.Namespace, folder: Path, content: dict[str, Any], chosen: list[Any], console: Console, *,
     norm: bool,
 ) -> Verification:  # fmt: skip
-    executor = choose_executor(options, task_of(content))
+    executor = choose_executor(options, [worker_of(content)])
     with progress_bar(console) as bar:
         task = bar.add_task("Points" if norm else "Rows", total=len(chosen) * (2 if norm else 1))
         try:

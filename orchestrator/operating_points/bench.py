@@ -96,7 +96,7 @@ class PointBench:
         """That of the running system."""
         assert self._master is not None
         whole = {name: self.linearized(name) for name in self._master.components}
-        blocks = Blocks(self._master, known={n: _without_references(c) for n, c in whole.items()}, without_step=True)
+        blocks = Blocks(self._master, known={n: without_references(c) for n, c in whole.items()}, without_step=True)
         doubtful = [f"{name}: {', '.join(c.doubtful[:_SHOWN])}" for name, c in whole.items() if c.doubtful]
         text = f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:_SHOWN])}"
         return PointModel(continuous(blocks), blocks, whole, (text,) if doubtful else ())
@@ -121,7 +121,7 @@ def is_converter(plan: ComponentPlan) -> bool:
     return plan.kind == "converter" and all(name in plan.description.variables for name in (*DRIVEN, *OBSERVED))
 
 
-def _without_references(c: Any) -> Any:
+def without_references(c: Any) -> Any:
     """A converter's linear model without the references that damping controllers act on."""
     m = len(c.inputs) - (len(DRIVEN) if c.observed else 0)
     return replace(c, inputs=c.inputs[:m], B_c=c.B_c[:, :m], D=c.D[:, :m], observed=())

@@ -25,13 +25,13 @@ _WORKER = "orchestrator.points.worker"
 
 
 def choose_executor(
-    workers: int | None, scheduler: str | None, task: type[Task], tls: str | Path | None = None
+    workers: int | None, scheduler: str | None, imports: Sequence[str], tls: str | Path | None = None
 ) -> Executor:
     """Where the points are computed.
 
     ``workers``: number of processes on this machine; one for each core where None. ``scheduler``: address of a Dask
-    cluster, such as ``tcp://host:8786``; this machine where None. ``task``: the kind of task, whose module each worker
-    imports before its first point. ``tls``: as `DaskCluster` takes it.
+    cluster, such as ``tcp://host:8786``; this machine where None. ``imports``: modules that each
+    worker imports before its first point. ``tls``: as `DaskCluster` takes it.
     """
     if scheduler is not None:
         if workers not in (None, 1):
@@ -42,7 +42,7 @@ def choose_executor(
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise InputError(f"workers = {workers!r}; it must be a whole number of at least 1")
     workers = workers or number_of_cores()
-    return Processes(workers, (_WORKER, task.__module__)) if workers > 1 else Serial()
+    return Processes(workers, (_WORKER, *imports)) if workers > 1 else Serial()
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,12 @@ class PointStudy(Generic[Plan, Result, Shown]):
 
     run: Callable[Concatenate[Plan, Work, ...], Result]  # computes all points of a plan
     shown: Callable[[Result], Shown]  # what users get of its result
-    task: type[Task]
+    task: type[Task]  # whose module a worker imports
     prepared: Callable[[Any], Sequence[PreparedScenario]] = lambda plan: [plan.prepared]  # the scenarios of a plan
+
+    @property
+    def imports(self) -> tuple[str, ...]:
+        return (self.task.__module__,)
 
     def compute(
         self, planned: Plan, executor: Executor, folder: str | Path | None, report: CountReport, *more: Any

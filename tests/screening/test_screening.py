@@ -14,7 +14,7 @@ from orchestrator.analysis.modes import find_modes
 from orchestrator.cases.case import load_case
 from orchestrator.cli import main
 from orchestrator.errors import InputError
-from orchestrator.operating_points.bench import PointBench
+from orchestrator.operating_points.bench import PointBench, without_references
 from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Status
 from orchestrator.operating_points.outages import read_outages
@@ -24,7 +24,6 @@ from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening import modes, study
-from orchestrator.screening.point import without_references
 from orchestrator.screening.study import Shard, plan_screening, run_screening
 from orchestrator.screening.summary import Summary, duration
 from orchestrator.study.modes import compute_modes
