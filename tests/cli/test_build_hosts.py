@@ -43,8 +43,8 @@ def test_a_host_gets_what_its_row_says(name, built):
 def test_a_model_without_the_port_and_one_that_names_its_own_stay(built):
     assert with_port("external_grid", "abc", model_names()) == "external_grid"
     assert with_port("gfor_phasor", "abc", model_names()) == "gfor_phasor"
-    _, made, error = built("gfor", "synchronous_generator", "gfor_abc", "--for", "powerfactory")
-    assert [model for model, _ in made] == ["gfor_phasor", "synchronous_generator_phasor", "gfor_abc"]
+    _, made, error = built("gfor", "static_generation", "gfor_abc", "--for", "powerfactory")
+    assert [model for model, _ in made] == ["gfor_phasor", "static_generation_phasor", "gfor_abc"]
     assert "port: an emf behind an admittance; three instantaneous phases" in error
 
 
