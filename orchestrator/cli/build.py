@@ -11,17 +11,25 @@ from orchestrator.api.models import build, catalogue_model
 from orchestrator.cases.build_choices import PARTS
 from orchestrator.cli import linear_model
 from orchestrator.cli.arguments import option, repeatable, switch
-from orchestrator.cli.terminal import said_stages
+from orchestrator.cli.build_hosts import HOSTS, port_of, with_port
+from orchestrator.cli.terminal import make_errors, said_stages
 from orchestrator.errors import InputError
 
 _SUCH_AS = {"machine": "genrou", "exciter": "sexs", "governor": "tgov1", "stabilizer": "pss1a"}
+
+_NEEDS = (
+    "A Python-backed FMU needs a host that is a program in Python (3.8 or newer), such as FMPy; for others add "
+    "--native, or let --for HOST choose"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     option(parser, "--dest", "DIR", "folder (default: here)", read=Path, default=Path())
     switch(parser, "--native", "compiled FMUs with no Python in them")
-    parser.add_argument("--fmi", choices=("2.0", "3.0"), default="2.0", help="version of FMI (3.0: native only)")
+    parser.add_argument("--fmi", choices=("2.0", "3.0"), help="version of FMI (3.0: native only; default: 2.0)")
+    parser.add_argument("--for", dest="host", choices=HOSTS, metavar="HOST",
+                        help=f"what suits a host, chosen by a table: {', '.join(HOSTS)}")  # fmt: skip
     parser.add_argument("--platform", action="append", choices=sorted(TARGETS), help="compile for this platform "
                         "(repeatable; default: this machine's, for native FMUs all)")  # fmt: skip
     for part in PARTS:
@@ -39,6 +47,9 @@ def run(options: argparse.Namespace) -> int:
     """Build every model and print the files' paths."""
     if options.from_dll is not None:
         return _from_dll(options)
+    if options.host is not None:
+        _take_from_table(options)
+    options.fmi = options.fmi or "2.0"
     if options.fmi != "2.0" and not options.native:
         raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
     if options.sources and not options.native:
@@ -65,14 +76,32 @@ def run(options: argparse.Namespace) -> int:
                 sources=options.sources,
             )
             print(built)
+    if not options.native and options.host is None:
+        make_errors().print(_NEEDS, soft_wrap=True)
     return 0
 
 
+def _take_from_table(options: argparse.Namespace) -> None:
+    """Choose kind, version, platforms and ports, and say so."""
+    given = {"--native": options.native, "--fmi": options.fmi, "--platform": options.platform}
+    if said := [name for name, value in given.items() if value]:
+        raise InputError(f"--for {options.host} chooses that by itself: leave out {', '.join(said)}, or --for")
+    host = HOSTS[options.host]
+    options.native, options.fmi, options.platform = host.native, host.fmi, list(host.platforms)
+    names = options.names or [name for name in model_names() if not needs_arguments(name)]
+    options.names = list(dict.fromkeys(with_port(name, host.port, model_names()) for name in names))
+    ports = dict.fromkeys(port_of(name) for name in options.names)
+    make_errors().print(
+        f"for {options.host}: {host.kind}, FMI {host.fmi}, {', '.join(host.platforms)}; port: {'; '.join(ports)}. Why: "
+        f"{host.why} ({host.source})", soft_wrap=True, markup=False,
+    )  # fmt: skip
+
+
 def _from_dll(options: argparse.Namespace) -> int:
-    if options.names or options.native or options.platform or options.reference or options.fmi != "2.0":
+    if options.names or options.native or options.platform or options.reference or options.fmi == "3.0" or options.host:
         raise InputError(
             "--from-dll takes the DLL's own name, its platform and FMI 2.0: leave out names, --native, --platform, "
-            "--reference and --fmi"
+            "--reference, --fmi and --for"
         )
     pairs = [entry.partition("=") for entry in options.text]
     if wrong := [name for name, sign, _ in pairs if not (name and sign)]:

@@ -24,11 +24,8 @@ def rules_of(options: argparse.Namespace) -> MasterRules | None:
     """The master that a run is to follow; None for our own."""
     if options.order and not options.like:
         raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
-    for option_of_ours in ("threads", "workers"):
-        if options.like and getattr(options, option_of_ours) is not None:
-            raise InputError(
-                f"--like steps as another master does, on one thread; leave out --{option_of_ours} or --like"
-            )
+    if options.like and (options.threads or options.workers):
+        raise InputError("--like steps as another master does, on one thread; leave out --threads, --workers or --like")
     if options.like and options.tolerance is not None:
         raise InputError("--like steps as another master does, in fixed steps; leave out --tolerance or --like")
     return master_rules(options.like) if options.like else None

@@ -109,7 +109,16 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
 
     def work(index: int, report: Report) -> Outcome:
         place = ScenarioFolder(folder, scenarios[index].name, run_id)
-        return _outcome(place, scenarios[index], Progress(report), kept, options, engine)
+        try:
+            result = _run_into(place, scenarios[index], Progress(report), kept, options, engine)
+            if isinstance(result.failure, ResultsError):
+                place.discard()
+            else:
+                save_run(result, place, csv=options.csv)
+        except (CosimError, KeyboardInterrupt) as error:
+            place.discard()
+            return error
+        return result
 
     done = _one_after_the_other if workers == 1 else _side_by_side
     for index, outcome in done(scenarios, work, console, workers):
@@ -185,27 +194,6 @@ def _side_by_side(
 
         outcomes = copies.outcomes(len(scenarios), report)
     yield from outcomes
-
-
-def _outcome(
-    place: ScenarioFolder,
-    scenario: Scenario,
-    bar: Progress,
-    kept: checkpoints.StudyCheckpoints,
-    options: argparse.Namespace,
-    engine: Federates | None,
-) -> Outcome:
-    """Run a scenario and write what belongs to it; an error that ended it before anything was there is returned."""
-    try:
-        result = _run_into(place, scenario, bar, kept, options, engine)
-        if isinstance(result.failure, ResultsError):
-            place.discard()
-        else:
-            save_run(result, place, csv=options.csv)
-    except (CosimError, KeyboardInterrupt) as error:
-        place.discard()
-        return error
-    return result
 
 
 def _say_unfinished(folder: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.api.certification import chosen_anew, is_of_norm, worker_of, verify_anew
+from orchestrator.api.certification import chosen_anew, is_of_norm, verify_anew, worker_of
 from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verification, read_certificate, verify_files

@@ -40,9 +40,11 @@ def printed(process):
 
 
 def untimed(text, folder):
-    """What a run printed without the figures of its speed."""
-    table = text.index("Speed") if "Speed" in text else len(text)
-    return text[:table].replace(str(folder), "")
+    """What a run printed, without the table of its speed and the folder."""
+    lines = text.splitlines()
+    first = next(n for n, line in enumerate(lines) if line.strip() == "Run")
+    end = next(n for n in range(first, len(lines)) if lines[n].startswith("└"))
+    return "\n".join(lines[:first] + lines[end:]).replace(str(folder), "")
 
 
 @pytest.mark.slow
