@@ -29,7 +29,7 @@ function paintVerdict() {
   $("verdict").className = one.stable === true ? "good" : one.stable === false ? "bad" : "";
   $("verdict").textContent = `${seen.answer.title}: ${seen.answer.verdict}`;
   $("outside").querySelector("span").textContent = [seen.answer.outside, ...one.warnings.map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
-  $("wider").hidden = !seen.answer.outside || state.range[1] >= 1000;
+  $("wider").hidden = Boolean(SAVED) || !seen.answer.outside || state.range[1] >= 1000;
 }
 async function loadInfo() {
   const asked = state.scenario, empty = await ask("parameters", { ask: "parameters", scenario: asked, values: {} });
@@ -111,7 +111,6 @@ async function begin() {
   $("low").value = state.range[0]; $("high").value = state.range[1];
   for (const id of ["low", "high"]) { $(id).disabled = Boolean(SAVED); $(id).addEventListener("change", () => setRange(+$("low").value, +$("high").value)); }
   $("wider").addEventListener("click", () => setRange(0, 1000));
-  if (SAVED) $("wider").classList.add("saved");
   $("search").addEventListener("input", paintFound);
   $("pin").addEventListener("click", pin);
   $("copy").addEventListener("click", showCopies);
