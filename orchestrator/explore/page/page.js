@@ -7,7 +7,14 @@ async function compute(place = null) {
   failed("");
   document.querySelectorAll(".control .error").forEach(one => { one.textContent = ""; });
   const found = await ask("modes", asked, place);
-  if (!found) return;
+  if (found === undefined) return;
+  if (found === null) {  // the figures, the address and the copies stay those of the values before
+    if (seen.computed) { Object.assign(state, copyOf(seen.computed)); $("scenario").value = state.scenario; keepState(); }
+    seen.estimate = null;
+    if (seen.answer) { paintVerdict(); paintMap(); paintTable(); }
+    return;
+  }
+  seen.computed = { scenario: asked.scenario, values: asked.values, range: asked.range };
   const before = seen.modes, after = found.modes.scenarios[0].modes;
   const partners = partnersIn(after, before);
   const trails = after.map((m, k) => {
