@@ -2,14 +2,21 @@
 
 import argparse
 import webbrowser
+from pathlib import Path
+from warnings import catch_warnings, simplefilter
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.case import load
+from orchestrator.api.progress import shown_progress
+from orchestrator.api.scenario import UnusualDataWarning
 from orchestrator.asked import read_range
 from orchestrator.cli.arguments import assignment, option, repeatable, switch
 from orchestrator.cli.case_arguments import add_trust_argument, values_set
 from orchestrator.errors import InputError
+from orchestrator.explore.saved import save_page
 from orchestrator.explore.server import Explorer
+from orchestrator.explore.worker import Desk
+from orchestrator.sweep.axes import parse_vary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,6 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser, "--port", "N", "of the server, on this machine alone (default: any that is free)", read=_port, default=0
     )
     switch(parser, "--no-browser", "print the address, and open no browser")
+    option(parser, "--save", "FILE.html", "write a page that needs neither server nor Python, and open none", read=Path)
+    repeatable(parser, "--vary", "COMPONENT.PARAMETER=START:STOP:COUNT",
+               "a slider of the saved page, with these values (repeatable: a full grid)", read=parse_vary)  # fmt: skip
     add_trust_argument(parser)
 
 
@@ -34,6 +44,15 @@ def run(options: argparse.Namespace) -> int:
     if name not in case.scenarios:
         raise InputError(f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}")
     beginning = {"case": case.name, "scenario": name, "values": values_set(options), "range": list(options.range)}
+    if options.save is not None:
+        desk = Desk(options.case, options.trust_fmus)
+        with shown_progress("Points", shown=True) as report, catch_warnings():
+            simplefilter("ignore", UnusualDataWarning)  # the page has them
+            save_page(options.save, case, desk, beginning, options.vary, report)
+        print(f"Written: {options.save}")
+        return 0
+    if options.vary:
+        raise InputError("--vary is for a page that is saved; give --save FILE.html as well, or drag the slider")
     explorer = Explorer(options.case, beginning, port=options.port, trust_fmus=options.trust_fmus)
     print(f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)", flush=True)
     if not options.no_browser:

@@ -59,7 +59,7 @@ function tick() {
 }
 setInterval(tick, 200);
 
-// The answer; null where nobody wants it any more or it failed, which is said at `place` or at the top.
+// The answer; undefined where a newer question took its place, null where it failed, which is said at `place` or at the top.
 async function ask(what, question, place = null) {
   if (SAVED) return savedAnswer(question);
   working(what, true);
@@ -71,7 +71,7 @@ async function ask(what, question, place = null) {
   } catch {
     found = { error: "the server does not answer; it ended, or was ended by Ctrl-C: start gfor explore again" };
   }
-  if (found.superseded) return null;
+  if (found.superseded) return undefined;
   if (atWork.get(what) === mine) working(what, false);
   delete seen.timing[`said ${what}`];
   if (found.cancelled || found.closed) { failed("the computation was cancelled; the figures are those before it", place); return null; }

@@ -7,7 +7,14 @@ async function compute(place = null) {
   failed("");
   document.querySelectorAll(".control .error").forEach(one => { one.textContent = ""; });
   const found = await ask("modes", asked, place);
-  if (!found) return;
+  if (found === undefined) return;
+  if (found === null) {  // the figures, the address and the copies stay those of the values before
+    if (seen.computed) { Object.assign(state, copyOf(seen.computed)); $("scenario").value = state.scenario; keepState(); }
+    seen.estimate = null;
+    if (seen.answer) { paintVerdict(); paintMap(); paintTable(); }
+    return;
+  }
+  seen.computed = { scenario: asked.scenario, values: asked.values, range: asked.range };
   const before = seen.modes, after = found.modes.scenarios[0].modes;
   const partners = partnersIn(after, before);
   const trails = after.map((m, k) => {
@@ -29,7 +36,7 @@ function paintVerdict() {
   $("verdict").className = one.stable === true ? "good" : one.stable === false ? "bad" : "";
   $("verdict").textContent = `${seen.answer.title}: ${seen.answer.verdict}`;
   $("outside").querySelector("span").textContent = [seen.answer.outside, ...one.warnings.map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
-  $("wider").hidden = !seen.answer.outside || state.range[1] >= 1000;
+  $("wider").hidden = Boolean(SAVED) || !seen.answer.outside || state.range[1] >= 1000;
 }
 async function loadInfo() {
   const asked = state.scenario, empty = await ask("parameters", { ask: "parameters", scenario: asked, values: {} });
@@ -111,7 +118,6 @@ async function begin() {
   $("low").value = state.range[0]; $("high").value = state.range[1];
   for (const id of ["low", "high"]) { $(id).disabled = Boolean(SAVED); $(id).addEventListener("change", () => setRange(+$("low").value, +$("high").value)); }
   $("wider").addEventListener("click", () => setRange(0, 1000));
-  if (SAVED) $("wider").classList.add("saved");
   $("search").addEventListener("input", paintFound);
   $("pin").addEventListener("click", pin);
   $("copy").addEventListener("click", showCopies);

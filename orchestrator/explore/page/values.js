@@ -57,7 +57,8 @@ function paintControls() {
       });
       const row = make("div", { class: "row" }, field, make("span", { class: "soft" }, unit));
       if (p && typeof p.value === "number" && p.type === "Real") {
-        const scale = scaleOf({ ...p, value: original(name) });
+        const held = SAVED?.grid[name], least = held && Math.min(...held), most = held && Math.max(...held);
+        const scale = held ? { low: least, high: most, to: x => least + x * (most - least), from: v => (v - least) / (most - least) } : scaleOf({ ...p, value: original(name) });
         const slider = make("input", { type: "range", min: 0, max: 1000, step: 1, "aria-label": `${name}, from ${number(scale.low)} to ${number(scale.high)} ${unit}` });
         slider.value = typeof value === "number" ? Math.round(1000 * Math.min(1, Math.max(0, scale.from(value)))) : 0;
         const at = () => +scale.to(slider.value / 1000).toPrecision(4);
@@ -100,7 +101,7 @@ async function wantSlopes(name) {
 }
 function estimateAt(name, value) {
   const begin = performance.now(), found = seen.slopes[slopeKey(name)];
-  if (SAVED) { setValue(name, value); return; }
+  if (SAVED) { state.values[name] = value; compute(); return; }
   if (!found || found.eigenvalues.length !== seen.modes.length) { wantSlopes(name); return; }
   const modes = found.eigenvalues.map(([re, im], k) => {
     const slope = found.slopes[k];

@@ -1,0 +1,64 @@
+"""How long the page takes from an input to the painted map: `python -m tests.explore.speed CASE SCENARIO PARAMETER`."""
+
+import os
+import statistics
+import sys
+import threading
+import time
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+from orchestrator.explore.server import Explorer
+from tests.explore.test_page import CHROMIUM, OPTIONS, add, computed, opened
+
+DRAGS = 10_000
+
+
+def resident(pid):
+    return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def main(case, scenario, parameter, times=11):
+    explorer = Explorer(case, {"case": case, "scenario": scenario, "values": {}, "range": [0.1, 2.0]})
+    threading.Thread(target=explorer.serve, daemon=True).start()
+    with sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=[*OPTIONS, "--js-flags=--expose-gc"])
+        begin = time.monotonic()
+        with opened(browser, explorer.address) as view:
+            print(f"opened after {time.monotonic() - begin:.1f} s")
+            slider = add(view, parameter).locator('input[type="range"]')
+            exact, estimate = [], []
+            for count in range(2, times + 2):
+                slider.focus()
+                view.evaluate("() => wantSlopes(state.controls[0])")
+                while view.evaluate("() => !seen.slopes[slopeKey(state.controls[0])]"):
+                    time.sleep(0.05)
+                value = view.evaluate("() => state.values[state.controls[0]] ?? original(state.controls[0])")
+                for part in (0.99, 0.98, 0.97):
+                    painted = view.evaluate("() => document.body.dataset.estimateCount ?? 0")
+                    view.evaluate("x => estimateAt(state.controls[0], x)", part * value)
+                    view.wait_for_selector(f'body[data-estimate-count="{int(painted) + 1}"]', state="attached")
+                    estimate.append(float(view.locator("body").get_attribute("data-estimate")))
+                slider.press("ArrowLeft")
+                computed(view, count)
+                exact.append(float(view.locator("body").get_attribute("data-exact")))
+            for name, found in (("exact", exact), ("estimate", estimate)):
+                print(f"{name}: median {statistics.median(found):.0f} ms, {min(found):.0f} to {max(found):.0f}")
+            worker = explorer.computing["modes"].process
+            before = view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }"), resident(worker)
+            begin = time.monotonic()
+            view.evaluate(
+                "async n => { for (let k = 0; k < n; k++) { estimateAt(state.controls[0], 1 + (k % 100)); "
+                "if (k % 50 === 0) await new Promise(requestAnimationFrame); } }",
+                DRAGS,
+            )  # fmt: skip
+            after = view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }"), resident(worker)
+            print(f"{DRAGS} drags in {time.monotonic() - begin:.0f} s: page {before[0]:.1f} to {after[0]:.1f} MB, "
+                  f"worker {before[1]:.0f} to {after[1]:.0f} MB")  # fmt: skip
+        browser.close()
+    explorer.close()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
