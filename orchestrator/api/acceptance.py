@@ -83,7 +83,7 @@ class Acceptance:
         return f"<Acceptance of {self.report.fmu.name}: {self._verdict()}>"
 
     def _repr_html_(self) -> str:
-        from orchestrator.api.show import page  # noqa: PLC0415 - imports pandas
+        from orchestrator.report.notebook import page  # noqa: PLC0415 - imports pandas
 
         return page(f"{self.report.fmu.name}: {self._verdict()}", table=self.table())
 

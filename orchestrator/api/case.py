@@ -15,13 +15,12 @@ from orchestrator.api.design import ControllerDesign, Wanted, design_controller
 from orchestrator.api.design import request_of as design_of
 from orchestrator.api.executors import Plan, PointStudy, Result, Shown, choose_executor
 from orchestrator.api.interactions import STUDY as INTERACTIONS
-from orchestrator.api.interactions import Interactions, WantedInteractions
+from orchestrator.api.interactions import WantedInteractions
 from orchestrator.api.interactions import request_of as interactions_of
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
 from orchestrator.api.screening import STUDY as SCREENING
 from orchestrator.api.screening import Screening
-from orchestrator.api.show import page
 from orchestrator.api.siting import Siting
 from orchestrator.api.sweep import STUDY as SWEEP
 from orchestrator.api.sweep import ParameterSweep, plan
@@ -38,7 +37,9 @@ from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
+from orchestrator.interactions.view import Interactions
 from orchestrator.points.store import POINTS
+from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 from orchestrator.screening.study import plan_screening

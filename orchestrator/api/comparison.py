@@ -12,10 +12,10 @@ import xarray as xr
 from orchestrator.analysis.threads import side_by_side
 from orchestrator.api.identification import doubt_text, identified_mode_json, opened
 from orchestrator.api.results import Run
-from orchestrator.api.show import page
 from orchestrator.api.values import Time, moment
 from orchestrator.asked import Names, names
 from orchestrator.errors import InputError
+from orchestrator.report.notebook import page
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.results.recorded import in_memory
 from orchestrator.study.common_times import common_times

@@ -8,13 +8,13 @@ import pandas as pd
 
 from orchestrator.api.design import parameter_file_path, require_controllers
 from orchestrator.api.executors import PointStudy
-from orchestrator.api.show import page
 from orchestrator.asked import Names, checked, require_known
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.coordinated_design.files import as_json, points_rows, ranking_rows, save
 from orchestrator.coordinated_design.study import PointsDesign, PointsDesignRequest, design_over_points, values_of
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.errors import InputError
+from orchestrator.report.notebook import page
 
 
 class WantedOverPoints(TypedDict, total=False):

@@ -7,7 +7,6 @@ from typing import Any, TypedDict
 
 import pandas as pd
 
-from orchestrator.api.show import page
 from orchestrator.api.values import path as path_of
 from orchestrator.asked import checked, require_known, text_or_none
 from orchestrator.cases.case import Case as CaseFile
@@ -18,6 +17,7 @@ from orchestrator.errors import InputError
 from orchestrator.pod_design.design import DesignRequest, PodDesign, StageReport, design_pod
 from orchestrator.pod_design.files import design_json, parameters_of, provenance
 from orchestrator.points.store import PointStore
+from orchestrator.report.notebook import page
 from orchestrator.safe_files import write_text
 
 

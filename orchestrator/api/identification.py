@@ -11,10 +11,10 @@ import xarray as xr
 from orchestrator.analysis.identification import IdentifiedMode, Sampling, sampling
 from orchestrator.analysis.mode_doubts import is_trend, nothing_swings, over_a_trend, short_window, straight_line
 from orchestrator.api.results import Run
-from orchestrator.api.show import page
 from orchestrator.api.values import Time, moment
 from orchestrator.asked import text_or_none
 from orchestrator.errors import InputError
+from orchestrator.report.notebook import page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recorded import warn_of_early_end
 from orchestrator.study.comparison import open_trajectory, recorded, require_numbers, strongest_modes

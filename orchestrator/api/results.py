@@ -9,11 +9,11 @@ import numpy as np
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
-from orchestrator.api.show import Axes, axes_or_new, curves_on, page
 from orchestrator.api.sources import Sources, sources_of
 from orchestrator.api.values import Time
 from orchestrator.errors import CosimError, InputError
 from orchestrator.late import pd, xr
+from orchestrator.report.notebook import Axes, axes_or_new, curves_on, page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import recorded
 

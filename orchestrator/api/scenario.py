@@ -14,7 +14,6 @@ from orchestrator.api.linear import LinearSystem
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
 from orchestrator.api.sensitivities import Sensitivities
-from orchestrator.api.show import page
 from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.api.values import path as path_of
 from orchestrator.asked import Names, frequency_range, percent, plain_value, whole_number
@@ -34,6 +33,7 @@ from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
 from orchestrator.late import pd
+from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from orchestrator.api.executors import PointStudy
-from orchestrator.api.show import page
+from orchestrator.report.notebook import page
 from orchestrator.safe_files import made_folder
 from orchestrator.screening.study import ScreeningResult, run_screening
 from orchestrator.screening.summary import ModeAt, Summary, as_json

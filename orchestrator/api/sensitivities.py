@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.show import page
 from orchestrator.late import pd
+from orchestrator.report.notebook import page
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import made_folder

@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from orchestrator.api.show import page
+from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 from orchestrator.siting import view

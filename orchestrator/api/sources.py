@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.api.show import page
 from orchestrator.api.values import Time, moment
 from orchestrator.late import Late
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.reading import contest_cases, measurements_of, read_contest
 from orchestrator.oscillations.verdict import Located, locate
+from orchestrator.report.notebook import page
 
 if TYPE_CHECKING:
     import pandas as pd

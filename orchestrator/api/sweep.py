@@ -9,11 +9,11 @@ import xarray as xr
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.executors import PointStudy
-from orchestrator.api.show import Axes, axes_or_new, page
 from orchestrator.api.values import Paths, Time, case_values, check_case_name, in_seconds, parameter_files
 from orchestrator.asked import Names, frequency_range, names, plain_value
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.errors import InputError
+from orchestrator.report.notebook import Axes, axes_or_new, page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder

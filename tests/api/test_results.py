@@ -310,7 +310,7 @@ def test_results_show_themselves(modes, run, two_area):
 
 
 def test_what_is_shown_cannot_be_read_as_html(two_area):
-    from orchestrator.api.show import page  # noqa: PLC0415 - inner part
+    from orchestrator.report.notebook import page  # noqa: PLC0415 - inner part
 
     assert "<script>" not in page("<script>", ["<script>"])
 
