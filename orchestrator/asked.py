@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeVar
 
 from orchestrator.errors import InputError
@@ -17,6 +18,7 @@ Request = TypeVar("Request")
 Names = str | Sequence[str]  # one name, or several
 
 _ASKED = "asked"
+_SHOWN = 60  # characters of an overlong path that an error shows
 _LARGEST = 10**308  # of a whole number that a floating-point number can hold
 
 
@@ -136,6 +138,24 @@ def text_or_none(given: Any, argument: str, rule: str = "give one name, or leave
     if given is not None and (not isinstance(given, str) or not given):
         raise InputError(f"{argument} = {given!r}; {rule}")
     return given
+
+
+def path(given: Any, argument: str, kind: str = "file") -> Path:
+    """A path of a file, or of another ``kind`` of place."""
+    if not isinstance(given, str | Path) or not str(given):
+        raise InputError(f"{argument} = {given!r}; give the path of a {kind}")
+    _check_length(Path(given), argument)
+    return Path(given)
+
+
+def _check_length(path: Path, argument: str) -> None:
+    """Refuse what no file system can hold, before it says so itself."""
+    try:
+        path.exists()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}…"
+        raise InputError(f"{argument} = {shown!r} is no path that a file can have: {reason}") from error
 
 
 def read_range(text: str) -> tuple[float, float]:

@@ -274,15 +274,15 @@ ON_THE_FACE = {
     "build": {"api.models.build", "api.models.catalogue_model"},
     "check": {"api.acceptance.check"},
     "compare": {"api.comparison.compare"},
-    "design": {"api.design.design_controller"},
+    "design": {"api.studies.design_controller"},
     "export_comtrade": {"api.comtrade.export_comtrade"},
     "identify": {"api.identification.identify"},
     "info": {"api.fmu.info"},
     "linearize": {"cli.case_arguments.chosen"},
     "modes": {"cli.case_arguments.chosen"},
     "run": {"cli.case_arguments.chosen"},
-    "screen": {"api.screening.STUDY"},
-    "sweep": {"api.sweep.plan", "api.sweep.STUDY"},
+    "screen": {"api.studies.SCREENING"},
+    "sweep": {"api.sweep.plan", "api.studies.SWEEP"},
 }
 """Command → what it calls of the Python face; ``chosen`` gives the face's scenarios."""
 

@@ -9,41 +9,48 @@ from typing import Any, Unpack
 import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.coordinated_design import STUDY as COORDINATED_DESIGN
-from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoints, request_of
-from orchestrator.api.design import ControllerDesign, Wanted, design_controller
-from orchestrator.api.design import request_of as design_of
 from orchestrator.api.executors import Plan, PointStudy, Result, Shown, choose_executor
-from orchestrator.api.interactions import STUDY as INTERACTIONS
-from orchestrator.api.interactions import WantedInteractions
-from orchestrator.api.interactions import request_of as interactions_of
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
-from orchestrator.api.screening import STUDY as SCREENING
-from orchestrator.api.screening import Screening
-from orchestrator.api.siting import Siting
-from orchestrator.api.sweep import STUDY as SWEEP
-from orchestrator.api.sweep import ParameterSweep, plan
+from orchestrator.api.studies import (
+    COORDINATED_DESIGN,
+    INTERACTIONS,
+    SCREENING,
+    SWEEP,
+    Wanted,
+    WantedInteractions,
+    WantedOverPoints,
+    design_controller,
+    design_request,
+    interactions_request,
+    points_design_request,
+)
+from orchestrator.api.sweep import plan
 from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
-from orchestrator.api.values import path as path_of
 from orchestrator.asked import Names, flag, frequency_range, percent, text_or_none
 from orchestrator.asked import names as names_given
+from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import forced
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.coordinated_design.study import plan_points_design
+from orchestrator.coordinated_design.view import CoordinatedDesign
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.interactions.view import Interactions
+from orchestrator.pod_design.view import ControllerDesign
 from orchestrator.points.store import POINTS
 from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 from orchestrator.screening.study import plan_screening
+from orchestrator.screening.view import Screening
 from orchestrator.siting.study import SiteRequest, find_sites
+from orchestrator.siting.view import Siting
+from orchestrator.sweep.view import ParameterSweep
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -458,7 +465,7 @@ class Case:
         [45.53, 0.4, 0.6]
         """
         of_case = (scenario, case_values(values), in_seconds(step, "step"), parameter_files(parameters))
-        planned = partial(plan_interactions, self.file, interactions_of(wanted), *of_case)
+        planned = partial(plan_interactions, self.file, interactions_request(wanted), *of_case)
         return _studied(INTERACTIONS, planned, (workers, None, None), folder, "Systems", shown=progress)
 
     def design(
@@ -503,7 +510,7 @@ class Case:
         >>> design.parameters["gfor.pod_p.K"]
         200.0
         """
-        request = design_of(controller, wanted, scenario, overrides=case_values(values),
+        request = design_request(controller, wanted, scenario, overrides=case_values(values),
                             parameters=parameter_files(parameters), step_size=in_seconds(step, "step"))  # fmt: skip
         with shown_stages(shown=progress) as report:
             design = design_controller(self.file, request, report=report)
@@ -566,7 +573,7 @@ class Case:
         >>> bool(design.points()["damping_percent"].min() >= 15)
         True
         """
-        request = request_of(names_given(controllers, "controllers"), wanted, scenario=scenario,
+        request = points_design_request(names_given(controllers, "controllers"), wanted, scenario=scenario,
                              overrides=case_values(values), parameters=parameter_files(parameters),
                              step_size=in_seconds(step, "step"))  # fmt: skip
         planned = partial(plan_points_design, self.file, request, path_of(points, "points", "file"), outages)

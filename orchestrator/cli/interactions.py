@@ -7,7 +7,7 @@ from dataclasses import replace
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.interactions import STUDY
+from orchestrator.api.studies import INTERACTIONS
 from orchestrator.certification.devices import devices_of
 from orchestrator.cli.arguments import add_request_arguments, asked_by, repeatable
 from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     case = case_of(options)
     request = _request(options)
     folder = folder_of(options, case.name, "interactions")
-    with working_in(options, folder, STUDY, lambda: plan_interactions(case, request, **of_case)) as (_, compute):
+    with working_in(options, folder, INTERACTIONS, lambda: plan_interactions(case, request, **of_case)) as (_, compute):
         found = compute()
         end = last_line(found.result, "systems ", folder, found.save(folder))
         say("warning", found.warnings)

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.screening import STUDY, Screening
+from orchestrator.api.studies import SCREENING
 from orchestrator.asked import read_percent
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.cli.arguments import Joined, option, repeatable, switch
@@ -19,11 +19,11 @@ from orchestrator.cli.terminal import make_console, make_errors, print_parts
 from orchestrator.errors import InputError
 from orchestrator.points.store import POINTS
 from orchestrator.safe_files import made_folder
-from orchestrator.screening import tables
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 from orchestrator.screening.record import Status
 from orchestrator.screening.study import Shard, plan_screening
 from orchestrator.screening.summary import Summary
+from orchestrator.screening.view import Screening, modes_table, overview, remarks, verdict
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,28 +61,28 @@ def run(options: argparse.Namespace) -> int:
     how = {"wanted": wanted, "whole": options.whole, "sharing": sharing, **of_case}
     folder = folder_of(options, case.name, "screen")
     plan = partial(plan_screening, case, options.points, options.outages, **how)
-    with working_in(options, folder, STUDY, plan) as (planned, compute):
+    with working_in(options, folder, SCREENING, plan) as (planned, compute):
         _merge(options.merge, folder / POINTS)
         found = compute(options.shard)
         if options.shard is not None:
             part, whole = len(found.result.items), planned.number_of_items
             text = f"part {options.shard.number} of {options.shard.total}: {part} of {whole} items are kept in {folder}"
-            remarks = tables.remarks(found.summary) if found.summary.counts[Status.INTERNAL] else ()
+            said = remarks(found.summary) if found.summary.counts[Status.INTERNAL] else ()
             print_parts(make_console(stderr=options.json), [escape(text)])
-            for text in remarks:
+            for text in said:
                 make_errors().print(escape(text), soft_wrap=True)
             return _exit_code(found, found.summary.stable_here, fail_unstable=options.fail_unstable)
         end = last_line(found.result, "", folder, found.save(folder))
-        present(options, found.as_json, _parts(found.summary), tables.remarks(found.summary), end)
+        present(options, found.as_json, _parts(found.summary), remarks(found.summary), end)
     return _exit_code(found, found.stable, fail_unstable=options.fail_unstable)
 
 
 def _parts(summary: Summary) -> Iterator[RenderableType]:
     plan = summary.result.plan
-    yield tables.verdict(summary)
+    yield verdict(summary)
     if len(plan.outages) + len(plan.points) > 2:
-        yield from ("", tables.overview(summary))
-    yield from ("", tables.modes(summary), "")
+        yield from ("", overview(summary))
+    yield from ("", modes_table(summary), "")
 
 
 def _exit_code(found: Screening, stable: bool | None, *, fail_unstable: bool) -> int:

@@ -7,7 +7,6 @@ from rich.markup import escape
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.progress import shown_progress
-from orchestrator.api.siting import Siting
 from orchestrator.asked import read_range
 from orchestrator.cases.case import load_case
 from orchestrator.cli.arguments import Joined
@@ -16,8 +15,8 @@ from orchestrator.cli.terminal import make_console, print_json, print_questions,
 from orchestrator.cli.verdict import NOT_MET
 from orchestrator.errors import InputError
 from orchestrator.safe_files import made_folder
-from orchestrator.siting import view
 from orchestrator.siting.study import SiteRequest, find_sites
+from orchestrator.siting.view import Siting, ranking_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     console = make_console()
     for text in (found.answer, *found.remarks):
         console.print(escape(text), soft_wrap=True, highlight=False)
-    console.print("", view.ranking_table(found.result), "")
+    console.print("", ranking_table(found.result), "")
     warn(prepared.name, found.result.intact.found.warnings)
     if written:
         console.print(escape(f"Written: {', '.join(map(str, written))}"), soft_wrap=True)

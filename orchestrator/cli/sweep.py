@@ -4,7 +4,8 @@ import argparse
 
 from rich.console import RenderableType
 
-from orchestrator.api.sweep import STUDY, plan
+from orchestrator.api.studies import SWEEP
+from orchestrator.api.sweep import plan
 from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, case_of, values_set
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.errors import InputError
@@ -51,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
             parameters=options.parameters, frequencies=options.range, until=options.until,
         )  # fmt: skip
 
-    with working_in(options, folder, STUDY, planning) as (_, compute):
+    with working_in(options, folder, SWEEP, planning) as (_, compute):
         sweep = compute()
         end = last_line(sweep.result, "points ", folder, sweep.save(folder))
         first = tables.limits(sweep.samples) or tables.stability(sweep.samples)

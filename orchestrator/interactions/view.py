@@ -24,7 +24,7 @@ from orchestrator.late import pd
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, paragraphs
 from orchestrator.report.notebook import page
-from orchestrator.report.table import Column, Table, mode_columns, verdict
+from orchestrator.report.table import Column, ColumnTable, mode_columns, verdict
 from orchestrator.report.tables import first_few
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
@@ -126,7 +126,7 @@ class Interactions:
         return page(repr(self).strip("<>"), self.sentences, self.pairs())
 
 
-def modes_table(judgement: JudgedInteractions) -> Table[JudgedMode]:
+def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:
     """The modes of the system as it is, with the participation of every group."""
     plan = judgement.result.plan
     groups = [*plan.vendors, *(g for g in dict.fromkeys(plan.groups.values()) if g not in plan.vendors)]
@@ -134,7 +134,7 @@ def modes_table(judgement: JudgedInteractions) -> Table[JudgedMode]:
     def share_of(group: str) -> Column[JudgedMode]:
         return Column(group, lambda judged: judged.groups.get(group, 0.0), _share, f"share.{group}")
 
-    return Table("As in the case", (
+    return ColumnTable("As in the case", (
         *mode_columns(lambda judged: judged.mode),
         *map(share_of, groups),
         Column("", lambda judged: judged.is_interaction, name="interaction"),
@@ -157,17 +157,17 @@ def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:
     ]
 
 
-def systems_table(judgement: JudgedInteractions) -> Table[tuple[str, JudgedSystem, str]]:
+def systems_table(judgement: JudgedInteractions) -> ColumnTable[tuple[str, JudgedSystem, str]]:
     """Nobody, each vendor alone, and each pair, at the same power flow."""
     rows = [("no vendor", judgement.none, "")]
     rows += [(f"{vendor} alone", system, "") for vendor, system in judgement.alone.items()]
     rows += [(pair.text, pair.joint, "–" if pair.fall is None else f"{pair.fall:+.2f}") for pair in judgement.pairs]
     name, fall = Column[tuple[str, JudgedSystem, str]]("System", lambda r: r[0]), "Falls by [points]"
     columns = (name, *_figures(lambda r: r[1]), Column(fall, lambda r: r[2]))
-    return Table("Vendors alone and in pairs", columns, rows, left=2)
+    return ColumnTable("Vendors alone and in pairs", columns, rows, left=2)
 
 
-def assignments_table(judgement: JudgedInteractions) -> Table[JudgedSystem]:
+def assignments_table(judgement: JudgedInteractions) -> ColumnTable[JudgedSystem]:
     """All assignments, the worst first."""
     swapped = judgement.result.plan.swapped
 
@@ -175,7 +175,7 @@ def assignments_table(judgement: JudgedInteractions) -> Table[JudgedSystem]:
         return Column(place, lambda one: one.name.names[k], name=f"at.{place}")
 
     columns = [*(at(k, place) for k, place in enumerate(swapped)), *_figures(lambda one: one)]
-    return Table("Each device at each place", columns, judgement.assignments, left=len(swapped) + 1)
+    return ColumnTable("Each device at each place", columns, judgement.assignments, left=len(swapped) + 1)
 
 
 def warnings_of(judgement: JudgedInteractions) -> list[str]:

@@ -46,7 +46,7 @@ class Column(Generic[Row]):
 
 
 @dataclass(frozen=True)
-class Table(Generic[Row]):
+class ColumnTable(Generic[Row]):
     title: str
     columns: Sequence[Column[Row]]
     rows: Sequence[Row]
@@ -82,7 +82,7 @@ class Table(Generic[Row]):
         return pd.DataFrame(self.records(), columns=[column.name for column in self.columns if column.name])
 
     def save(self, path: Path) -> None:
-        """Write a CSV file; truth values in lower case."""
+        """Write a CSV file; truth values are in lower case, as in JSON."""
         plain = [{k: str(v).lower() if isinstance(v, bool) else v for k, v in row.items()} for row in self.records()]
         save_table(plain, path, [column.name for column in self.columns if column.name])
 

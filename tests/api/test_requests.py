@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from orchestrator.api.coordinated_design import WantedOverPoints
-from orchestrator.api.design import Wanted
-from orchestrator.api.interactions import WantedInteractions
+from orchestrator.api.studies import Wanted, WantedInteractions, WantedOverPoints
 from orchestrator.asked import DAMPING, FLAG, NAMES, STAGES, asked, asked_of, checked
 from orchestrator.cli.arguments import add_request_arguments, asked_by
 from orchestrator.coordinated_design.study import PointsDesignRequest

@@ -1,8 +1,9 @@
-"""Files of a design over operating points: parameter file, JSON, a row for each point, a row for each converter."""
+"""A design over operating points as Python has it, and its files: parameters, JSON, rows for points and converters."""
+
+from __future__ import annotations
 
 import csv
 import io
-import json
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,96 @@ from orchestrator.cases.parameter_files import parameter_file_text
 from orchestrator.coordinated_design.ranking import RankedConverter
 from orchestrator.coordinated_design.study import PointsDesign, values_of
 from orchestrator.coordinated_design.verdict import JudgedPoint, PlacedMode, PointsVerdict
-from orchestrator.coordinated_design.words import verdict_sentence
+from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
+from orchestrator.late import pd
+from orchestrator.pod_design.view import parameter_file_path
+from orchestrator.report.notebook import page
+from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
 
 _OF_POINTS = ("point", "outage", "hours", "status", "stable", "damping_before_percent", "frequency_before_hz",
               "damping_percent", "frequency_hz", "who", "allowed", "why")  # fmt: skip
 _OF_RANKING = ("converter", "controller", "least_damping_percent", "K", "T_S1", "T_S2", "shift_rad_s_per_pu")
+
+
+class CoordinatedDesign:
+    """POD controllers for many operating points and outages. `Case.design_over_points` makes it.
+
+    Attributes
+    ----------
+    result
+        Every figure on the way.
+    """
+
+    def __init__(self, result: PointsDesign) -> None:
+        self.result = result
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the wanted damping is reached at every point; where none is wanted, whether the least one is better.
+
+        None where points have no modes, and no other point says no.
+        """
+        return self.result.verdict.met
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in one sentence, with the point, the outage and the mode that limit."""
+        return verdict_sentence(self.result.verdict)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The settings by ``component.variable``: the values of a scenario with these controllers."""
+        return values_of(self.result.plan.groups, self.result.settings)
+
+    def points(self) -> pd.DataFrame:
+        """One row for each operating point with each outage: status, verdict, damping without and with it [%]."""
+        return pd.DataFrame(points_rows(self.result.verdict))
+
+    def ranking(self) -> pd.DataFrame:
+        """One row for each converter, the best first: what a controller there alone would give."""
+        return pd.DataFrame(ranking_rows(self.result))
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor design --points --json`` prints, as JSON's types."""
+        return as_json(self.result)
+
+    def save(self, path: str | Path, command: str | None = None) -> list[Path]:
+        """Write the parameter file, and beside it JSON, a row for each point and a row for each converter.
+
+        Parameters
+        ----------
+        path
+            Path of the parameter file, which ``--parameters`` and `Case.scenario` take.
+        command
+            The command that the file names as its origin; by default the call in Python.
+
+        Raises
+        ------
+        InputError
+            If the path is none, or ends in ``.json``.
+        ResultsError
+            If a file cannot be written.
+        """
+        file = parameter_file_path(path)
+        said = command or f"gfor.load({self.result.plan.case.name!r}).design_over_points(…) in Python"
+        points, ranking = file.with_suffix(".csv"), file.with_name(f"{file.stem}_ranking.csv")
+        write_text(file, parameter_file_text(self.parameters, provenance(self.result, said)))
+        save_json(self.as_json(), file.with_suffix(".json"))
+        write_text(points, _csv(_OF_POINTS, points_rows(self.result.verdict)))
+        write_text(ranking, _csv(_OF_RANKING, ranking_rows(self.result)))
+        return [file, file.with_suffix(".json"), points, ranking]
+
+    def __repr__(self) -> str:
+        return f"<CoordinatedDesign for {self.result.plan.case.name}: {self.verdict}>"
+
+    def _repr_html_(self) -> str:
+        lines = [
+            self.verdict,
+            what_it_rests_on(self.result),
+            ", ".join(f"{k} = {v}" for k, v in self.parameters.items()),
+        ]
+        return page(f"Design over points of {self.result.plan.case.name}", lines, self.points())
 
 
 def as_json(design: PointsDesign) -> dict[str, Any]:
@@ -126,18 +211,6 @@ def ranking_rows(design: PointsDesign) -> list[dict[str, Any]]:
         cells = (one.place.component, one.place.controller, damping, *rest)
         rows.append(dict(zip(_OF_RANKING, cells, strict=True)))
     return rows
-
-
-def save(design: PointsDesign, path: Path, command: str) -> list[Path]:
-    """Write the parameter file, and beside it JSON and two CSV files."""
-    text = parameter_file_text(values_of(design.plan.groups, design.settings), provenance(design, command))
-    json_file = path.with_suffix(".json")
-    points, ranking = path.with_suffix(".csv"), path.with_name(f"{path.stem}_ranking.csv")
-    write_text(path, text)
-    write_text(json_file, json.dumps(as_json(design), indent=1, ensure_ascii=False) + "\n")
-    write_text(points, _csv(_OF_POINTS, points_rows(design.verdict)))
-    write_text(ranking, _csv(_OF_RANKING, ranking_rows(design)))
-    return [path, json_file, points, ranking]
 
 
 def _csv(columns: tuple[str, ...], rows: list[dict[str, Any]]) -> str:
