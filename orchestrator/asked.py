@@ -178,17 +178,26 @@ def frequency_range(given: Any, argument: str = "frequencies") -> tuple[float, f
     return low, high
 
 
+def read_part(rule: str, least: float, most: float) -> Callable[[str], float]:
+    """What reads percent, ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
+
+    def read(text: str) -> float:
+        number = as_number(text.strip().removesuffix("%"))
+        if not least <= number <= most:
+            raise ValueError(f"{text!r} is not {rule}")
+        if 0 < number < 1 and "%" not in text:
+            raise ValueError(
+                f"{text!r} is read in percent; write {100 * number:g} for a ratio of {number:g}, or {text}% if so "
+                "little is meant"
+            )
+        return number / 100
+
+    return read
+
+
 def read_percent(text: str, most: float = 90) -> float:
-    """Damping [%], as ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
-    number = as_number(text.removesuffix("%"))
-    if not 0 < number <= most:
-        raise ValueError(f"{text!r} is not a damping in percent between 0 and {most:g}, such as 20")
-    if number < 1 and not text.endswith("%"):
-        raise ValueError(
-            f"{text!r} is read in percent; write {100 * number:g} for a damping ratio of {number:g}, or {text}% if so "
-            "little is meant"
-        )
-    return number / 100
+    """Damping [%] as a ratio."""
+    return read_part(f"a damping in percent between 0 and {most:g}, such as 20", 1e-9, most)(text)
 
 
 def percent(given: Any, argument: str, most: float = 90) -> float:
@@ -198,14 +207,6 @@ def percent(given: Any, argument: str, most: float = 90) -> float:
         ratio = f": write {100 * own:g} for a damping ratio of {own:g}" if _is_number(own) and 0 < own < 1 else ""
         raise InputError(f"{argument} = {given!r}; it is in percent between 1 and {most:g}, such as 20{ratio}")
     return float(own) / 100
-
-
-def read_share(text: str) -> float:
-    """A share of a mode [%], as a ratio; a bare number below 1 looks like a ratio and is refused."""
-    number = as_number(text.removesuffix("%"))
-    if not 0 < number <= 50 or (number < 1 and not text.endswith("%")):
-        raise ValueError(f"{text!r} is not a share in percent up to 50, such as 5 (or 0.5% below 1)")
-    return number / 100
 
 
 def share(given: Any, argument: str) -> float:
@@ -273,7 +274,7 @@ NAME = FieldKind("NAME", str, text_or_none)
 NAMES = FieldKind("NAME", str, names, several=True)
 FREQUENCIES = FieldKind("LO:HI", read_range, frequency_range)
 DAMPING = FieldKind("PERCENT", read_percent, percent)
-SHARE = FieldKind("PERCENT", read_share, share)
+SHARE = FieldKind("PERCENT", read_part("a share in percent up to 50, such as 5", 1e-9, 50), share)
 GAIN = FieldKind("DK", read_positive, gain)
 GAIN_BOUNDS = FieldKind("MIN:MAX", read_bounds, bounds)
 STAGES = FieldKind("N_S", read_whole(0, 10), partial(whole_number, least=0, most=10))

@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.asked import read_part
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.needs_record import (
     confirmed_text,
@@ -39,22 +40,11 @@ def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     group.add_argument("--fixed", action="store_true", help="fixed parameters too")
     group.add_argument(
-        "--change", type=relative_change, metavar="PERCENT",
+        "--change", type=read_part("a change in percent from 0.01 to 50, such as 5", 0.01, 50), metavar="PERCENT",
         help=f"by so much of itself a parameter is changed to either side (default: {100 * CHANGE:g} percent)",
     )  # fmt: skip
     group.add_argument("--confirm", action="store_true",
                        help="run the one change that a straight line lets expect most of")  # fmt: skip
-
-
-def relative_change(text: str) -> float:
-    """A part above 0 and at most a half, in percent."""
-    try:
-        value = float(text.removesuffix("%"))
-    except ValueError:
-        value = 0.0
-    if not 0.01 <= value <= 50:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a change in percent from 0.01 to 50, such as 5")
-    return value / 100
 
 
 def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str], norm: str) -> None:

@@ -1,7 +1,6 @@
 """``gfor check``: acceptance tests of an FMU."""
 
 import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.api.acceptance import check
 from orchestrator.asked import read_positive
 from orchestrator.cli.arguments import option, repeatable, switch
+from orchestrator.cli.terminal import print_json
 from orchestrator.errors import InputError
 from orchestrator.fmi.protection import missing
 from orchestrator.units import read_value
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     if options.junit:
         found.save_junit(options.junit)
     if options.json:
-        print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
+        print_json(found.as_json())
     else:
         _print(found.report)
     return 1 if found.faults else NOT_SUPPORTED if found.not_supported else 0
