@@ -6,6 +6,7 @@ A `FieldKind` says twice what a field may be: ``read`` takes the text of an opti
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,6 +32,7 @@ class FieldKind:
     read: Callable[[str], Any] | None
     check: Callable[[Any, str], Any]  # from what a caller gives, and the keyword for the `InputError`
     several: bool = False  # whether the option is repeatable, and gives a tuple
+    joined: bool = False  # whether these are one text with commas
 
 
 @dataclass(frozen=True)
@@ -223,11 +225,28 @@ def read_positive(text: str) -> float:
     return number
 
 
-def gain(given: Any, argument: str) -> float:
+def positive(given: Any, argument: str, rule: str = "give a number above 0, such as 50.0, or leave it out") -> float:
     own: Any = plain_value(given)
     if not _is_number(own) or not 0 < own < 1e300:
-        raise InputError(f"{argument} = {given!r}; give a gain above 0 in pu, such as 50.0, or leave it out")
+        raise InputError(f"{argument} = {given!r}; {rule}")
     return float(own)
+
+
+def one_of(values: type[StrEnum]) -> "FieldKind":
+    """One of these words, or None."""
+    known = ", ".join(values)
+
+    def read(text: str) -> StrEnum:
+        if text not in list(values):
+            raise ValueError(f"{text!r} is none of {known}")
+        return values(text)
+
+    def check(given: Any, argument: str) -> StrEnum | None:
+        if given is not None and given not in list(values):
+            raise InputError(f"{argument} = {given!r}; give one of {known}")
+        return None if given is None else values(given)
+
+    return FieldKind("RULE", read, check)
 
 
 def _are_bounds(low: Any, high: Any) -> bool:
@@ -275,7 +294,15 @@ NAMES = FieldKind("NAME", str, names, several=True)
 FREQUENCIES = FieldKind("LO:HI", read_range, frequency_range)
 DAMPING = FieldKind("PERCENT", read_percent, percent)
 SHARE = FieldKind("PERCENT", read_part("a share in percent up to 50, such as 5", 1e-9, 50), share)
-GAIN = FieldKind("DK", read_positive, gain)
+POSITIVE = FieldKind("X", read_positive, positive)
+GAIN = FieldKind(
+    "DK", read_positive, partial(positive, rule="give a gain above 0 in pu, such as 50.0, or leave it out")
+)
+FILE = FieldKind("FILE", Path, lambda given, argument: None if given is None else path(given, argument))
+OUTAGES = FieldKind(
+    "WHICH", str, lambda given, argument: None if given is None else ",".join(names(given, argument)),
+    several=True, joined=True,
+)  # fmt: skip
 GAIN_BOUNDS = FieldKind("MIN:MAX", read_bounds, bounds)
 STAGES = FieldKind("N_S", read_whole(0, 10), partial(whole_number, least=0, most=10))
 RANKED = FieldKind("N", read_whole(0, 1000), partial(whole_number, least=0, most=1000))

@@ -20,6 +20,7 @@ from orchestrator.api.studies import (
     Wanted,
     WantedInteractions,
     WantedOverPoints,
+    WantedPlaces,
     design_controller,
     design_request,
     interactions_request,
@@ -27,14 +28,13 @@ from orchestrator.api.studies import (
 )
 from orchestrator.api.sweep import plan
 from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
-from orchestrator.asked import Names, flag, frequency_range, percent, text_or_none
+from orchestrator.asked import Names, checked, flag, require_known, text_or_none
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import forced
-from orchestrator.cases.sharing import SharingRule
 from orchestrator.coordinated_design.study import plan_points_design
 from orchestrator.coordinated_design.view import CoordinatedDesign
 from orchestrator.coupling.schedule import ScheduleName
@@ -45,7 +45,7 @@ from orchestrator.pod_design.view import ControllerDesign
 from orchestrator.points.store import POINTS
 from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
-from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening
 from orchestrator.screening.view import Screening
 from orchestrator.siting.study import SiteRequest, find_sites
@@ -354,14 +354,14 @@ class Case:
            point  frequency_hz  damping_percent
         0  00:00          0.58            10.57
         """
-        wanted = CriticalRegion(*frequency_range(frequencies), percent(damping, "damping", most=100 * MOST_DAMPING))
-        if sharing is not None and sharing not in list(SharingRule):
-            raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
+        request = ScreeningRequest(**checked(ScreeningRequest, {
+            "points": points, "outages": outages, "sharing": sharing, "frequencies": frequencies, "damping": damping,
+            "whole": whole,
+        }))  # fmt: skip
         planned = partial(
-            plan_screening, self.file, None if points is None else path_of(points, "points", "file"),
-            outages if outages is None else ",".join(names_given(outages, "outages")), scenario, case_values(values),
-            in_seconds(step, "step"), wanted, parameter_files(parameters), whole=whole,
-            sharing=None if sharing is None else SharingRule(sharing),
+            plan_screening, self.file, request.points, request.outages, scenario, case_values(values),
+            in_seconds(step, "step"), request.region, parameter_files(parameters), whole=request.whole,
+            sharing=request.sharing,
         )  # fmt: skip
         return _studied(SCREENING, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
 
@@ -371,15 +371,9 @@ class Case:
         scenario: str | None = None,
         values: Mapping[str, Any] | None = None,
         *,
-        binding: str | Path | None = None,
         step: Time | None = None,
         parameters: Paths = (),
-        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-        below: float = 10,
-        outages: str | Sequence[str] | None = None,
-        confirm: int = 3,
-        rating: float = 100,
-        gain: float = 200,
+        **wanted: Unpack[WantedPlaces],
     ) -> Siting:
         """Where to put a converter: how far support at each bus moves each poorly damped mode.
 
@@ -395,20 +389,11 @@ class Case:
             Its name; the first one where None.
         values, step, parameters
             As for `scenario`.
-        binding
-            Of the FMU.
-        frequencies
-            Modes from the first to the second are looked at [Hz] …
-        below
-            … where they are damped less than this [%]; the least damped one where none is.
-        outages
-            Rank for these too: ``"n-1"``, ``"lines"``, ``"units"``, or names; the least of all counts.
-        confirm
-            How many of the best buses are confirmed.
-        rating
-            Of the converter that confirms [MVA].
-        gain
-            Largest of its POD [pu of its rating].
+        wanted
+            Any of: ``binding`` (of the FMU), ``frequencies`` [Hz] and ``below`` [%] (modes that are looked at; the
+            least damped one where none is damped so little), ``outages`` (rank for these too: ``"n-1"``, ``"lines"``,
+            ``"units"``, or names; the least of all counts), ``confirm`` (how many of the best buses), ``rating`` [MVA]
+            of the converter that confirms, and largest ``gain`` of its POD [pu of its rating].
 
         Raises
         ------
@@ -422,10 +407,10 @@ class Case:
         >>> places.ranking, places.agrees
         (('bus_2', 'bus_3'), True)
         """
+        require_known(wanted, WantedPlaces.__annotations__, "places")
         return Siting(find_sites(self.file, SiteRequest(
-            str(device), None if binding is None else path_of(binding, "binding", "file"), scenario, below,
-            frequency_range(frequencies), None if outages is None else ",".join(names_given(outages, "outages")),
-            confirm, rating, gain, case_values(values), parameter_files(parameters), in_seconds(step, "step"),
+            **checked(SiteRequest, {"device": str(device), **wanted}), scenario=scenario,
+            overrides=case_values(values), parameters=parameter_files(parameters), step_size=in_seconds(step, "step"),
         )))  # fmt: skip
 
     def interactions(

@@ -153,3 +153,15 @@ def points_design_request(controllers: Sequence[str], wanted: WantedOverPoints, 
         raise InputError(f"controllers is empty; name one or both of {', '.join(DAMPING_CONTROLLERS)}")
     require_known(wanted, WantedOverPoints.__annotations__, "a design over points")
     return PointsDesignRequest(tuple(controllers), **checked(PointsDesignRequest, wanted), **rest)
+
+
+class WantedPlaces(TypedDict, total=False):
+    """What may be asked of the places of a device; `SiteRequest` says what each means."""
+
+    binding: str | Path | None
+    below: float
+    frequencies: tuple[float, float]
+    outages: Names | None
+    confirm: int
+    rating: float
+    gain: float

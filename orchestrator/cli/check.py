@@ -40,13 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--json", "print JSON")
     option(parser, "--junit", "FILE.xml", "write the results for a CI server", read=Path)
     option(parser, "--time-limit", "S", "for one call [s] (default: 30)", read=read_positive, default=30.0)
-    parser.add_argument(
-        "--memory-limit",
-        type=read_value,
-        default=4096.0,
-        metavar="MB",
-        help="of the FMU's process [MB], or with a unit such as '4 GB' (default: 4096)",
-    )
+    option(parser, "--memory-limit", "MB", "of the FMU's process [MB], or with a unit such as '4 GB' (default: 4096)",
+           read=read_value, default=4096.0)  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:

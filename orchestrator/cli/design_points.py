@@ -15,7 +15,7 @@ from orchestrator.cli.case_arguments import case_of, of_one_scenario
 from orchestrator.cli.executors import add_executor_arguments
 from orchestrator.cli.study import present, working_in
 from orchestrator.cli.verdict import NOT_MET
-from orchestrator.coordinated_design import words
+from orchestrator.coordinated_design import view, words
 from orchestrator.coordinated_design.study import ALL, PointsDesign, PointsDesignRequest, plan_points_design
 from orchestrator.coordinated_design.verdict import PointsVerdict
 from orchestrator.screening.record import Status
@@ -62,9 +62,9 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
 
 def _parts(design: PointsDesign) -> Iterator[RenderableType]:
     yield words.verdict_of(design.verdict).markup()
-    yield from ("", words.points_table(design.verdict), "", words.settings_table(design))
+    yield from ("", view.least_damped_table(design.verdict), "", view.settings_table(design))
     if design.plan.request.ranked:
-        yield from ("", words.ranking_table(design))
+        yield from ("", view.ranking_table(design))
     yield from ("", escape(words.what_it_rests_on(design)))
 
 

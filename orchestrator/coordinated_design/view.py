@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,15 @@ from orchestrator.coordinated_design.study import PointsDesign, values_of
 from orchestrator.coordinated_design.verdict import JudgedPoint, PlacedMode, PointsVerdict
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.late import pd
+from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.view import parameter_file_path
 from orchestrator.report.notebook import page
+from orchestrator.report.table import Column, ColumnTable
+from orchestrator.report.tables import PlainTable, make_table
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
 
-_OF_POINTS = ("point", "outage", "hours", "status", "stable", "damping_before_percent", "frequency_before_hz",
-              "damping_percent", "frequency_hz", "who", "allowed", "why")  # fmt: skip
-_OF_RANKING = ("converter", "controller", "least_damping_percent", "K", "T_S1", "T_S2", "shift_rad_s_per_pu")
+_ROWS = 12
 
 
 class CoordinatedDesign:
@@ -55,11 +56,11 @@ class CoordinatedDesign:
 
     def points(self) -> pd.DataFrame:
         """One row for each operating point with each outage: status, verdict, damping without and with it [%]."""
-        return pd.DataFrame(points_rows(self.result.verdict))
+        return points_table(self.result.verdict).frame()
 
     def ranking(self) -> pd.DataFrame:
         """One row for each converter, the best first: what a controller there alone would give."""
-        return pd.DataFrame(ranking_rows(self.result))
+        return ranking_table(self.result).frame()
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor design --points --json`` prints, as JSON's types."""
@@ -87,8 +88,8 @@ class CoordinatedDesign:
         points, ranking = file.with_suffix(".csv"), file.with_name(f"{file.stem}_ranking.csv")
         write_text(file, parameter_file_text(self.parameters, provenance(self.result, said)))
         save_json(self.as_json(), file.with_suffix(".json"))
-        write_text(points, _csv(_OF_POINTS, points_rows(self.result.verdict)))
-        write_text(ranking, _csv(_OF_RANKING, ranking_rows(self.result)))
+        points_table(self.result.verdict).save(points)
+        ranking_table(self.result).save(ranking)
         return [file, file.with_suffix(".json"), points, ranking]
 
     def __repr__(self) -> str:
@@ -181,44 +182,83 @@ def _ranked(one: RankedConverter) -> dict[str, Any]:
     }
 
 
-def points_rows(verdict: PointsVerdict) -> list[dict[str, Any]]:
-    """One row for each operating point with each outage; "" where there is no figure."""
-    rows = []
-    for point in verdict.points:
-        before, after = point.target_before, point.target
-        status = point.before.status if not point.before.computed else point.after.status
-        why = "; ".join(text for text in (point.why_not, *point.after.warnings) if text)
-        allowed = "" if point.worth is None else str(point.worth.allowed).lower()
-        stable = "" if point.stable is None else str(point.stable).lower()
-        figures = [figure for mode in (before, after) for figure in _figures(mode)]
-        cells = (point.point.name, point.outage.name, point.point.hours, str(status), stable, *figures,
-                 "" if after is None else after.who, allowed, why)  # fmt: skip
-        rows.append(dict(zip(_OF_POINTS, cells, strict=True)))
-    return rows
+def settings_table(design: PointsDesign) -> PlainTable:
+    columns = ("Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
+    placed = zip(design.plan.groups, design.settings, strict=True)
+    rows = [(group.name, *_setting(setting), str(len(group.components))) for group, setting in placed]
+    return make_table("Settings", *columns, rows=rows)
 
 
-def _figures(mode: PlacedMode | None) -> tuple[float | str, float | str]:
-    return ("", "") if mode is None else (100 * mode.damping_ratio, mode.frequency_hz)
+def _setting(setting: PodSetting) -> list[str]:
+    filters = setting.filters
+    angle = filters.N_S * filters.stage_angle_deg if filters.T_S1 else 0.0
+    return [f"{setting.gain:.5g}", f"{filters.T_S1:.4f}", f"{filters.T_S2:.4f}", str(filters.N_S), f"{angle:+.1f}"]
 
 
-def ranking_rows(design: PointsDesign) -> list[dict[str, Any]]:
-    """One row for each converter, the best first; "" where no controller was searched."""
-    rows = []
-    for one in design.ranking:
-        own = _ranked(one)
-        damping = "" if one.worst is None else 100 * one.worst
-        rest = ["" if own[name] is None else own[name] for name in ("K", "T_S1", "T_S2", "shift_rad_s_per_pu")]
-        cells = (one.place.component, one.place.controller, damping, *rest)
-        rows.append(dict(zip(_OF_RANKING, cells, strict=True)))
-    return rows
+def points_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
+    """Each operating point with each outage; "" where there is no figure."""
+
+    def of(mode: PlacedMode | None, figure: str) -> float | str:
+        return "" if mode is None else 100 * mode.damping_ratio if figure == "damping" else mode.frequency_hz
+
+    return ColumnTable("Points and outages", (
+        Column("Point", lambda p: p.point.name, name="point"),
+        Column("Outage", lambda p: p.outage.name, name="outage"),
+        Column("", lambda p: p.point.hours, name="hours"),
+        Column("", lambda p: str((p.after if p.before.computed else p.before).status), name="status"),
+        Column("", lambda p: _lower(p.stable), name="stable"),
+        Column("before [%]", lambda p: of(p.target_before, "damping"), _two, "damping_before_percent"),
+        Column("", lambda p: of(p.target_before, "frequency"), name="frequency_before_hz"),
+        Column("with it [%]", lambda p: of(p.target, "damping"), _two, "damping_percent"),
+        Column("f [Hz]", lambda p: of(p.target, "frequency"), ".3f", "frequency_hz"),
+        Column("Who", lambda p: "" if p.target is None else p.target.who, name="who"),
+        Column("", lambda p: "" if p.worth is None else _lower(p.worth.allowed), name="allowed"),
+        Column("", lambda p: "; ".join(text for text in (p.why_not, *p.after.warnings) if text), name="why"),
+        Column("Stable", lambda p: {True: "yes", False: "NO", None: "not known"}[p.stable]),
+    ), verdict.points, left=2)  # fmt: skip
 
 
-def _csv(columns: tuple[str, ...], rows: list[dict[str, Any]]) -> str:
-    text = io.StringIO(newline="")
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
+def _lower(value: bool | None) -> str:
+    return "" if value is None else str(value).lower()
+
+
+def _two(figure: float | str) -> str:
+    return "–" if isinstance(figure, str) else f"{figure:.2f}"
+
+
+def least_damped_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
+    """The points with the least damping, the worst first."""
+    having = [(point, point.target) for point in verdict.known if point.target is not None]
+    ordered = [point for point, _ in sorted(having, key=lambda entry: entry[1].damping_ratio)][:_ROWS]
+    title = f"The {len(ordered)} least damped of {len(verdict.points)} points and outages"
+    return replace(points_table(verdict), title=title, rows=ordered)
+
+
+def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
+    """Converters by what a controller there alone would give; "" where no controller was searched."""
+
+    def setting(name: str) -> Callable[[RankedConverter], Any]:
+        return lambda one: "" if (found := _ranked(one)[name]) is None else found
+
+    def shown(form: str) -> Callable[[Any], str]:
+        return lambda figure: "–" if figure == "" else f"{figure:{form}}"
+
+    def damping(one: RankedConverter) -> str:
+        if one.setting is None:
+            return "–"
+        return "unstable or not known" if one.worst is None else f"{100 * one.worst:.2f}"
+
+    title = "Converters by what a controller there alone gives: the least damping of all points, computed anew"
+    return ColumnTable(title, (
+        Column("Converter", lambda one: one.place.component, name="converter"),
+        Column("Controller", lambda one: one.place.controller, name="controller"),
+        Column("least damping [%]", lambda one: one, damping),
+        Column("", lambda one: "" if one.worst is None else 100 * one.worst, name="least_damping_percent"),
+        Column("K [pu]", setting("K"), shown(".4g"), "K"),
+        Column("T_S1 [s]", setting("T_S1"), shown(".4f"), "T_S1"),
+        Column("T_S2 [s]", setting("T_S2"), shown(".4f"), "T_S2"),
+        Column("shift by 1 pu [rad/s]", setting("shift_rad_s_per_pu"), shown(".3g"), "shift_rad_s_per_pu"),
+    ), design.ranking, 2, _ROWS, "the files")  # fmt: skip
 
 
 def provenance(design: PointsDesign, command: str) -> list[str]:

@@ -37,6 +37,7 @@ class Column(Generic[Row]):
     get: Callable[[Row], Any]
     write: str | Callable[[Any], str | Marked] = ""  # how a cell shows it: a format, or a function
     name: str = ""  # in files and DataFrames; "" for what is only shown
+    text: bool = False  # whether it holds text, though it stands behind figures
 
     def cell(self, row: Row) -> str | Marked:
         value = self.get(row)
@@ -62,6 +63,8 @@ class ColumnTable(Generic[Row]):
         cells = [[_on_terminal(column.cell(row)) for column in self.shown] for row in self.rows[: self.most]]
         table = make_table(self.title, *(column.heading for column in self.shown), left=self.left, rows=cells)
         table.caption = self._rest or None
+        for column, shown in zip(self.shown, table.columns, strict=True):
+            shown.justify = "left" if column.text else shown.justify
         return table
 
     def html(self) -> str:

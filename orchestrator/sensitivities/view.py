@@ -5,15 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from rich.table import Table
-
 from orchestrator.late import pd
 from orchestrator.report.notebook import page
-from orchestrator.report.tables import make_table
+from orchestrator.report.table import Column, ColumnTable
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import made_folder
+from orchestrator.sensitivities.parameters import Parameter
 from orchestrator.sensitivities.sensitivities import Sensitivity, SensitivityResult
 
 
@@ -44,7 +43,7 @@ class Sensitivities:
 
     def table(self) -> pd.DataFrame:
         """One row for each parameter; columns as in ``sensitivities.csv``."""
-        return pd.DataFrame(rows_of(self.result)).set_index("parameter")
+        return sensitivity_table(self.result).frame().set_index("parameter")
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor sensitivities --json`` prints, as JSON's types."""
@@ -66,28 +65,39 @@ class Sensitivities:
         return page(repr(self).strip("<>"), [f"warning: {text}" for text in self.warnings], self.table())
 
 
-def rows_of(result: SensitivityResult) -> list[dict[str, Any]]:
+def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
     """One row for each parameter, largest effect first; None where there is no figure."""
-    return [
-        {
-            "parameter": row.parameter.name,
-            "value": row.parameter.value,
-            "unit": row.parameter.unit,
-            "variability": "tunable" if row.parameter.tunable else "fixed",
-            "frequency_hz_per_unit": row.frequency_per_unit,
-            "damping_points_per_unit": row.damping_per_unit,
-            "frequency_hz_per_percent": row.frequency_per_percent,
-            "damping_points_per_percent": row.damping_per_percent,
-            "real_per_unit": _part(row.derivative, "real"),
-            "imag_per_unit": _part(row.derivative, "imag"),
-            "continuous_real_per_unit": _part(row.continuous, "real"),
-            "continuous_imag_per_unit": _part(row.continuous, "imag"),
-            "operating_point": row.operating_point,
-            "doubts": "; ".join(row.doubts),
-            "reason": row.reason,
-        }
-        for row in result.rows
-    ]
+    mode = result.mode
+    name = result.modes.name_of(mode) or "critical"
+    kind = "the operating point held" if result.held else "total: the operating point moves with the parameter"
+    title = f"{result.modes.prepared.title}, {name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %; {kind}"
+    return ColumnTable(title, (
+        Column("Parameter", lambda row: row.parameter.name, name="parameter"),
+        Column("Value", lambda row: row.parameter, _value),
+        Column("", lambda row: row.parameter.value, name="value"),
+        Column("", lambda row: row.parameter.unit, name="unit"),
+        Column("", lambda row: "tunable" if row.parameter.tunable else "fixed", name="variability"),
+        Column("Hz per unit", lambda row: row.frequency_per_unit, _text, "frequency_hz_per_unit"),
+        Column("Points per unit", lambda row: row.damping_per_unit, _text, "damping_points_per_unit"),
+        Column("Hz per %", lambda row: row.frequency_per_percent, _text, "frequency_hz_per_percent"),
+        Column("Points per %", lambda row: row.damping_per_percent, _text, "damping_points_per_percent"),
+        Column("", lambda row: _part(row.derivative, "real"), name="real_per_unit"),
+        Column("", lambda row: _part(row.derivative, "imag"), name="imag_per_unit"),
+        Column("", lambda row: _part(row.continuous, "real"), name="continuous_real_per_unit"),
+        Column("", lambda row: _part(row.continuous, "imag"), name="continuous_imag_per_unit"),
+        Column("Point", lambda row: row.operating_point, name="operating_point"),
+        Column("", lambda row: "; ".join(row.doubts), name="doubts"),
+        Column("", lambda row: row.reason, name="reason"),
+        Column("Doubt", lambda row: row.reason or "; ".join(row.doubts), text=True),
+    ), result.rows)  # fmt: skip
+
+
+def rows_of(result: SensitivityResult) -> list[dict[str, Any]]:
+    return sensitivity_table(result).records()
+
+
+def _value(parameter: Parameter) -> str:
+    return f"{parameter.value:.5g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
 
 
 def _part(value: complex | None, part: str) -> float | None:
@@ -107,27 +117,6 @@ def as_json(result: SensitivityResult) -> dict[str, Any]:
         "warnings": [*modes.warnings, *result.warnings],
         "sensitivities": rows_of(result),
     }
-
-
-def sensitivity_table(result: SensitivityResult, shown: int | None = None) -> Table:
-    """The table for a terminal.
-
-    ``shown``: number of rows; all where None.
-    """
-    mode = result.mode
-    name = result.modes.name_of(mode) or "critical"
-    kind = "the operating point held" if result.held else "total: the operating point moves with the parameter"
-    title = f"{result.modes.prepared.title}, {name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %; {kind}"
-    columns = ("Parameter", "Value", "Hz per unit", "Points per unit", "Hz per %", "Points per %", "Point")
-    table = make_table(title, *columns)
-    table.add_column("Doubt", overflow="fold")
-    for row in result.rows[:shown]:
-        unit = "" if row.parameter.unit == "1" else f" {row.parameter.unit}"
-        figures = (row.frequency_per_unit, row.damping_per_unit, row.frequency_per_percent, row.damping_per_percent)
-        why = row.reason or "; ".join(row.doubts)
-        value = f"{row.parameter.value:.5g}{unit}"
-        table.add_row(row.parameter.name, value, *map(_text, figures), row.operating_point, why)
-    return table
 
 
 def _text(figure: float | None) -> str:
