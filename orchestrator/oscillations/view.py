@@ -57,17 +57,19 @@ class Sources:
 
 
 def sources_table(found: Sequence[Sources]) -> PlainTable:
-    rows = [row for one in found for row in _rows(one)]
-    return make_table("", "Record", "Kind", "Source", "f [Hz]", "Begins [s]", "Multiples", left=3, rows=rows)
+    columns = ("Record", "f [Hz]", "Kind", "Source", "Begins [s]", "Multiples")
+    table = make_table("", *columns, rows=[row for one in found for row in _rows(one)])
+    table.columns[2].justify = table.columns[3].justify = "left"
+    return table
 
 
 def _rows(one: Sources) -> Iterator[Sequence[str]]:
     for x in one:
         begin = "before" if x.found.begin is None else f"{x.found.begin:.1f}"
         multiples = ", ".join(str(order) for order in x.found.harmonics)
-        yield one.label, str(x.evidence.kind), x.source or "not known", f"{x.found.frequency:.4f}", begin, multiples
+        yield one.label, f"{x.found.frequency:.4f}", str(x.evidence.kind), x.source or "not known", begin, multiples
     if not len(one):
-        yield one.label, "no oscillation", "–", "–", "–", ""
+        yield one.label, "–", "no oscillation", "–", "–", ""
 
 
 def opinions_table(head: str, one: Located) -> PlainTable:
