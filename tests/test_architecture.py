@@ -281,8 +281,8 @@ ON_THE_FACE = {
     "linearize": {"cli.case_arguments.chosen"},
     "modes": {"cli.case_arguments.chosen"},
     "run": {"cli.case_arguments.chosen"},
-    "screen": {"api.studies.SCREENING"},
-    "sweep": {"api.sweep.plan", "api.studies.SWEEP"},
+    "screen": {"screening.view.STUDY"},
+    "sweep": {"api.sweep.plan", "sweep.view.STUDY"},
 }
 """Command → what it calls of the Python face; ``chosen`` gives the face's scenarios."""
 

@@ -9,14 +9,10 @@ from typing import Any, Unpack
 import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.executors import Plan, PointStudy, Result, Shown, choose_executor
+from orchestrator.api.executors import choose_executor
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
 from orchestrator.api.studies import (
-    COORDINATED_DESIGN,
-    INTERACTIONS,
-    SCREENING,
-    SWEEP,
     Wanted,
     WantedInteractions,
     WantedOverPoints,
@@ -36,20 +32,25 @@ from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import forced
 from orchestrator.coordinated_design.study import plan_points_design
+from orchestrator.coordinated_design.view import STUDY as COORDINATED_DESIGN
 from orchestrator.coordinated_design.view import CoordinatedDesign
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
+from orchestrator.interactions.view import STUDY as INTERACTIONS
 from orchestrator.interactions.view import Interactions
 from orchestrator.pod_design.view import ControllerDesign
+from orchestrator.points.point_study import Plan, PointStudy, Result, Shown
 from orchestrator.points.store import POINTS
 from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening
+from orchestrator.screening.view import STUDY as SCREENING
 from orchestrator.screening.view import Screening
 from orchestrator.siting.study import SiteRequest, find_sites
 from orchestrator.siting.view import Siting
+from orchestrator.sweep.view import STUDY as SWEEP
 from orchestrator.sweep.view import ParameterSweep
 
 

@@ -1,36 +1,23 @@
-"""The studies of many points, and what may be asked of a study in Python, as its request."""
+"""What may be asked of a study in Python, as its request."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypedDict
 
-from orchestrator.api.executors import PointStudy
 from orchestrator.api.values import binding_path
 from orchestrator.asked import Names, checked, require_known, text_or_none
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.coordinated_design.one_point import search_settings
-from orchestrator.coordinated_design.study import PointsDesignRequest, design_over_points
-from orchestrator.coordinated_design.view import CoordinatedDesign
+from orchestrator.coordinated_design.study import PointsDesignRequest
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.interactions.request import GivenDevice, InteractionsRequest
-from orchestrator.interactions.study import run_interactions
-from orchestrator.interactions.view import Interactions
 from orchestrator.pod_design.design import DesignRequest, StageReport, design_pod
 from orchestrator.pod_design.view import ControllerDesign
 from orchestrator.points.store import PointStore
-from orchestrator.screening.study import run_screening
-from orchestrator.screening.view import Screening
-from orchestrator.sweep.sweep import run_sweep
-from orchestrator.sweep.view import ParameterSweep
-
-SWEEP = PointStudy(run_sweep, ParameterSweep, "orchestrator.sweep.worker", lambda plan: plan.scenarios)
-SCREENING = PointStudy(run_screening, Screening, "orchestrator.screening.worker")
-INTERACTIONS = PointStudy(run_interactions, Interactions, "orchestrator.interactions.worker")
-COORDINATED_DESIGN = PointStudy(design_over_points, CoordinatedDesign, "orchestrator.coordinated_design.worker")
 
 
 class WantedInteractions(TypedDict, total=False):

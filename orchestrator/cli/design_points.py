@@ -9,7 +9,6 @@ from pathlib import Path
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.studies import COORDINATED_DESIGN
 from orchestrator.cli.arguments import Joined, add_request_arguments, asked_by, option
 from orchestrator.cli.case_arguments import case_of, of_one_scenario
 from orchestrator.cli.executors import add_executor_arguments
@@ -50,7 +49,7 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
     path = out or Path(f"{case.name}_{'_'.join(options.controller)}_points.toml")
     folder = path.with_suffix(".points")
     plan = partial(plan_points_design, case, request, options.points, options.outages)
-    with working_in(options, folder, COORDINATED_DESIGN, plan) as (_, compute):
+    with working_in(options, folder, view.STUDY, plan) as (_, compute):
         design = compute()
         written = design.save(path, _command_line(options, request))
     verdict = design.result.verdict

@@ -7,7 +7,6 @@ from dataclasses import replace
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.studies import INTERACTIONS
 from orchestrator.certification.devices import devices_of
 from orchestrator.cli.arguments import add_request_arguments, asked_by, repeatable
 from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
@@ -17,7 +16,7 @@ from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
-from orchestrator.interactions.view import Interactions, assignments_table, modes_table, systems_table
+from orchestrator.interactions.view import STUDY, Interactions, assignments_table, modes_table, systems_table
 from orchestrator.interactions.words import verdict_of
 
 
@@ -36,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     case = case_of(options)
     request = _request(options)
     folder = folder_of(options, case.name, "interactions")
-    with working_in(options, folder, INTERACTIONS, lambda: plan_interactions(case, request, **of_case)) as (_, compute):
+    with working_in(options, folder, STUDY, lambda: plan_interactions(case, request, **of_case)) as (_, compute):
         found = compute()
         end = last_line(found.result, "systems ", folder, found.save(folder))
         say("warning", found.warnings)

@@ -9,7 +9,6 @@ from pathlib import Path
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.studies import SCREENING
 from orchestrator.cli.arguments import add_request_arguments, asked_by, option, repeatable
 from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
@@ -21,7 +20,7 @@ from orchestrator.screening.record import Status
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import Shard, plan_screening
 from orchestrator.screening.summary import Summary
-from orchestrator.screening.view import Screening, modes_table, overview, remarks, verdict
+from orchestrator.screening.view import STUDY, Screening, modes_table, overview, remarks, verdict
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
         plan_screening, case, request.points, request.outages, wanted=request.region, whole=request.whole,
         sharing=request.sharing, **of_case,
     )  # fmt: skip
-    with working_in(options, folder, SCREENING, plan) as (planned, compute):
+    with working_in(options, folder, STUDY, plan) as (planned, compute):
         _merge(options.merge, folder / POINTS)
         found = compute(options.shard)
         if options.shard is not None:

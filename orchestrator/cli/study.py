@@ -9,13 +9,13 @@ from typing import Protocol
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.executors import Plan, PointStudy, Result, Shown
 from orchestrator.cli.arguments import add_json_argument, option
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
+from orchestrator.points.point_study import Plan, PointStudy, Result, Shown
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 

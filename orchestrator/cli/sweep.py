@@ -4,7 +4,6 @@ import argparse
 
 from rich.console import RenderableType
 
-from orchestrator.api.studies import SWEEP
 from orchestrator.api.sweep import plan
 from orchestrator.cli.arguments import option, repeatable
 from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, case_of, values_set
@@ -14,6 +13,7 @@ from orchestrator.sweep import tables
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.limit import Ending
 from orchestrator.sweep.sweep import SweepPlan
+from orchestrator.sweep.view import STUDY
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
             parameters=options.parameters, frequencies=options.range, until=options.until,
         )  # fmt: skip
 
-    with working_in(options, folder, SWEEP, planning) as (_, compute):
+    with working_in(options, folder, STUDY, planning) as (_, compute):
         sweep = compute()
         end = last_line(sweep.result, "points ", folder, sweep.save(folder))
         first = tables.limits(sweep.samples) or tables.stability(sweep.samples)

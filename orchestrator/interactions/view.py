@@ -17,10 +17,11 @@ from orchestrator.interactions.judgement import (
 )
 from orchestrator.interactions.places import by_group
 from orchestrator.interactions.point import SharedMode
-from orchestrator.interactions.study import InteractionsResult
+from orchestrator.interactions.study import InteractionsResult, run_interactions
 from orchestrator.interactions.systems import Kind, SystemName
 from orchestrator.interactions.words import damping_text, frequency_text, sentences, stand_in_sentence, verdict_word
 from orchestrator.late import pd
+from orchestrator.points.point_study import PointStudy
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, paragraphs
 from orchestrator.report.notebook import page
@@ -344,3 +345,6 @@ def _colour(system: JudgedSystem) -> str:
     end = _GOOD if share > 0 else _BAD
     mixed = (round(m + (e - m) * abs(share)) for m, e in zip(_MIDDLE, end, strict=True))
     return "#" + "".join(f"{value:02x}" for value in mixed)
+
+
+STUDY = PointStudy(run_interactions, Interactions, "orchestrator.interactions.worker")

@@ -10,6 +10,7 @@ import numpy as np
 from rich.markup import escape as escape_markup
 
 from orchestrator.late import pd
+from orchestrator.points.point_study import PointStudy
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, colour, paragraphs
@@ -20,7 +21,7 @@ from orchestrator.results.storage import save_json
 from orchestrator.safe_files import made_folder, write_text
 from orchestrator.screening.record import Status
 from orchestrator.screening.stress import OutageRow, by_outage
-from orchestrator.screening.study import ScreenedItem, ScreeningResult
+from orchestrator.screening.study import ScreenedItem, ScreeningResult, run_screening
 from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration
 from orchestrator.screening.words import verdict_of, verdict_sentence, what_was_counted, where
 
@@ -354,3 +355,6 @@ def _ranking(summary: Summary) -> str:
         if (found := mode.worst.ranking())
     ]
     return "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"
+
+
+STUDY = PointStudy(run_screening, Screening, "orchestrator.screening.worker")

@@ -6,12 +6,12 @@ import signal
 
 import pytest
 
-from orchestrator.api.executors import PointStudy
 from orchestrator.cli import run as command
 from orchestrator.cli import sweep as sweep_command
 from orchestrator.cli.checkpoints import Checkpoints
 from orchestrator.cli.interrupted import is_interrupt
 from orchestrator.coupling.progress import Progress
+from orchestrator.points.point_study import PointStudy
 from orchestrator.points.store import PointStore
 from orchestrator.study import run as study
 
