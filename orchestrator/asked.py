@@ -6,7 +6,9 @@ A `FieldKind` says twice what a field may be: ``read`` takes the text of an opti
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from enum import StrEnum
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeVar
 
 from orchestrator.errors import InputError
@@ -17,6 +19,7 @@ Request = TypeVar("Request")
 Names = str | Sequence[str]  # one name, or several
 
 _ASKED = "asked"
+_SHOWN = 60  # characters of an overlong path that an error shows
 _LARGEST = 10**308  # of a whole number that a floating-point number can hold
 
 
@@ -29,6 +32,7 @@ class FieldKind:
     read: Callable[[str], Any] | None
     check: Callable[[Any, str], Any]  # from what a caller gives, and the keyword for the `InputError`
     several: bool = False  # whether the option is repeatable, and gives a tuple
+    joined: bool = False  # whether these are one text with commas
 
 
 @dataclass(frozen=True)
@@ -138,6 +142,24 @@ def text_or_none(given: Any, argument: str, rule: str = "give one name, or leave
     return given
 
 
+def path(given: Any, argument: str, kind: str = "file") -> Path:
+    """A path of a file, or of another ``kind`` of place."""
+    if not isinstance(given, str | Path) or not str(given):
+        raise InputError(f"{argument} = {given!r}; give the path of a {kind}")
+    _check_length(Path(given), argument)
+    return Path(given)
+
+
+def _check_length(path: Path, argument: str) -> None:
+    """Refuse what no file system can hold, before it says so itself."""
+    try:
+        path.exists()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}…"
+        raise InputError(f"{argument} = {shown!r} is no path that a file can have: {reason}") from error
+
+
 def read_range(text: str) -> tuple[float, float]:
     """``LO:HI`` [Hz]."""
     low, colon, high = text.partition(":")
@@ -158,17 +180,26 @@ def frequency_range(given: Any, argument: str = "frequencies") -> tuple[float, f
     return low, high
 
 
+def read_part(rule: str, least: float, most: float) -> Callable[[str], float]:
+    """What reads percent, ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
+
+    def read(text: str) -> float:
+        number = as_number(text.strip().removesuffix("%"))
+        if not least <= number <= most:
+            raise ValueError(f"{text!r} is not {rule}")
+        if 0 < number < 1 and "%" not in text:
+            raise ValueError(
+                f"{text!r} is read in percent; write {100 * number:g} for a ratio of {number:g}, or {text}% if so "
+                "little is meant"
+            )
+        return number / 100
+
+    return read
+
+
 def read_percent(text: str, most: float = 90) -> float:
-    """Damping [%], as ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
-    number = as_number(text.removesuffix("%"))
-    if not 0 < number <= most:
-        raise ValueError(f"{text!r} is not a damping in percent between 0 and {most:g}, such as 20")
-    if number < 1 and not text.endswith("%"):
-        raise ValueError(
-            f"{text!r} is read in percent; write {100 * number:g} for a damping ratio of {number:g}, or {text}% if so "
-            "little is meant"
-        )
-    return number / 100
+    """Damping [%] as a ratio."""
+    return read_part(f"a damping in percent between 0 and {most:g}, such as 20", 1e-9, most)(text)
 
 
 def percent(given: Any, argument: str, most: float = 90) -> float:
@@ -178,14 +209,6 @@ def percent(given: Any, argument: str, most: float = 90) -> float:
         ratio = f": write {100 * own:g} for a damping ratio of {own:g}" if _is_number(own) and 0 < own < 1 else ""
         raise InputError(f"{argument} = {given!r}; it is in percent between 1 and {most:g}, such as 20{ratio}")
     return float(own) / 100
-
-
-def read_share(text: str) -> float:
-    """A share of a mode [%], as a ratio; a bare number below 1 looks like a ratio and is refused."""
-    number = as_number(text.removesuffix("%"))
-    if not 0 < number <= 50 or (number < 1 and not text.endswith("%")):
-        raise ValueError(f"{text!r} is not a share in percent up to 50, such as 5 (or 0.5% below 1)")
-    return number / 100
 
 
 def share(given: Any, argument: str) -> float:
@@ -202,11 +225,28 @@ def read_positive(text: str) -> float:
     return number
 
 
-def gain(given: Any, argument: str) -> float:
+def positive(given: Any, argument: str, rule: str = "give a number above 0, such as 50.0, or leave it out") -> float:
     own: Any = plain_value(given)
     if not _is_number(own) or not 0 < own < 1e300:
-        raise InputError(f"{argument} = {given!r}; give a gain above 0 in pu, such as 50.0, or leave it out")
+        raise InputError(f"{argument} = {given!r}; {rule}")
     return float(own)
+
+
+def one_of(values: type[StrEnum]) -> "FieldKind":
+    """One of these words, or None."""
+    known = ", ".join(values)
+
+    def read(text: str) -> StrEnum:
+        if text not in list(values):
+            raise ValueError(f"{text!r} is none of {known}")
+        return values(text)
+
+    def check(given: Any, argument: str) -> StrEnum | None:
+        if given is not None and given not in list(values):
+            raise InputError(f"{argument} = {given!r}; give one of {known}")
+        return None if given is None else values(given)
+
+    return FieldKind("RULE", read, check)
 
 
 def _are_bounds(low: Any, high: Any) -> bool:
@@ -253,8 +293,16 @@ NAME = FieldKind("NAME", str, text_or_none)
 NAMES = FieldKind("NAME", str, names, several=True)
 FREQUENCIES = FieldKind("LO:HI", read_range, frequency_range)
 DAMPING = FieldKind("PERCENT", read_percent, percent)
-SHARE = FieldKind("PERCENT", read_share, share)
-GAIN = FieldKind("DK", read_positive, gain)
+SHARE = FieldKind("PERCENT", read_part("a share in percent up to 50, such as 5", 1e-9, 50), share)
+POSITIVE = FieldKind("X", read_positive, positive)
+GAIN = FieldKind(
+    "DK", read_positive, partial(positive, rule="give a gain above 0 in pu, such as 50.0, or leave it out")
+)
+FILE = FieldKind("FILE", Path, lambda given, argument: None if given is None else path(given, argument))
+OUTAGES = FieldKind(
+    "WHICH", str, lambda given, argument: None if given is None else ",".join(names(given, argument)),
+    several=True, joined=True,
+)  # fmt: skip
 GAIN_BOUNDS = FieldKind("MIN:MAX", read_bounds, bounds)
 STAGES = FieldKind("N_S", read_whole(0, 10), partial(whole_number, least=0, most=10))
 RANKED = FieldKind("N", read_whole(0, 1000), partial(whole_number, least=0, most=1000))

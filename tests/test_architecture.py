@@ -270,7 +270,7 @@ ON_THE_FACE = {
     "build": {"api.models.build", "api.models.catalogue_model"},
     "check": {"api.acceptance.check"},
     "compare": {"api.comparison.compare"},
-    "design": {"api.design.design_controller"},
+    "design": {"api.studies.design_controller"},
     "export_ssp": {"api.export.write_ssp"},
     "verify": {"api.certification.verify_anew"},
     "export_comtrade": {"api.comtrade.export_comtrade"},
@@ -279,8 +279,8 @@ ON_THE_FACE = {
     "linearize": {"cli.case_arguments.chosen"},
     "modes": {"cli.case_arguments.chosen"},
     "run": {"cli.case_arguments.chosen"},
-    "screen": {"api.screening.STUDY"},
-    "sweep": {"api.sweep.plan", "api.sweep.STUDY"},
+    "screen": {"screening.view.STUDY"},
+    "sweep": {"api.sweep.plan", "sweep.view.STUDY"},
 }
 """Command → what it calls of the Python face; ``chosen`` gives the face's scenarios."""
 

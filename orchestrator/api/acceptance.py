@@ -8,8 +8,8 @@ from orchestrator.acceptance.checks.subject import Use
 from orchestrator.acceptance.junit import write_junit
 from orchestrator.acceptance.runner import AcceptanceReport, check_fmu, question_of
 from orchestrator.api.values import Time, binding_path, in_megabytes, in_seconds
-from orchestrator.api.values import path as path_of
 from orchestrator.asked import Names, names, text_or_none
+from orchestrator.asked import path as path_of
 from orchestrator.cases.use import use_in_case
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import read_description
@@ -83,7 +83,7 @@ class Acceptance:
         return f"<Acceptance of {self.report.fmu.name}: {self._verdict()}>"
 
     def _repr_html_(self) -> str:
-        from orchestrator.api.show import page  # noqa: PLC0415 - imports pandas
+        from orchestrator.report.notebook import page  # noqa: PLC0415 - imports pandas
 
         return page(f"{self.report.fmu.name}: {self._verdict()}", table=self.table())
 

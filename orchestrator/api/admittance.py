@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from orchestrator.api.values import Time, binding_path, in_seconds, plain
-from orchestrator.api.values import path as path_of
 from orchestrator.asked import frequency_range
+from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.files import identification_json, save_identification

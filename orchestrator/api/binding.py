@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from orchestrator.api.values import path as path_of
+from orchestrator.asked import path as path_of
 from orchestrator.binding.draft import draft_binding
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.fmi.description import read_description

@@ -9,40 +9,48 @@ from typing import Any, Unpack
 import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.coordinated_design import STUDY as COORDINATED_DESIGN
-from orchestrator.api.coordinated_design import CoordinatedDesign, WantedOverPoints, request_of
-from orchestrator.api.design import ControllerDesign, Wanted, design_controller
-from orchestrator.api.design import request_of as design_of
-from orchestrator.api.interactions import STUDY as INTERACTIONS
-from orchestrator.api.interactions import Interactions, WantedInteractions
-from orchestrator.api.interactions import request_of as interactions_of
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
-from orchestrator.api.screening import STUDY as SCREENING
-from orchestrator.api.screening import Screening
-from orchestrator.api.show import page
-from orchestrator.api.siting import Siting
-from orchestrator.api.sweep import STUDY as SWEEP
-from orchestrator.api.sweep import ParameterSweep, plan
+from orchestrator.api.studies import (
+    Wanted,
+    WantedInteractions,
+    WantedOverPoints,
+    WantedPlaces,
+    design_controller,
+    design_request,
+    interactions_request,
+    points_design_request,
+)
+from orchestrator.api.sweep import plan
 from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
-from orchestrator.api.values import path as path_of
-from orchestrator.asked import Names, flag, frequency_range, percent, text_or_none
+from orchestrator.asked import Names, checked, flag, require_known, text_or_none
 from orchestrator.asked import names as names_given
+from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import forced
-from orchestrator.cases.sharing import SharingRule
 from orchestrator.coordinated_design.study import plan_points_design
+from orchestrator.coordinated_design.view import STUDY as COORDINATED_DESIGN
+from orchestrator.coordinated_design.view import CoordinatedDesign
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
+from orchestrator.interactions.view import STUDY as INTERACTIONS
+from orchestrator.interactions.view import Interactions
+from orchestrator.pod_design.view import ControllerDesign
 from orchestrator.points.store import POINTS
 from orchestrator.points.study import Plan, PointStudy, Result, Shown, choose_executor
+from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
-from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening
+from orchestrator.screening.view import STUDY as SCREENING
+from orchestrator.screening.view import Screening
 from orchestrator.siting.study import SiteRequest, find_sites
+from orchestrator.siting.view import Siting
+from orchestrator.sweep.view import STUDY as SWEEP
+from orchestrator.sweep.view import ParameterSweep
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -346,14 +354,14 @@ class Case:
            point  frequency_hz  damping_percent
         0  00:00          0.58            10.57
         """
-        wanted = CriticalRegion(*frequency_range(frequencies), percent(damping, "damping", most=100 * MOST_DAMPING))
-        if sharing is not None and sharing not in list(SharingRule):
-            raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
+        request = ScreeningRequest(**checked(ScreeningRequest, {
+            "points": points, "outages": outages, "sharing": sharing, "frequencies": frequencies, "damping": damping,
+            "whole": whole,
+        }))  # fmt: skip
         planned = partial(
-            plan_screening, self.file, None if points is None else path_of(points, "points", "file"),
-            outages if outages is None else ",".join(names_given(outages, "outages")), scenario, case_values(values),
-            in_seconds(step, "step"), wanted, parameter_files(parameters), whole=whole,
-            sharing=None if sharing is None else SharingRule(sharing),
+            plan_screening, self.file, request.points, request.outages, scenario, case_values(values),
+            in_seconds(step, "step"), request.region, parameter_files(parameters), whole=request.whole,
+            sharing=request.sharing,
         )  # fmt: skip
         return _studied(SCREENING, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
 
@@ -363,15 +371,9 @@ class Case:
         scenario: str | None = None,
         values: Mapping[str, Any] | None = None,
         *,
-        binding: str | Path | None = None,
         step: Time | None = None,
         parameters: Paths = (),
-        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-        below: float = 10,
-        outages: str | Sequence[str] | None = None,
-        confirm: int = 3,
-        rating: float = 100,
-        gain: float = 200,
+        **wanted: Unpack[WantedPlaces],
     ) -> Siting:
         """Where to put a converter: how far support at each bus moves each poorly damped mode.
 
@@ -387,20 +389,11 @@ class Case:
             Its name; the first one where None.
         values, step, parameters
             As for `scenario`.
-        binding
-            Of the FMU.
-        frequencies
-            Modes from the first to the second are looked at [Hz] …
-        below
-            … where they are damped less than this [%]; the least damped one where none is.
-        outages
-            Rank for these too: ``"n-1"``, ``"lines"``, ``"units"``, or names; the least of all counts.
-        confirm
-            How many of the best buses are confirmed.
-        rating
-            Of the converter that confirms [MVA].
-        gain
-            Largest of its POD [pu of its rating].
+        wanted
+            Any of: ``binding`` (of the FMU), ``frequencies`` [Hz] and ``below`` [%] (modes that are looked at; the
+            least damped one where none is damped so little), ``outages`` (rank for these too: ``"n-1"``, ``"lines"``,
+            ``"units"``, or names; the least of all counts), ``confirm`` (how many of the best buses), ``rating`` [MVA]
+            of the converter that confirms, and largest ``gain`` of its POD [pu of its rating].
 
         Raises
         ------
@@ -414,10 +407,10 @@ class Case:
         >>> places.ranking, places.agrees
         (('bus_2', 'bus_3'), True)
         """
+        require_known(wanted, WantedPlaces.__annotations__, "places")
         return Siting(find_sites(self.file, SiteRequest(
-            str(device), None if binding is None else path_of(binding, "binding", "file"), scenario, below,
-            frequency_range(frequencies), None if outages is None else ",".join(names_given(outages, "outages")),
-            confirm, rating, gain, case_values(values), parameter_files(parameters), in_seconds(step, "step"),
+            **checked(SiteRequest, {"device": str(device), **wanted}), scenario=scenario,
+            overrides=case_values(values), parameters=parameter_files(parameters), step_size=in_seconds(step, "step"),
         )))  # fmt: skip
 
     def interactions(
@@ -457,7 +450,7 @@ class Case:
         [45.53, 0.4, 0.6]
         """
         of_case = (scenario, case_values(values), in_seconds(step, "step"), parameter_files(parameters))
-        planned = partial(plan_interactions, self.file, interactions_of(wanted), *of_case)
+        planned = partial(plan_interactions, self.file, interactions_request(wanted), *of_case)
         return _studied(INTERACTIONS, planned, (workers, None, None), folder, "Systems", shown=progress)
 
     def design(
@@ -502,7 +495,7 @@ class Case:
         >>> design.parameters["gfor.pod_p.K"]
         200.0
         """
-        request = design_of(controller, wanted, scenario, overrides=case_values(values),
+        request = design_request(controller, wanted, scenario, overrides=case_values(values),
                             parameters=parameter_files(parameters), step_size=in_seconds(step, "step"))  # fmt: skip
         with shown_stages(shown=progress) as report:
             design = design_controller(self.file, request, report=report)
@@ -565,7 +558,7 @@ class Case:
         >>> bool(design.points()["damping_percent"].min() >= 15)
         True
         """
-        request = request_of(names_given(controllers, "controllers"), wanted, scenario=scenario,
+        request = points_design_request(names_given(controllers, "controllers"), wanted, scenario=scenario,
                              overrides=case_values(values), parameters=parameter_files(parameters),
                              step_size=in_seconds(step, "step"))  # fmt: skip
         planned = partial(plan_points_design, self.file, request, path_of(points, "points", "file"), outages)

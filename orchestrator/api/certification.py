@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.values import binding_path, plain
-from orchestrator.api.values import path as path_of
+from orchestrator.asked import path as path_of
 from orchestrator.errors import InputError
 from orchestrator.points.study import choose_executor
 from orchestrator.results.lock import held

@@ -1,80 +1,25 @@
 """Two runs side by side."""
 
 import warnings
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-import pandas as pd
 import xarray as xr
 
 from orchestrator.analysis.threads import side_by_side
-from orchestrator.api.identification import doubt_text, identified_mode_json, opened
+from orchestrator.api.identification import opened
 from orchestrator.api.results import Run
-from orchestrator.api.show import page
 from orchestrator.api.values import Time, moment
 from orchestrator.asked import Names, names
 from orchestrator.errors import InputError
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.results.recorded import in_memory
 from orchestrator.study.common_times import common_times
-from orchestrator.study.comparison import Comparison, most_different
 from orchestrator.study.comparison import compare as compare_signal
+from orchestrator.study.comparison import most_different
+from orchestrator.study.signal_modes import RunComparison, doubt_text
 
 RINGS_FROM = 2.0
 """Oscillations are looked for from this time on [s], if nothing else is asked for."""
-
-
-class RunComparison:
-    """How far two runs differ, signal by signal. `compare` makes it.
-
-    Attributes
-    ----------
-    labels
-        Of the two runs.
-    signals
-        One comparison a signal, those first that differ most.
-    remarks
-        Sentences on different record intervals, on runs too short for their oscillations to be read, and on those in
-        doubt.
-    """
-
-    def __init__(self, labels: tuple[str, str], signals: Sequence[Comparison], remarks: Sequence[str] = ()) -> None:
-        self.labels, self.signals, self.remarks = labels, list(signals), list(remarks)
-
-    def __iter__(self) -> Iterator[Comparison]:
-        return iter(self.signals)
-
-    def table(self) -> pd.DataFrame:
-        """Largest deviation of each run, largest difference and its time [s], and the strongest oscillation of each."""
-        rows = [
-            {
-                "signal": c.expression,
-                "unit": c.unit,
-                "deviation_a": c.deviations[0],
-                "deviation_b": c.deviations[1],
-                "largest_difference": c.largest,
-                "at_s": c.at,
-                "rms": c.rms,
-                "frequency_hz_a": c.modes[0].frequency_hz if c.modes[0] else None,
-                "damping_percent_a": c.modes[0].damping_percent if c.modes[0] else None,
-                "frequency_hz_b": c.modes[1].frequency_hz if c.modes[1] else None,
-                "damping_percent_b": c.modes[1].damping_percent if c.modes[1] else None,
-            }
-            for c in self.signals
-        ]
-        return pd.DataFrame(rows).set_index("signal")
-
-    def as_json(self) -> list[dict[str, Any]]:
-        """The same as ``gfor signal compare --json`` prints, as JSON's types."""
-        return [asdict(c) | {"modes": [m and identified_mode_json(m) for m in c.modes]} for c in self.signals]
-
-    def __repr__(self) -> str:
-        return f"<RunComparison of {self.labels[0]} and {self.labels[1]}: {len(self.signals)} signals>"
-
-    def _repr_html_(self) -> str:
-        return page(f"a: {self.labels[0]}; b: {self.labels[1]}", self.remarks, self.table())
 
 
 def compare(

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fmus.toolchain.extras import require
-from orchestrator.api.values import path as path_of
 from orchestrator.asked import names
+from orchestrator.asked import path as path_of
 from orchestrator.errors import InputError
 from orchestrator.fmi.vendor_files import DEVICE_ENDING, READER, foreign_platforms
 

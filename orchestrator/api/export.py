@@ -7,7 +7,7 @@ from fmus.toolchain.archive import write_archive
 from orchestrator.api.comtrade import export_comtrade
 from orchestrator.api.dll import export_dll
 from orchestrator.api.scenario import Scenario
-from orchestrator.api.values import path as path_of
+from orchestrator.asked import path as path_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.results.staging import new_run_id, staged

@@ -7,11 +7,10 @@ from typing import Any, Self
 
 import pandas as pd
 
-from orchestrator.api.show import page
 from orchestrator.api.values import Time, binding_path, in_seconds, plain
-from orchestrator.api.values import path as path_of
 from orchestrator.asked import Names
 from orchestrator.asked import names as names_given
+from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
@@ -19,6 +18,7 @@ from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_declared
 from orchestrator.fmi.instance import open_component
 from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
+from orchestrator.report.notebook import page
 
 
 class Fmu:

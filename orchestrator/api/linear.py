@@ -10,10 +10,10 @@ from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.state_space import StateSpace
 from orchestrator.analysis.state_space import read_linear_model as read_state_space
 from orchestrator.analysis.steady_state import OperatingPoint
-from orchestrator.api.show import page
-from orchestrator.api.values import path as path_of
+from orchestrator.asked import path as path_of
 from orchestrator.errors import InputError
 from orchestrator.late import pd
+from orchestrator.report.notebook import page
 
 UNKNOWN = OperatingPoint(math.nan, math.nan, math.nan, 0, {})
 """That of a model which was read from an FMU."""

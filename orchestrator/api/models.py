@@ -8,8 +8,8 @@ from pathlib import Path
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, parts_of
 from fmus.toolchain.extras import require
 from fmus.toolchain.model import FmiVersion, Model
-from orchestrator.api.values import path as path_of
 from orchestrator.asked import flag, names
+from orchestrator.asked import path as path_of
 from orchestrator.errors import InputError
 
 

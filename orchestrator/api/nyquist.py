@@ -7,44 +7,9 @@ from typing import Any
 from orchestrator.api.values import plain
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.immittance.scan_files import ENDINGS
-from orchestrator.immittance.study import CutRequest, CutResult, study_cut
+from orchestrator.immittance.study import CutRequest, study_cut
+from orchestrator.immittance.view import Nyquist
 from orchestrator.units import to_unit
-
-
-class Nyquist:
-    """What was found at a cut. `nyquist` makes it.
-
-    Attributes
-    ----------
-    result
-        Loop, judgement and scans.
-    """
-
-    def __init__(self, result: CutResult) -> None:
-        self.result = result
-
-    @property
-    def verdict(self) -> str:
-        """``stable``, ``unstable`` or ``not known``."""
-        return str(self.result.verdict)
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """Why the verdict is not known."""
-        return self.result.judgement.reasons
-
-    def as_json(self) -> dict[str, Any]:
-        """The same as ``gfor fmu nyquist --json`` prints, as JSON's types."""
-        return self.result.as_json()
-
-    def save_pictures(self, folder: str | Path) -> list[Path]:
-        """Write the eigenloci and the matrices as PNG into a folder that exists; returns the paths."""
-        from orchestrator.immittance.pictures import draw  # noqa: PLC0415 - a second to import
-
-        return draw(self.result, Path(folder))
-
-    def __repr__(self) -> str:
-        return f"<Nyquist {self.verdict}: {self.result.because}>"
 
 
 def nyquist(

@@ -13,12 +13,10 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
-from orchestrator.api.sensitivities import Sensitivities
-from orchestrator.api.show import page
 from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
-from orchestrator.api.values import path as path_of
 from orchestrator.asked import Names, frequency_range, percent, plain_value, whole_number
 from orchestrator.asked import names as names_given
+from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.load_models import as_powers, is_open
@@ -34,10 +32,12 @@ from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
 from orchestrator.late import pd, xr
+from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
+from orchestrator.sensitivities.view import Sensitivities
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
 

@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestrator.api.identification import opened
-from orchestrator.api.results import Run
-from orchestrator.api.sources import Sources, sources_of
+from orchestrator.api.results import Run, sources_of
 from orchestrator.api.values import Time
+from orchestrator.oscillations.reading import contest_cases, read_contest
+from orchestrator.oscillations.verdict import locate
+from orchestrator.oscillations.view import Sources
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,3 +42,15 @@ def source(run: Run | xr.Dataset | str | Path, start: Time | None = None, stop: 
     """
     dataset, label = opened(run, "run")
     return sources_of(dataset, label, start, stop)
+
+
+def contest_sources(folder: Path) -> list[Sources]:
+    """`source` of each case of a folder in the form of the 2021 IEEE-NASPI contest.
+
+    Parameters
+    ----------
+    folder
+        A case's folder, or one with the folders of several.
+    """
+    measured = [read_contest(path) for path in contest_cases(folder)]
+    return [Sources(one, locate(one)) for one in measured]

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestrator.asked import number_in, plain_value
+from orchestrator.asked import number_in, path, plain_value
 from orchestrator.cases.build_choices import ALPHA, MODELS
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.schema import Value
@@ -21,9 +21,6 @@ Time = float | str
 
 Paths = str | Path | Iterable[str | Path]
 """One path, or several."""
-
-_SHOWN = 60
-"""Characters of an overlong path that an error shows."""
 
 _CASE_VALUE = re.compile(r"[^.\s]+\.\S+")
 
@@ -70,24 +67,6 @@ def _keys(values: Mapping[Any, Any]) -> Iterable[Any]:
         yield key
         if isinstance(value, dict):
             yield from _keys(value)
-
-
-def path(given: Any, argument: str, kind: str = "file") -> Path:
-    """A path of a file, or of another ``kind`` of place."""
-    if not isinstance(given, str | Path) or not str(given):
-        raise InputError(f"{argument} = {given!r}; give the path of a {kind}")
-    _check_length(Path(given), argument)
-    return Path(given)
-
-
-def _check_length(path: Path, argument: str) -> None:
-    """Refuse what no file system can hold, before it says so itself."""
-    try:
-        path.exists()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}…"
-        raise InputError(f"{argument} = {shown!r} is no path that a file can have: {reason}") from error
 
 
 def binding_path(given: Any) -> Path | None:

@@ -1,6 +1,5 @@
 """Files of an identification: the measured response, the fitted model, and a picture of both."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +12,7 @@ from orchestrator.black_box.fitting import IdentifiedModel
 from orchestrator.black_box.frequency_response import FrequencyResponse
 from orchestrator.black_box.passivity import Passivity
 from orchestrator.report.plot_style import STYLE, colour, save_figure
-from orchestrator.results.storage import save_matrices, save_table
-from orchestrator.safe_files import write_text
+from orchestrator.results.storage import save_json, save_matrices, save_table
 
 
 def save_identification(
@@ -28,7 +26,7 @@ def save_identification(
              (("inputs", model.inputs), ("outputs", model.outputs))}  # fmt: skip
     content = {"A": model.A, "B": model.B, "C": model.C, "D": model.D, "step_size": model.step_size}
     save_matrices(content | lists, matrices)
-    write_text(summary, json.dumps(identification_json(response, model, passive), indent=1) + "\n")
+    save_json(identification_json(response, model, passive), summary)
     _plot(response, model, passive, picture)
     return [table, matrices, summary, picture]
 

@@ -1,6 +1,5 @@
 """The files of a matrix of codes and devices: JSON and a page, beside the certificates that it sums up."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -20,6 +19,7 @@ from orchestrator.certification.request import shown
 from orchestrator.certification.verdict import FAILS, PASSES
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import table
+from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
 
 FORMAT = "matrix-1"  # form of the JSON
@@ -35,7 +35,7 @@ def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Pa
     made = datetime.now(UTC).replace(microsecond=0)
     content = {"made": made.isoformat(), **matrix_json(matrix, devices)}
     write_text(folder / MATRIX_HTML, matrix_page(matrix, devices, made))
-    write_text(folder / MATRIX_JSON, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+    save_json(content, folder / MATRIX_JSON)
     return [folder / MATRIX_HTML, folder / MATRIX_JSON]
 
 

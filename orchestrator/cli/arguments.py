@@ -50,9 +50,12 @@ def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> 
 
 
 def asked_by(options: argparse.Namespace, request: type) -> dict[str, Any]:
-    found = {name: getattr(options, name, None) for name in asked_of(request)}
-    given = {name: value for name, value in found.items() if value is not None and value is not False and value != []}
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+    found = {name: (one.kind, getattr(options, name, None)) for name, one in asked_of(request).items()}
+    return {
+        name: ",".join(value) if kind.joined else tuple(value) if isinstance(value, list) else value
+        for name, (kind, value) in found.items()
+        if value is not None and value is not False and value != []
+    }
 
 
 class Joined(argparse.Action):

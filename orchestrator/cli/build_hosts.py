@@ -1,4 +1,4 @@
-"""Which FMU suits which host: the table behind ``gfor build --for``. A page shows it: use-in-another-tool.md."""
+"""Which FMU suits which host: the table behind ``gfor fmu build --for``. A page shows it: use-in-another-tool.md."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -7,7 +7,7 @@ from orchestrator.certification.details import TEMPLATE
 from orchestrator.certification.devices import devices_of
 from orchestrator.certification.issue import NTS631
 from orchestrator.certification.request import PODS, REACTANCES
-from orchestrator.cli.arguments import reactances, setting
+from orchestrator.cli.arguments import option, reactances, repeatable, setting, switch
 from orchestrator.cli.certificate import ALL, CODE_NAMES, GB, codes_of, run_one, run_stiffness
 from orchestrator.cli.certify_matrix import run_matrix
 from orchestrator.cli.certify_sensitivities import add_sensitivity_arguments, check_sensitivity_options
@@ -25,43 +25,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="the converter; several, also as NAME=FILE.fmu, are compared in one matrix")  # fmt: skip
     parser.add_argument("--code", choices=CODE_NAMES, default=NTS631,
                         help="whose test (default: nts631, the damping test)")  # fmt: skip
-    parser.add_argument("--binding", action="append", default=[], metavar="vendor.toml", help="maps the FMU's "
-                        "variables to our port; of one of several converters: NAME=vendor.toml "
-                        "(repeatable)")  # fmt: skip
-    parser.add_argument("--pod", choices=PODS, help="damping controllers that are to be active: set in the FMU where "
-                        "it has pod_p.enabled and pod_q.enabled, else declared by the applicant (default: as the FMU "
-                        "shows them)")  # fmt: skip
-    parser.add_argument("--set", action="append", default=[], type=setting, metavar="VARIABLE=VALUE",
-                        help="a value of the converter, such as pod_p.K=150, or of the study, such as "
-                        "sg1.governor.enabled=true, which makes it another test than the norm's; of one of several "
-                        "converters: NAME:VARIABLE=VALUE (repeatable)")  # fmt: skip
-    parser.add_argument("--declare", action="append", default=[], type=setting, metavar="NAME=VALUE",
-                        help="what is declared of the converter, for the codes that compare it with that: X_eff, D and "
-                        "H for rte (repeatable)")  # fmt: skip
-    parser.add_argument("--reactances", type=reactances, default=REACTANCES, metavar="X,X,…",
-                        help="line reactances X_L [pu] (default: the norm's 13, 0.01 and 0.05 to 0.60; less is "
-                        "incomplete)")  # fmt: skip
-    parser.add_argument("--black-box", action="store_true",
-                        help="do not use the converter's states for the modes, even if it shows them")  # fmt: skip
+    repeatable(parser, "--binding", "vendor.toml", "maps the FMU's variables to our port; of one of several "
+               "converters: NAME=vendor.toml (repeatable)")  # fmt: skip
+    parser.add_argument(
+        "--pod", choices=PODS,
+        help="damping controllers that are to be active: set in the FMU where it has pod_p.enabled and pod_q.enabled, "
+        "else declared by the applicant (default: as the FMU shows them)",
+    )  # fmt: skip
+    repeatable(parser, "--set", "VARIABLE=VALUE", "a value of the converter, such as pod_p.K=150, or of the study, "
+               "such as sg1.governor.enabled=true, which makes it another test than the norm's; of one of several "
+               "converters: NAME:VARIABLE=VALUE (repeatable)", read=setting)  # fmt: skip
+    repeatable(parser, "--declare", "NAME=VALUE", "what is declared of the converter, for the codes that compare it "
+               "with that: X_eff, D and H for rte (repeatable)", read=setting)  # fmt: skip
+    option(parser, "--reactances", "X,X,…", "line reactances X_L [pu] (default: the norm's 13, 0.01 and 0.05 to 0.60; "
+           "less is incomplete)", read=reactances, default=REACTANCES)  # fmt: skip
+    switch(parser, "--black-box", "do not use the converter's states for the modes, even if it shows them")
     add_executor_arguments(parser)
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for results (default: results/certify_<file>); "
-                        "points that are there are not computed again")  # fmt: skip
+    option(parser, "--out", "DIR", "folder for results (default: results/certify_<file>); points that are there are "
+           "not computed again", read=Path)  # fmt: skip
     _add_document_arguments(parser)
     add_sensitivity_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print all figures as JSON")
 
 
 def _add_document_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--details", type=Path, metavar="FILE.toml",
-                        help="number, applicant, operator, tester, place, date")  # fmt: skip
+    option(parser, "--details", "FILE.toml", "number, applicant, operator, tester, place, date", read=Path)
     parser.add_argument("--details-template", action="store_true", help="print such a file to be filled in, and end")
     checks = parser.add_mutually_exclusive_group()
     checks.add_argument("--check", type=Path, metavar="report.json",
                         help="the FMU's acceptance tests by `gfor fmu check --json` (default: run now)")  # fmt: skip
     checks.add_argument("--no-check", action="store_true", help="leave out the acceptance tests; the report says so")
-    parser.add_argument(
-        "--pdf", action="store_true", help="print the report to certificate.pdf with an installed browser"
-    )
+    switch(parser, "--pdf", "print the report to certificate.pdf with an installed browser")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.asked import read_part
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.needs_record import (
     confirmed_text,
@@ -19,6 +20,7 @@ from orchestrator.certification.codes.needs_record import (
     save_needs,
 )
 from orchestrator.certification.codes.what_it_takes import CHANGE, confirm_changes, plan_changes, run_changes
+from orchestrator.cli.arguments import repeatable, switch
 from orchestrator.cli.executors import choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
@@ -30,29 +32,16 @@ _WORKER = ["orchestrator.certification.codes.change_point"]
 
 def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("what a failed criterion would take")
-    group.add_argument("--sensitivities", action="store_true",
-                       help="run every failed row again with each tunable parameter changed to either side, and say "
-                       "how each moves the margin of each failed criterion")  # fmt: skip
-    group.add_argument("--parameter", action="append", default=[], metavar="PARAMETER", help="only this one, tunable "
-                       "or fixed; also a pattern (repeatable; default: all tunable ones)")  # fmt: skip
+    switch(group, "--sensitivities", "run every failed row again with each tunable parameter changed to either side, "
+           "and say how each moves the margin of each failed criterion")  # fmt: skip
+    repeatable(group, "--parameter", "PARAMETER", "only this one, tunable or fixed; also a pattern (repeatable; "
+               "default: all tunable ones)")  # fmt: skip
     group.add_argument("--fixed", action="store_true", help="fixed parameters too")
     group.add_argument(
-        "--change", type=relative_change, metavar="PERCENT",
+        "--change", type=read_part("a change in percent from 0.01 to 50, such as 5", 0.01, 50), metavar="PERCENT",
         help=f"by so much of itself a parameter is changed to either side (default: {100 * CHANGE:g} percent)",
     )  # fmt: skip
-    group.add_argument("--confirm", action="store_true",
-                       help="run the single change predicted to help most")  # fmt: skip
-
-
-def relative_change(text: str) -> float:
-    """A part above 0 and at most a half, in percent."""
-    try:
-        value = float(text.removesuffix("%"))
-    except ValueError:
-        value = 0.0
-    if not 0.01 <= value <= 50:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a change in percent from 0.01 to 50, such as 5")
-    return value / 100
+    switch(group, "--confirm", "run the single change predicted to help most")
 
 
 def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str], norm: str) -> None:

@@ -1,7 +1,6 @@
 """``gfor fmu check``: acceptance tests of an FMU."""
 
 import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.api.acceptance import check
 from orchestrator.asked import read_positive
 from orchestrator.cli.arguments import option, repeatable, switch
+from orchestrator.cli.terminal import print_json
 from orchestrator.errors import InputError
 from orchestrator.fmi.protection import missing
 from orchestrator.units import read_value
@@ -40,8 +40,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--json", "print JSON")
     option(parser, "--junit", "FILE.xml", "write the results for a CI server", read=Path)
     option(parser, "--time-limit", "S", "for one call [s] (default: 30)", read=read_positive, default=30.0)
-    parser.add_argument("--memory-limit", type=read_value, default=4096.0, metavar="MB", help="of the FMU's process "
-                        "[MB], or with a unit such as '4 GB' (default: 4096)")  # fmt: skip
+    option(parser, "--memory-limit", "MB", "of the FMU's process [MB], or with a unit such as '4 GB' (default: 4096)",
+           read=read_value, default=4096.0)  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     if options.junit:
         found.save_junit(options.junit)
     if options.json:
-        print(json.dumps(found.as_json(), indent=1, ensure_ascii=False))
+        print_json(found.as_json())
     else:
         _print(found.report)
     return 1 if found.faults else NOT_SUPPORTED if found.not_supported else 0

@@ -8,7 +8,7 @@ from shutil import rmtree
 
 from rich.markup import escape
 
-from orchestrator.api.design import design_controller, parameter_file_path
+from orchestrator.api.studies import design_controller
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.cli.arguments import add_request_arguments, asked_by, option, repeatable, switch
 from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
@@ -19,6 +19,7 @@ from orchestrator.cli.verdict import NOT_MET, add_verdict_argument, exit_code, p
 from orchestrator.errors import CosimError, InputError
 from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.sheet import first_screen, sheet
+from orchestrator.pod_design.view import parameter_file_path
 from orchestrator.points.store import PointStore, any_kept
 
 

@@ -9,13 +9,12 @@ from pathlib import Path
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.coordinated_design import STUDY
 from orchestrator.cli.arguments import Joined, add_request_arguments, asked_by, option
 from orchestrator.cli.case_arguments import case_of, of_one_scenario
 from orchestrator.cli.executors import add_executor_arguments
 from orchestrator.cli.study import present, working_in
 from orchestrator.cli.verdict import NOT_MET
-from orchestrator.coordinated_design import words
+from orchestrator.coordinated_design import view, words
 from orchestrator.coordinated_design.study import ALL, PointsDesign, PointsDesignRequest, plan_points_design
 from orchestrator.coordinated_design.verdict import PointsVerdict
 from orchestrator.operating_points.item import Status
@@ -50,7 +49,7 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
     path = out or Path(f"{case.name}_{'_'.join(options.controller)}_points.toml")
     folder = path.with_suffix(".points")
     plan = partial(plan_points_design, case, request, options.points, options.outages)
-    with working_in(options, folder, STUDY, plan) as (_, compute):
+    with working_in(options, folder, view.STUDY, plan) as (_, compute):
         design = compute()
         written = design.save(path, _command_line(options, request))
     verdict = design.result.verdict
@@ -62,9 +61,9 @@ def run_over_points(options: argparse.Namespace, out: Path | None) -> int:
 
 def _parts(design: PointsDesign) -> Iterator[RenderableType]:
     yield words.verdict_of(design.verdict).markup()
-    yield from ("", words.points_table(design.verdict), "", words.settings_table(design))
+    yield from ("", view.least_damped_table(design.verdict), "", view.settings_table(design))
     if design.plan.request.ranked:
-        yield from ("", words.ranking_table(design))
+        yield from ("", view.ranking_table(design))
     yield from ("", escape(words.what_it_rests_on(design)))
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.interactions import STUDY, Interactions
 from orchestrator.certification.devices import devices_of
 from orchestrator.cli.arguments import add_request_arguments, asked_by, repeatable
 from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
@@ -15,9 +14,9 @@ from orchestrator.cli.study import add_study_arguments, folder_of, last_line, pr
 from orchestrator.cli.terminal import say
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
-from orchestrator.interactions import tables
 from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
+from orchestrator.interactions.view import STUDY, Interactions, assignments_table, modes_table, systems_table
 from orchestrator.interactions.words import verdict_of
 
 
@@ -60,6 +59,6 @@ def _parts(found: Interactions) -> Iterator[RenderableType]:
     judgement = found.judgement
     yield verdict_of(judgement).markup()
     yield from map(escape, found.sentences[1:])
-    yield from ("", tables.modes_table(judgement), "", tables.systems_table(judgement), "")
+    yield from ("", modes_table(judgement), "", systems_table(judgement), "")
     if found.result.plan.swapped:
-        yield from (tables.assignments_table(judgement), "")
+        yield from (assignments_table(judgement), "")

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
+from orchestrator.cli.arguments import repeatable
 from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.safe_files import write_text
@@ -29,8 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frequency", metavar="HZ", help="'60 Hz', where the network's file does not say it")
     parser.add_argument("--leave-out", action="append", default=[], metavar="KIND", help="elements of the network that "
                         "may go, where a message asks for it (repeatable)")  # fmt: skip
-    parser.add_argument("--dyr-leave-out", action="append", default=[], metavar="MODEL",
-                        help="records of dynamics data that may go (repeatable)")  # fmt: skip
+    repeatable(parser, "--dyr-leave-out", "MODEL", "records of dynamics data that may go (repeatable)")
     parser.add_argument("--out", type=Path, metavar="FILE.toml", help="the case file (default: the network's name)")
     parser.add_argument("--force", action="store_true", help="overwrite an existing file")
 

@@ -32,12 +32,8 @@ _NOT_WITH_RESUME: Mapping[str, Any] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--checkpoint",
-        type=seconds_or_none,
-        metavar="SECONDS",
-        help=f"wall-clock time between two checkpoints (default: {EVERY:g}); 0 writes none",
-    )
+    option(parser, "--checkpoint", "SECONDS", f"wall-clock time between two checkpoints (default: {EVERY:g}); 0 writes "
+           f"none", read=seconds_or_none)  # fmt: skip
     switch(parser, "--require-checkpoint", "refuse a run that could not be resumed, because an FMU cannot serialise "
            "its state")  # fmt: skip
     option(parser, "--resume", "DIR", "go on with the interrupted run whose results are in DIR; case and options are "

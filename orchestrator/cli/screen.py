@@ -9,36 +9,23 @@ from pathlib import Path
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.screening import STUDY, Screening
-from orchestrator.asked import read_percent
-from orchestrator.cases.sharing import SharingRule
-from orchestrator.cli.arguments import Joined, option, repeatable, switch
-from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, case_of, of_one_scenario
+from orchestrator.cli.arguments import add_request_arguments, asked_by, option, repeatable
+from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.cli.terminal import make_console, make_errors, print_parts
 from orchestrator.errors import InputError
 from orchestrator.operating_points.item import Status
 from orchestrator.points.store import POINTS
 from orchestrator.safe_files import made_folder
-from orchestrator.screening import tables
-from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import Shard, plan_screening
 from orchestrator.screening.summary import Summary
+from orchestrator.screening.view import STUDY, Screening, modes_table, overview, remarks, verdict
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, several=False)
-    option(parser, "--points", "FILE",
-           "operating points: a CSV file, a row each (default: the case as it is)", read=Path)  # fmt: skip
-    parser.add_argument("--outages", action=Joined, metavar="WHICH", help="n-1, lines, units, or names such as "
-                        "line_1_2,sg3 or line_1_2+sg3 (repeatable)")  # fmt: skip
-    parser.add_argument("--sharing", choices=[str(rule) for rule in SharingRule], help="who feeds what an outage "
-                        "takes: units by droop and rating (default), by rating, or the slack alone")  # fmt: skip
-    add_range_argument(parser)
-    parser.add_argument("--damping", type=partial(read_percent, most=100 * MOST_DAMPING), default=0.2,
-                        metavar="PERCENT", help="damping below which a mode is critical, at most 60 (default: "
-                        "20)")  # fmt: skip
-    switch(parser, "--whole", "count growing modes of all frequencies at every point; takes longer")
+    add_request_arguments(parser, ScreeningRequest)
     option(parser, "--shard", "I/N", "compute the part I of N only, and keep its points", read=Shard.parse)
     repeatable(parser, "--merge", "DIR", "take the points that a part kept there", read=Path)
     add_study_arguments(parser, "screen")
@@ -48,36 +35,34 @@ def run(options: argparse.Namespace) -> int:
     """Plan, compute, write and print; returns 1 if nothing has modes, or after an internal error."""
     of_case = of_one_scenario(options, "a screening is of one scenario")
     case = case_of(options)
-    low, high = options.range
-    wanted = CriticalRegion(low, high, options.damping)
-    if not wanted.lowest_hz > 0:
-        raise InputError(f"--range {wanted.lowest_hz:g}:{wanted.highest_hz:g}: a screening begins above 0 Hz")
-    sharing = None if options.sharing is None else SharingRule(options.sharing)
-    how = {"wanted": wanted, "whole": options.whole, "sharing": sharing, **of_case}
+    request = ScreeningRequest(**asked_by(options, ScreeningRequest))
     folder = folder_of(options, case.name, "screen")
-    plan = partial(plan_screening, case, options.points, options.outages, **how)
+    plan = partial(
+        plan_screening, case, request.points, request.outages, wanted=request.region, whole=request.whole,
+        sharing=request.sharing, **of_case,
+    )  # fmt: skip
     with working_in(options, folder, STUDY, plan) as (planned, compute):
         _merge(options.merge, folder / POINTS)
         found = compute(options.shard)
         if options.shard is not None:
             part, whole = len(found.result.items), planned.number_of_items
             text = f"part {options.shard.number} of {options.shard.total}: {part} of {whole} items are kept in {folder}"
-            remarks = tables.remarks(found.summary) if found.summary.counts[Status.INTERNAL] else ()
+            said = remarks(found.summary) if found.summary.counts[Status.INTERNAL] else ()
             print_parts(make_console(stderr=options.json), [escape(text)])
-            for text in remarks:
+            for text in said:
                 make_errors().print(escape(text), soft_wrap=True)
             return _exit_code(found, found.summary.stable_here, fail_unstable=options.fail_unstable)
         end = last_line(found.result, "", folder, found.save(folder))
-        present(options, found.as_json, _parts(found.summary), tables.remarks(found.summary), end)
+        present(options, found.as_json, _parts(found.summary), remarks(found.summary), end)
     return _exit_code(found, found.stable, fail_unstable=options.fail_unstable)
 
 
 def _parts(summary: Summary) -> Iterator[RenderableType]:
     plan = summary.result.plan
-    yield tables.verdict(summary)
+    yield verdict(summary)
     if len(plan.outages) + len(plan.points) > 2:
-        yield from ("", tables.overview(summary))
-    yield from ("", tables.modes(summary), "")
+        yield from ("", overview(summary))
+    yield from ("", modes_table(summary), "")
 
 
 def _exit_code(found: Screening, stable: bool | None, *, fail_unstable: bool) -> int:

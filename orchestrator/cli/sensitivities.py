@@ -16,7 +16,7 @@ from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verd
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
-from orchestrator.sensitivities.tables import left_out, sensitivity_table
+from orchestrator.sensitivities.view import left_out, sensitivity_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -3,16 +3,15 @@
 import argparse
 from pathlib import Path
 
+from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.api.source import source
-from orchestrator.api.sources import Sources, contest_sources
+from orchestrator.api.source import contest_sources, source
 from orchestrator.cli.arguments import seconds, seconds_or_none
-from orchestrator.cli.terminal import make_console, print_json, saying_warnings
+from orchestrator.cli.terminal import make_console, print_json, print_parts, saying_warnings
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
-from orchestrator.oscillations.verdict import Located
-from orchestrator.report.tables import PlainTable
+from orchestrator.oscillations.view import Sources, opinions_table, sources_table
 
 _SHOWN = 5
 
@@ -49,38 +48,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _print(found: list[Sources], *, details: bool) -> None:
     console = make_console()
-    table = PlainTable(header_style="bold")
-    for column in ("Record", "f [Hz]", "Kind", "Source", "Begins [s]", "Multiples"):
-        table.add_column(column, justify="left" if column in ("Record", "Kind", "Source") else "right")
-    for one in found:
-        for x in one:
-            begin = "before" if x.found.begin is None else f"{x.found.begin:.1f}"
-            multiples = ", ".join(str(order) for order in x.found.harmonics)
-            frequency = f"{x.found.frequency:.4f}"
-            table.add_row(
-                escape(one.label), frequency, x.evidence.kind, escape(x.source or "not known"), begin, multiples
-            )
-        if not len(one):
-            table.add_row(escape(one.label), "-", "no oscillation", "-", "-", "")
-    console.print(table)
+    console.print(sources_table(found))
     for one in found:
         for x in one:
             head = f"{one.label}, {x.found.frequency:.4g} Hz"
-            console.print(escape(f"{head}: {x.reason}. Next: {x.advice}."), soft_wrap=True, highlight=False)
+            said: list[RenderableType] = [escape(f"{head}: {x.reason}. Next: {x.advice}.")]
             if details:
-                _print_details(head, x)
-        for remark in one.remarks:
-            console.print(escape(f"{one.label}: {remark}"), soft_wrap=True, highlight=False)
-
-
-def _print_details(head: str, one: Located) -> None:
-    console = make_console()
-    table = PlainTable(title=escape(head), title_justify="left", header_style="bold")
-    for column in ("Method", "Applies", "Names", "Places, the largest part first"):
-        table.add_column(column)
-    for o in one.opinions:
-        places = ", ".join(f"{name} {100 * share:.0f} %" for name, share in o.ranking[:_SHOWN])
-        table.add_row(o.method, "yes" if o.applies else "no", escape(o.place or "-"), escape(places))
-    console.print(table)
-    text = ", ".join(f"{name} {value:.3g}" for name, value in list(one.found.amplitudes.items())[:_SHOWN])
-    console.print(escape(f"Amplitudes, the clearest first: {text}"), soft_wrap=True, highlight=False)
+                text = ", ".join(f"{name} {value:.3g}" for name, value in list(x.found.amplitudes.items())[:_SHOWN])
+                said += [opinions_table(head, x), escape(f"Amplitudes, the clearest first: {text}")]
+            print_parts(console, said)
+        print_parts(console, (escape(f"{one.label}: {remark}") for remark in one.remarks))

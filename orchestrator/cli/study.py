@@ -77,7 +77,7 @@ def present(
         print_parts(console, parts)
     for text in remarks:
         make_errors().print(escape(text), soft_wrap=True)
-    if not options.json:
+    if end and not options.json:
         console.print(escape(end), soft_wrap=True, highlight=False)
 
 

@@ -4,7 +4,8 @@ import argparse
 
 from rich.console import RenderableType
 
-from orchestrator.api.sweep import STUDY, plan
+from orchestrator.api.sweep import plan
+from orchestrator.cli.arguments import option, repeatable
 from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, case_of, values_set
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.errors import InputError
@@ -12,25 +13,21 @@ from orchestrator.sweep import tables
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.limit import Ending
 from orchestrator.sweep.sweep import SweepPlan
+from orchestrator.sweep.view import STUDY
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    parser.add_argument(
-        "--vary",
-        action="append",
-        default=[],
-        type=parse_vary,
-        metavar="COMPONENT.PARAMETER=START:STOP:COUNT",
-        help="what to vary; also =log:START:STOP:COUNT and =0.1,0.2,0.5 (repeatable: a full grid, followed along the "
-        "last one); several together: 'grid.X_a,grid.X_b=…', 'grid.X_line_7_*=…', 'line_7_9,line_8_9: length=1:4:7'",
-    )
+    repeatable(parser, "--vary", "COMPONENT.PARAMETER=START:STOP:COUNT", "what to vary; also =log:START:STOP:COUNT and "
+               "=0.1,0.2,0.5 (repeatable: a full grid, followed along the last one); several together: "
+               "'grid.X_a,grid.X_b=…', 'grid.X_line_7_*=…', 'line_7_9,line_8_9: length=1:4:7'",
+               read=parse_vary)  # fmt: skip
     parser.add_argument("--scr", action="append", dest="vary", type=_scr, metavar="BUS=START:STOP:COUNT", help="SCR of "
                         "the converters at a bus, or its short-circuit power ('bus_9=3000 MVA:800 MVA:5'): R and X of "
                         "all branches that end there are multiplied")  # fmt: skip
-    parser.add_argument("--until", metavar="unstable|PERCENT", help="how far the range START:STOP may go before the "
-                        "system is unstable, or a mode of --range is damped less than so many percent: coarse grid "
-                        "(COUNT, 9), then bisection")  # fmt: skip
+    option(parser, "--until", "unstable|PERCENT", "how far the range START:STOP may go before the system is unstable, "
+           "or a mode of --range is damped less than so many percent: coarse grid (COUNT, 9), then "
+           "bisection")  # fmt: skip
     add_range_argument(parser)
     add_study_arguments(parser, "sweep")
 

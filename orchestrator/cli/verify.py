@@ -11,7 +11,7 @@ from orchestrator.api.certification import chosen_anew, is_of_norm, verify_anew,
 from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verification, read_certificate, verify_files
-from orchestrator.cli.arguments import reactances
+from orchestrator.cli.arguments import option, reactances
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import INTERRUPTED
@@ -28,9 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--points", type=reactances, metavar="X,X,…",
                        help="line reactances that are computed anew [pu] (default: the least damped one)")  # fmt: skip
-    which.add_argument("--rows", type=lambda text: tuple(text.split(",")), metavar="ROW,ROW,…",
-                       help="of a code's certificate: rows that are computed anew (default: the one with the narrowest "
-                       "margin, and one that chance draws)")  # fmt: skip
+    option(which, "--rows", "ROW,ROW,…", "of a code's certificate: rows that are computed anew (default: the one with "
+           "the narrowest margin, and one that chance draws)", read=lambda text: tuple(text.split(",")))  # fmt: skip
     which.add_argument("--all", action="store_true", help="compute every point or row anew")
     which.add_argument("--files-only", action="store_true", help="compute nothing: compare hashes, and judge again")
     add_executor_arguments(parser)

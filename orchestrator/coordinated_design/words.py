@@ -2,17 +2,12 @@
 
 from collections import Counter
 
-from rich.table import Table
-
 from orchestrator.analysis.stability import zeros_in_words
-from orchestrator.coordinated_design.ranking import RankedConverter
 from orchestrator.coordinated_design.study import PointsDesign
-from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict
-from orchestrator.pod_design.closed_loop import PodSetting
-from orchestrator.report.tables import make_table
+from orchestrator.coordinated_design.verdict import PointsVerdict
 from orchestrator.report.verdict import VerdictSentence
 
-_ROWS, _SHOWN = 12, 4
+_SHOWN = 4
 
 
 def verdict_sentence(verdict: PointsVerdict) -> str:
@@ -83,68 +78,6 @@ def what_it_rests_on(design: PointsDesign) -> str:
         f"the best came from {steps} linear programs. The figures are those of power flow, steady state and "
         "eigenvalues computed anew at every point, of the system without a communication step."
     )
-
-
-def settings_table(design: PointsDesign) -> Table:
-    columns = ("Controller", "K [pu]", "T_S1 [s]", "T_S2 [s]", "N_S", "Lead [°]", "of")
-    placed = zip(design.plan.groups, design.settings, strict=True)
-    rows = [(group.name, *_setting(setting), str(len(group.components))) for group, setting in placed]
-    return make_table("Settings", *columns, rows=rows)
-
-
-def _setting(setting: PodSetting) -> list[str]:
-    filters = setting.filters
-    angle = filters.N_S * filters.stage_angle_deg if filters.T_S1 else 0.0
-    return [f"{setting.gain:.5g}", f"{filters.T_S1:.4f}", f"{filters.T_S2:.4f}", str(filters.N_S), f"{angle:+.1f}"]
-
-
-def points_table(verdict: PointsVerdict) -> Table:
-    """The points with the least damping, the worst first."""
-    having = [(point, point.target) for point in verdict.known if point.target is not None]
-    ordered = sorted(having, key=lambda entry: entry[1].damping_ratio)
-    columns = ("Point", "Outage", "before [%]", "with it [%]", "f [Hz]", "Who", "Stable")
-    rows = [
-        (point.point.name, point.outage.name,
-         "–" if point.target_before is None else f"{100 * point.target_before.damping_ratio:.2f}",
-         f"{100 * target.damping_ratio:.2f}", f"{target.frequency_hz:.3f}", target.who, _stable(point))
-        for point, target in ordered[:_ROWS]
-    ]  # fmt: skip
-    title = f"The {min(_ROWS, len(ordered))} least damped of {len(verdict.points)} points and outages"
-    return make_table(title, *columns, left=2, rows=rows)
-
-
-def _stable(point: JudgedPoint) -> str:
-    return {True: "yes", False: "NO", None: "not known"}[point.stable]
-
-
-def ranking_table(design: PointsDesign) -> Table:
-    """Converters by what a controller there alone would give."""
-    title = "Converters by what a controller there alone gives: the least damping of all points, computed anew"
-    columns = (
-        "Converter",
-        "Controller",
-        "least damping [%]",
-        "K [pu]",
-        "T_S1 [s]",
-        "T_S2 [s]",
-        "shift by 1 pu [rad/s]",
-    )
-    found = [(one.place.component, one.place.controller, *ranked_cells(one), f"{one.shift:.3g}")
-             for one in design.ranking[:_ROWS]]  # fmt: skip
-    return make_table(title, *columns, left=2, rows=found)
-
-
-def ranked_cells(one: RankedConverter) -> list[str]:
-    """Least damping, gain and time constants of a ranked converter; dashes where no controller was searched."""
-    if one.setting is None:
-        return ["–"] * 4
-    filters = one.setting.filters
-    return [
-        "unstable or not known" if one.worst is None else f"{100 * one.worst:.2f}",
-        f"{one.setting.gain:.4g}",
-        f"{filters.T_S1:.4f}",
-        f"{filters.T_S2:.4f}",
-    ]
 
 
 def remarks(verdict: PointsVerdict) -> list[str]:

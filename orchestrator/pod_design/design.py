@@ -84,7 +84,7 @@ with where they come from."""
 
 
 @dataclass(frozen=True)
-class Sensitivities:
+class GainSensitivities:
     """Mode [rad/s] and eigenvalue sensitivity [rad/s per pu] at the gain ΔK, without and with the lead/lag."""
 
     mode: complex
@@ -109,7 +109,7 @@ class PodDesign:
     initial: complex
     required_damping: float
     predicted: complex
-    sensitivities: Sensitivities
+    sensitivities: GainSensitivities
     filters: LeadLag
     gain_non_compensated: float
     gain_compensated: float
@@ -320,7 +320,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         initial=initial,
         required_damping=required,
         predicted=predicted,
-        sensitivities=Sensitivities(bare.eigenvalue, S, turned.eigenvalue, S_turned),
+        sensitivities=GainSensitivities(bare.eigenvalue, S, turned.eigenvalue, S_turned),
         filters=filters,
         gain_non_compensated=gains[0],
         gain_compensated=gains[1],

@@ -47,8 +47,8 @@ def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
 
 
 def short(text: str, longest: int) -> str:
-    """A remark, cut where it has more characters."""
-    return text if len(text) <= longest else f"{text[: longest - 2].rstrip()} …"
+    """A remark, cut at a word where it has more characters."""
+    return text if len(text) <= longest else f"{text[: longest - 1].rsplit(' ', 1)[0]} …"
 
 
 def share_text(entry: tuple[str, float]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -159,12 +159,12 @@ def safe_cell(value: Any) -> Any:
     return value
 
 
-def save_table(rows: Iterable[Mapping[str, Any]], path: Path) -> None:
-    """Write rows of equal keys as CSV."""
+def save_table(rows: Iterable[Mapping[str, Any]], path: Path, names: Sequence[str] = ()) -> None:
+    """Write rows of equal keys as CSV; ``names`` are its columns where there may be no row."""
     rows = list(rows)
     file = io.StringIO(newline="")
     writer = csv.writer(file)
-    names = list(rows[0]) if rows else []
+    names = list(rows[0]) if rows else names
     writer.writerow([safe_cell(name) for name in names])
     writer.writerows([safe_cell(row.get(name, "")) for name in names] for row in rows)
     write_text(path, file.getvalue())

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,48 +174,3 @@ def duration(mode: ScreenedMode, *, outages: bool = False) -> tuple[NDArray[np.f
             least[point.name] = point.hours, min(known[1], one.damping)
     ordered = sorted(least.values(), key=lambda entry: entry[1])
     return np.cumsum([hours for hours, _ in ordered]), np.array([damping for _, damping in ordered])
-
-
-def as_json(summary: Summary) -> dict[str, Any]:
-    """The summary as JSON's types."""
-    result = summary.result
-    return {
-        "case": result.plan.case.name,
-        "scenario": result.plan.prepared.name,
-        "points": len(result.plan.points),
-        "outages": len(result.plan.outages) - 1,
-        "items": len(result.items),
-        "complete": result.complete,
-        "stable": summary.stable,
-        "counted_at_all_frequencies": summary.counted,
-        "slowest_growth_counted": summary.slowest,
-        "nothing_restores": [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free],
-        "counts": {str(status): number for status, number in summary.counts.items()},
-        "unstable": [_where(item) for item in summary.unstable],
-        "failures": [_where(item) | {"status": str(item.record.status), "why": item.record.text}
-                     for item in summary.failures()],
-        "modes": [
-            {
-                "name": mode.name,
-                "worst": _where(mode.worst.item)
-                | {
-                    "real": mode.worst.value.real,
-                    "imag": mode.worst.value.imag,
-                    "frequency_hz": mode.worst.frequency,
-                    "damping_percent": mode.worst.damping,
-                },
-                "participation": dict(mode.worst.participation()),
-                "converters": [
-                    {"component": name, "residue_p": abs(p), "residue_q": abs(q)}
-                    for name, p, q in mode.worst.ranking()
-                ],
-                "items": len(mode.at),
-                "hours": mode.hours,
-            }
-            for mode in summary.modes
-        ],
-    }  # fmt: skip
-
-
-def _where(item: ScreenedItem) -> dict[str, Any]:
-    return {"point": item.point.name, "outage": item.outage.name, "place": item.point.place}

@@ -9,6 +9,7 @@ from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.arrays import Vector
+from orchestrator.asked import FILE, FREQUENCIES, NAME, OUTAGES, POSITIVE, RANKED, asked
 from orchestrator.cases.case import Case
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
@@ -32,20 +33,19 @@ HARDLY = 0.02  # A bus that moves a mode by less than this part of what the best
 
 @dataclass(frozen=True)
 class SiteRequest:
-    """What is asked: a ``device`` (``pod_p``, ``pod_q``, ``droop`` or the path of an FMU), for modes with less damping
-    than ``below`` [%], the best ``confirm`` buses confirmed by a converter of a ``rating`` [MVA] with a POD of at most
-    a ``gain``.
-    """
+    """What is asked; shifts are those of the least damped mode where none is damped less than ``below``."""
 
-    device: str
-    binding: Path | None = None
+    device: str = asked(NAME, "pod_p", "pod_p (default), pod_q, droop, or a vendor's .fmu", "DEVICE")
+    binding: Path | None = asked(FILE, None, "binding of the vendor's FMU")
     scenario: str | None = None
-    below: float = 10.0
-    frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ
-    outages: str | None = None
-    confirm: int = 3
-    rating: float = 100.0
-    gain: float = 200.0
+    below: float = asked(POSITIVE, 10.0, "damping of poorly damped modes (default: 10)", "PERCENT")
+    frequencies: tuple[float, float] = asked(
+        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range"
+    )
+    outages: str | None = asked(OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)")
+    confirm: int = asked(RANKED, 3, "confirm the best N by coupled FMUs (default: 3)")
+    rating: float = asked(POSITIVE, 100.0, "of the converter that confirms (default: 100)", "MVA")
+    gain: float = asked(POSITIVE, 200.0, "largest of its POD [pu of its rating] (default: 200)", "K")
     overrides: Mapping[str, Value] = field(default_factory=dict)
     parameters: Sequence[ParameterFile] = ()
     step_size: float | None = None
@@ -120,9 +120,6 @@ def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], No
     """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best."""
     if request.is_foreign and not request.device.lower().endswith(".fmu"):
         raise InputError(f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu")
-    for option in ("rating", "gain", "below", "confirm"):
-        if not (value := getattr(request, option)) > (-1 if option == "confirm" else 0):
-            raise InputError(f"--{option} {value:g}: it must be positive")
     scenario = request.scenario or next(iter(case.scenarios))
     open_case = replace(case, injections=True)
     layers = (*request.parameters, *([OptionValues.of(request.overrides)] if request.overrides else []))

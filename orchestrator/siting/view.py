@@ -1,4 +1,6 @@
-"""What a study of places found: in words, as JSON, as rows, and as a page."""
+"""What a study of places found: in Python, in words, as JSON, as rows, and as a page."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Mapping
@@ -9,15 +11,18 @@ from typing import Any
 from rich.table import Table
 
 from orchestrator.analysis.modes import damping_percent
+from orchestrator.late import pd
 from orchestrator.points.code import code_hash
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, damping, table
 from orchestrator.report.html.network_map import network_map
+from orchestrator.report.notebook import page
 from orchestrator.report.tables import make_table, share_text
+from orchestrator.results.lock import held
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
-from orchestrator.safe_files import write_text
+from orchestrator.safe_files import made_folder, write_text
 from orchestrator.siting.confirmation import Confirmation
 from orchestrator.siting.residues import SeenMode
 from orchestrator.siting.responses import ACTIVE, REACTIVE
@@ -28,6 +33,62 @@ _NONE = 1e-5
 """Damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 MW/Hz would give a hundredth of a point."""
 
 _SHOWN = 12
+
+
+class Siting:
+    """How far a device at each bus moves the poorly damped modes, best bus first.
+
+    Attributes
+    ----------
+    result
+        All that was computed.
+    """
+
+    def __init__(self, result: SiteResult) -> None:
+        self.result = result
+
+    @property
+    def ranking(self) -> tuple[str, ...]:
+        """All buses, best first."""
+        return self.result.ranking
+
+    @property
+    def answer(self) -> str:
+        """The best places in one sentence."""
+        return answer(self.result)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What coupled FMUs say of the best places, which modes these do not reach, and what was not judged."""
+        return [*sureness(self.result), *remarks(self.result)]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the coupled FMUs confirm every place that was tried."""
+        return self.result.agrees
+
+    def table(self) -> pd.DataFrame:
+        """One row for each bus and mode; columns as in ``buses.csv``."""
+        return pd.DataFrame(rows(self.result))
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor site --json`` prints, as JSON's types."""
+        return as_json(self.result)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``site.json``, ``buses.csv`` and the page ``site.html``, which has a map, into a folder."""
+        place = made_folder(Path(folder), "folder")
+        with held(place), staged(place, new_run_id()) as staging:
+            save_json(self.as_json(), staging / "site.json")
+            save_table(rows(self.result), staging / "buses.csv")
+            write_text(staging / "site.html", _page(self.result))
+        return [place / name for name in ("site.json", "buses.csv", "site.html")]
+
+    def __repr__(self) -> str:
+        return f"<Siting in {self.result.case.name}: {self.answer}>"
+
+    def _repr_html_(self) -> str:
+        return page(f"Siting in {self.result.case.name}", [self.answer, *self.remarks], self.table())
 
 
 def unit(result: SiteResult, times: str = "1") -> str:
@@ -195,15 +256,6 @@ def ranking_table(result: SiteResult) -> Table:
 def _cells(result: SiteResult, bus: str) -> list[str]:
     shifts = (result.shifts[DEVICE][result.intact.name][seen.label][bus] for seen in result.intact.modes)
     return ["hardly" if one.hardly else shown(result, one.damping) for one in shifts]
-
-
-def save(result: SiteResult, folder: Path) -> list[Path]:
-    """Write ``site.json``, ``buses.csv`` and the page ``site.html``."""
-    with staged(folder, new_run_id()) as staging:
-        save_json(as_json(result), staging / "site.json")
-        save_table(rows(result), staging / "buses.csv")
-        write_text(staging / "site.html", _page(result))
-    return [folder / name for name in ("site.json", "buses.csv", "site.html")]
 
 
 def _page(result: SiteResult) -> str:

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.api.design import ControllerDesign
 from orchestrator.errors import InputError
+from orchestrator.pod_design.view import ControllerDesign
 
 mpl.use("agg")
 

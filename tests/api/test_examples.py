@@ -9,32 +9,18 @@ import pytest
 import orchestrator
 
 MODULES = (
-    *(
-        "acceptance",
-        "admittance",
-        "binding",
-        "case",
-        "certification",
-        "comparison",
-        "comtrade",
-        "coordinated_design",
-        "design",
-        "export",
-        "fmu",
-        "identification",
-        "linear",
-        "models",
-        "nyquist",
-        "results",
-    ),
-    *("scenario", "screening", "sensitivities", "siting", "source", "sweep"),
+    *(f"api.{name}" for name in ("acceptance", "admittance", "binding", "case", "certification", "comparison")),
+    *(f"api.{name}" for name in ("comtrade", "export", "fmu", "identification", "linear")),
+    *(f"api.{name}" for name in ("models", "nyquist", "results", "scenario", "source")),
+    *(f"{name}.view" for name in ("coordinated_design", "interactions", "pod_design", "screening", "sensitivities")),
+    *("siting.view", "sweep.view"),
 )
 
 
 def examples():
     """Examples of all modules of the face, and of the package itself."""
     finder = doctest.DocTestFinder(exclude_empty=True)
-    modules = [orchestrator, *(import_module(f"orchestrator.api.{name}") for name in MODULES)]
+    modules = [orchestrator, *(import_module(f"orchestrator.{name}") for name in MODULES)]
     return [test for module in modules for test in finder.find(module, module.__name__)]
 
 

@@ -178,7 +178,7 @@ def test_a_design_is_made_with_the_step_files_and_values_that_are_given(two_area
     def prepared(case, request, *_):
         raise PreparedError(request.step_size, [one.values for one in request.parameters], dict(request.overrides))
 
-    monkeypatch.setattr("orchestrator.api.design.design_pod", prepared)
+    monkeypatch.setattr("orchestrator.api.studies.design_pod", prepared)
     with pytest.raises(PreparedError) as seen:
         two_area.design("pod_p", values={"gfor.P_0": 0.4}, step="50 us", parameters=file)
     assert seen.value.args == (5e-5, [{"grid.X_L": 0.15}], {"gfor.P_0": 0.4})
@@ -310,7 +310,7 @@ def test_results_show_themselves(modes, run, two_area):
 
 
 def test_what_is_shown_cannot_be_read_as_html(two_area):
-    from orchestrator.api.show import page  # noqa: PLC0415 - inner part
+    from orchestrator.report.notebook import page  # noqa: PLC0415 - inner part
 
     assert "<script>" not in page("<script>", ["<script>"])
 

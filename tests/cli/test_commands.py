@@ -521,7 +521,7 @@ def test_critical_modes_alone(gfor):
     ("arguments", "word"),
     [
         (("--critical", "120"), "between 0 and 90"),
-        (("--critical", "0.1"), "read in percent; write 10 for a damping ratio of 0.1"),
+        (("--critical", "0.1"), "read in percent; write 10 for a ratio of 0.1"),
         (("--critical", "--range", "0:2"), "begins above 0"),
     ],
 )

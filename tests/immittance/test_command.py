@@ -63,7 +63,7 @@ def test_python_gives_what_the_command_prints(tmp_path):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--compensation", "0.32"], "no share in percent"),
+        (["--compensation", "0.32"], "'0.32' is read in percent; write 32"),
         (["--frequency", "50 kV"], "is in kV, but Hz is needed"),
         (["--per-unit", "network"], "give the rated voltage at the cut"),
     ],

@@ -4,10 +4,10 @@ from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
 
-from orchestrator.api.interactions import Interactions
 from orchestrator.cases.case import load_case
 from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.interactions.study import plan_interactions, run_interactions
+from orchestrator.interactions.view import Interactions
 from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore

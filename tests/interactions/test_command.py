@@ -46,7 +46,7 @@ def test_words_files_and_what_is_kept(gfor, results):
         (("--binding", "a.toml"), "--binding is of a --device"),
         (("--scenario", "a", "--scenario", "b"), "interactions are those of one scenario"),
         (("--device", "none.fmu"), "none.fmu"),
-        (("--threshold", "0.05"), "'0.05' is not a share in percent up to 50, such as 5"),
+        (("--threshold", "0.05"), "'0.05' is read in percent; write 5 for a ratio of 0.05"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(options, text, gfor, results):

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.api.interactions import Interactions
 from orchestrator.errors import ErrorKind
 from orchestrator.interactions.judgement import JudgedSystem
 from orchestrator.interactions.point import SharedMode, SystemRecord
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
+from orchestrator.interactions.view import Interactions
 from orchestrator.points.failure import Failure
 from tests.interactions.park import park, studied, swapped, written
 

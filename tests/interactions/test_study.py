@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from orchestrator.api.interactions import Interactions
 from orchestrator.cases.case import load_case
 from orchestrator.errors import CaseError, ErrorKind, InputError
 from orchestrator.interactions.exchange import stand_in_at
@@ -14,6 +13,7 @@ from orchestrator.interactions.point import SystemRecord, compute_system
 from orchestrator.interactions.request import GivenDevice, InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
+from orchestrator.interactions.view import Interactions
 from orchestrator.points.failure import Failure
 from orchestrator.study.modes import compute_modes
 from tests.interactions.park import folder, park, studied, swapped, written

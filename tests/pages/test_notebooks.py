@@ -81,7 +81,7 @@ def test_a_notebook_is_kept_as_a_reader_can_use_it(path):
 def test_every_cell_that_draws_shows_its_picture(tmp_path):
     """Also the second one: the backend of notebooks sets itself up with the first figure."""
     path = tmp_path / "small.ipynb"
-    cells = [nbformat.v4.new_code_cell("from orchestrator.api.show import new_axes\nnew_axes().plot([0, 1]);")]
+    cells = [nbformat.v4.new_code_cell("from orchestrator.report.notebook import new_axes\nnew_axes().plot([0, 1]);")]
     cells += [nbformat.v4.new_code_cell("new_axes().plot([1, 0]);") for _ in range(2)]
     path.write_text(nbformat.writes(nbformat.v4.new_notebook(cells=cells)), encoding="utf-8")
     executed = execute(path, tmp_path)

@@ -120,7 +120,7 @@ def test_no_stages_leave_the_lead_lag_out(design):
         (["--mode", "1-2"], "--mode: the case names no mode '1-2'; it names: electromechanical"),
         (["--damping", "5"], "--damping 5: without the controller the mode has 10.59 % already; ask for more"),
         (["--damping", "120"], "'120' is not a damping in percent between 0 and 90, such as 20"),
-        (["--damping", "0.2"], "'0.2' is read in percent; write 20 for a damping ratio of 0.2, or 0.2% if so"),
+        (["--damping", "0.2"], "'0.2' is read in percent; write 20 for a ratio of 0.2, or 0.2% if so"),
         (["--damping", "20", "--damping-increment", "10"], "both say what is required; give one of them"),
         (["--gain-bounds", "400:200"], "'400:200' are no bounds; write MIN:MAX in pu"),
         (["--gain-bounds", "0:1e6"], "--gain-bounds: 1e+06 is out of range: gfor.pod_p.K takes from 0 to 100000"),

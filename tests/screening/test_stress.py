@@ -11,7 +11,7 @@ from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.stress import by_outage, not_judged
 from orchestrator.screening.study import ScreenedItem, ScreeningResult, plan_screening
 from orchestrator.screening.summary import Summary
-from orchestrator.screening.tables import overview
+from orchestrator.screening.view import overview
 from orchestrator.screening.words import verdict_sentence
 from tests.screening.five_machines import five_machines
 

@@ -12,8 +12,8 @@ from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.study import plan_screening, run_screening
-from orchestrator.screening.summary import Summary, as_json
-from orchestrator.screening.tables import remarks
+from orchestrator.screening.summary import Summary
+from orchestrator.screening.view import as_json, remarks
 from orchestrator.screening.words import growth_outside, verdict_sentence, what_was_counted
 
 

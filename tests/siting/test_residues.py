@@ -120,7 +120,7 @@ def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
         (["infinite_bus"], "[power_flow]"),
         (["two_area_rms", "--scenario", "gfor", "--range", "1.5:1.9"], "no oscillation from 1.5 to 1.9 Hz"),
         (["two_area_rms", "--scenario", "gfor", "--outages", "line_9"], "no unit, line, load or shunt 'line_9'"),
-        (["two_area_rms", "--scenario", "gfor", "--rating", "-5"], "--rating -5: it must be positive"),
+        (["two_area_rms", "--scenario", "gfor", "--rating", "-5"], "--rating: '-5' must be a number above 0"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_sentence(gfor, words, said):

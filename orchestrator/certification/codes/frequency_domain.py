@@ -1,7 +1,6 @@
 """GB: the network-frequency-perturbation plot of a converter, and how stiff a source it is; without a verdict."""
 
 import cmath
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +19,7 @@ from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.report.plot_style import STYLE, colour, save_figure
-from orchestrator.results.storage import save_table
-from orchestrator.safe_files import write_text
+from orchestrator.results.storage import save_json, save_table
 
 FIGURES_CSV, FIGURES_JSON, FIGURES_PNG = "frequency.csv", "frequency.json", "frequency.png"
 POWER = 0.5  # active power at which it is measured [pu]
@@ -134,7 +132,7 @@ def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> li
             row[f"re {name}"], row[f"im {name}"] = float(values[k].real), float(values[k].imag)
         rows.append(row)
     save_table(rows, table)
-    write_text(figures, json.dumps(figures_of_stiffness(found, model, f_n), indent=1) + "\n")
+    save_json(figures_of_stiffness(found, model, f_n), figures)
     _plot(found, asked_stiffness(found, f_n), picture)
     return [table, figures, picture]
 

@@ -1,6 +1,5 @@
 """What failed criteria would take: tables for a terminal, JSON, and a page."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -14,6 +13,7 @@ from orchestrator.certification.margins import margin_text
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import table
 from orchestrator.report.tables import PlainTable, make_table
+from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
 from orchestrator.sensitivities.parameters import Parameter
 
@@ -33,7 +33,7 @@ def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) 
     """Write ``sensitivities.html`` and ``sensitivities.json`` beside the certificate."""
     made = datetime.now(UTC).replace(microsecond=0)
     content = {"made": made.isoformat(), **needs_json(plan, needs)}
-    write_text(folder / NEEDS_JSON, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+    save_json(content, folder / NEEDS_JSON)
     write_text(folder / NEEDS_HTML, _page(plan, needs, made))
     return [folder / NEEDS_HTML, folder / NEEDS_JSON]
 
@@ -67,14 +67,10 @@ def _confirmed_json(c: ConfirmedChange) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def needs_table(need: CriterionNeeds) -> PlainTable:
-    """The table of one criterion for a terminal, without what has no effect."""
-    made = make_table(_title(need), *_COLUMNS)
-    made.add_column("Remark", overflow="fold")
-    for s in need.sensitivities:
-        if not s.idle:
-            made.add_row(*_cells(s))
-    return made
+def needs_table(need: CriterionNeeds, *, whole: bool = False) -> PlainTable:
+    """The table of one criterion; without what has no effect, unless ``whole``."""
+    rows = [_cells(s) for s in need.sensitivities if whole or not s.idle]
+    return make_table(_title(need), *_COLUMNS, rows=rows)
 
 
 def remarks_of(need: CriterionNeeds) -> list[str]:

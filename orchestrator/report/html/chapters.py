@@ -16,6 +16,7 @@ import xarray as xr
 from orchestrator.errors import InputError
 from orchestrator.report.html import studies
 from orchestrator.report.html.elements import damping, table
+from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, read_manifest
 
 _SHOWN, _OPEN, _LONGEST = 8, 4, 110
@@ -227,17 +228,14 @@ def first_page(chapters: Sequence[Chapter]) -> str:
     rows = []
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
-        open_ = "<br>".join(escape(_short(text)) for text in one.not_judged[:_OPEN]) or "nothing that is known of"
+        open_ = (
+            "<br>".join(escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN]) or "nothing that is known of"
+        )
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
         asked = f'{escape(one.question)}<br><span class="soft">{escape(str(one.source))}</span>'
-        rows.append([asked, answer, escape(_short(one.sure, 3 * _LONGEST)), open_ + more])
+        rows.append([asked, answer, escape(short(one.sure, 3 * _LONGEST)), open_ + more])
     return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
-
-
-def _short(text: str, most: int = 0) -> str:
-    most = most or _LONGEST
-    return text if len(text) <= most else f"{text[:most].rsplit(' ', 1)[0]} …"
 
 
 def made(place: Path) -> list[str]:

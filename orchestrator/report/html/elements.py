@@ -54,3 +54,10 @@ def damping(percent: float, least: float = 5.0) -> str:
     """A damping in percent, marked where it is negative or below a limit."""
     text = number(percent, 2)
     return f'<span class="bad">{text}</span>' if percent < least else text
+
+
+def paragraphs(good: bool | None, texts: Sequence[str]) -> str:
+    """Sentences; the first one is the verdict, in the colour of what is good, bad or not known."""
+    shade = {True: "good", False: "bad", None: "soft"}[good]
+    first, *rest = texts
+    return f'<p class="{shade}">{escape(first)}</p>' + "".join(f"<p>{escape(text)}</p>" for text in rest)

@@ -1,15 +1,132 @@
-"""A POD design as JSON, and as a parameter file's values and comments."""
+"""A POD design as Python has it, as JSON, and as a parameter file's values and comments."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import zip_longest
+from pathlib import Path
 from typing import Any
 
-from orchestrator.analysis.modes import Mode, damping_ratio
+from orchestrator.analysis.modes import Mode, damping_percent, damping_ratio
+from orchestrator.asked import path as path_of
+from orchestrator.cases.parameter_files import parameter_file_text
+from orchestrator.errors import InputError
+from orchestrator.late import pd
 from orchestrator.pod_design.closed_loop import Placed
 from orchestrator.pod_design.design import PodDesign
 from orchestrator.pod_design.lead_lag import LeadLag, angle_deg
 from orchestrator.pod_design.margins import Margins
 from orchestrator.pod_design.sheet import LABELS, mode_text, percent, verdict
+from orchestrator.report.notebook import page
+from orchestrator.results.storage import save_json
+from orchestrator.safe_files import write_text
+
+
+class ControllerDesign:
+    """A POD controller, and the closed loop with it. `Case.design` makes it.
+
+    Attributes
+    ----------
+    result
+        Every figure on the way.
+    """
+
+    def __init__(self, result: PodDesign) -> None:
+        self.result = result
+
+    @property
+    def met(self) -> bool:
+        """Whether the closed loop has the required damping, and leaves the other modes alone."""
+        return self.result.met
+
+    @property
+    def parameters(self) -> dict[str, bool | float | str]:
+        """The setting by ``component.variable``: the values of a scenario with this controller."""
+        return parameters_of(self.result)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be borne in mind of the design."""
+        return self.result.warnings
+
+    def table(self) -> pd.DataFrame:
+        """The mode before and after: eigenvalue [1/s, rad/s] and damping ratio, beside the required one."""
+        r = self.result
+        required = 100 * r.required_damping
+        rows = {"without the controller": (r.initial, None), "predicted": (r.predicted, required),
+                "with it": (r.achieved, required)}  # fmt: skip
+        cells = [(value.real, value.imag, damping_percent(value), wanted) for value, wanted in rows.values()]
+        return pd.DataFrame(cells, index=list(rows), columns=["real", "imag", "damping_percent", "required_percent"])
+
+    def as_json(self, parameter_file: str | Path | None = None) -> dict[str, Any]:
+        """The same as ``gfor design --json`` prints, as JSON's types.
+
+        Parameters
+        ----------
+        parameter_file
+            Path of the parameter file, which the command names at the end; left out where None.
+        """
+        named = {} if parameter_file is None else {"parameter_file": str(parameter_file)}
+        return design_json(self.result) | named
+
+    def save(self, path: str | Path, command: str | None = None) -> Path:
+        """Write the parameter file, which ``--parameters`` and `Case.scenario` take, and its JSON for ``gfor report``.
+
+        Parameters
+        ----------
+        path
+            Path of the parameter file; the JSON gets the same path with the suffix ``.json``.
+        command
+            The command that the file names as its origin; by default the call in Python.
+
+        Raises
+        ------
+        InputError
+            If the path is none, or ends in ``.json``: the JSON would take the parameter file's place.
+        ResultsError
+            If a file cannot be written.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> case = gfor.load("two_area")
+        >>> file = case.design("pod_p", margins=False).save("pod_p.toml")
+        >>> case.scenario("gfor", parameters=[file]).values["gfor.pod_p.K"]
+        200.0
+        """
+        if command is None:
+            command = f"gfor.load({self.result.case!r}).design({self.result.request.controller!r}, …) in Python"
+        file = parameter_file_path(path)
+        text = parameter_file_text(self.parameters, provenance(self.result, command))
+        write_text(file, text)
+        save_json(self.as_json(file), file.with_suffix(".json"))
+        return file
+
+    def __repr__(self) -> str:
+        said = "met" if self.met else "not met"
+        return f"<ControllerDesign {self.result.request.controller} for {self.result.case}: requirement {said}>"
+
+    def _repr_html_(self) -> str:
+        setting = [f"{name} = {value}" for name, value in self.parameters.items()]
+        lines = [self.result.stability.sentence(), *(f"warning: {text}" for text in self.warnings), ", ".join(setting)]
+        return page(repr(self).strip("<>"), lines, self.table())
+
+
+def parameter_file_path(given: str | Path, argument: str = "path") -> Path:
+    """The path of a parameter file, beside which the design's JSON finds a place of its own.
+
+    Raises
+    ------
+    InputError
+        If it is none, or ends in ``.json``.
+    """
+    path = path_of(given, argument)
+    if path.suffix.lower() == ".json":
+        raise InputError(
+            f"{argument} = {str(path)!r}; the parameter file is TOML, and the design's JSON is written beside it: "
+            f"name it {path.with_suffix('.toml').name}"
+        )
+    return path
 
 
 def design_json(d: PodDesign) -> dict[str, Any]:

@@ -1,23 +1,17 @@
-"""The oscillations of a record, as Python has them."""
+"""The oscillations of a record as Python has them, and as tables."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from orchestrator.api.show import page
-from orchestrator.api.values import Time, moment
-from orchestrator.late import Late
+from orchestrator.late import pd
 from orchestrator.oscillations.measurements import Measurements
-from orchestrator.oscillations.reading import contest_cases, measurements_of, read_contest
-from orchestrator.oscillations.verdict import Located, locate
+from orchestrator.oscillations.verdict import Located
+from orchestrator.report.notebook import page
+from orchestrator.report.tables import PlainTable, make_table
 
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
-else:
-    pd = Late("pandas")
+_SHOWN = 5
 
 
 class Sources:
@@ -62,30 +56,28 @@ class Sources:
         return page(repr(self).strip("<>"), list(self.remarks), self.table())
 
 
-def sources_of(dataset: xr.Dataset, label: str, start: Time | None, stop: Time | None) -> Sources:
-    """The oscillations of a part of a record.
-
-    Parameters
-    ----------
-    dataset
-        Signals over the time.
-    label
-        Name of the record.
-    start, stop
-        The part [s]; None for its own begin and end.
-    """
-    begin, end = (None if t is None else moment(t, name) for t, name in ((start, "start"), (stop, "stop")))
-    measured = measurements_of(dataset.sel(time=slice(begin, end)), label)
-    return Sources(measured, locate(measured))
+def sources_table(found: Sequence[Sources]) -> PlainTable:
+    columns = ("Record", "f [Hz]", "Kind", "Source", "Begins [s]", "Multiples")
+    table = make_table("", *columns, rows=[row for one in found for row in _rows(one)])
+    table.columns[2].justify = table.columns[3].justify = "left"
+    return table
 
 
-def contest_sources(folder: Path) -> list[Sources]:
-    """`source` of each case of a folder in the form of the 2021 IEEE-NASPI contest.
+def _rows(one: Sources) -> Iterator[Sequence[str]]:
+    for x in one:
+        begin = "before" if x.found.begin is None else f"{x.found.begin:.1f}"
+        multiples = ", ".join(str(order) for order in x.found.harmonics)
+        yield one.label, f"{x.found.frequency:.4f}", str(x.evidence.kind), x.source or "not known", begin, multiples
+    if not len(one):
+        yield one.label, "–", "no oscillation", "–", "–", ""
 
-    Parameters
-    ----------
-    folder
-        A case's folder, or one with the folders of several.
-    """
-    measured = [read_contest(path) for path in contest_cases(folder)]
-    return [Sources(one, locate(one)) for one in measured]
+
+def opinions_table(head: str, one: Located) -> PlainTable:
+    """What each method says of an oscillation."""
+    columns = ("Method", "Applies", "Names", "Places, the largest part first")
+    rows = [
+        (o.method, "yes" if o.applies else "no", o.place or "–",
+         ", ".join(f"{name} {100 * share:.0f} %" for name, share in o.ranking[:_SHOWN]))
+        for o in one.opinions
+    ]  # fmt: skip
+    return make_table(head, *columns, left=4, rows=rows)

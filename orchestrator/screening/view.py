@@ -1,0 +1,361 @@
+"""A screening as Python has it, as tables, as JSON, as files and as a page."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.markup import escape as escape_markup
+
+from orchestrator.late import pd
+from orchestrator.operating_points.item import Status
+from orchestrator.points.study import PointStudy
+from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
+from orchestrator.report.html.document import document
+from orchestrator.report.html.elements import Figures, colour, paragraphs
+from orchestrator.report.notebook import page
+from orchestrator.report.table import Column, ColumnTable, Marked, damping
+from orchestrator.report.tables import eigenvalue_text
+from orchestrator.results.storage import save_json
+from orchestrator.safe_files import made_folder, write_text
+from orchestrator.screening.point import StretchTask
+from orchestrator.screening.stress import OutageRow, by_outage
+from orchestrator.screening.study import ScreenedItem, ScreeningResult, run_screening
+from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration
+from orchestrator.screening.words import verdict_of, verdict_sentence, what_was_counted, where
+
+ITEMS, MODES, SUMMARY, PAGE = "items.csv", "modes.csv", "screening.json", "screening.html"
+
+_SHOWN, _FEW = 4, 6
+_CURVES = 6
+_MOST_MARKS = 4000
+
+
+class Screening:
+    """Critical modes of operating points and outages. `Case.screen` makes it.
+
+    Attributes
+    ----------
+    result
+        All items.
+    summary
+        What they come to.
+    """
+
+    def __init__(self, result: ScreeningResult) -> None:
+        self.result = result
+        self.summary = Summary(result)
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether nothing grows anywhere; None where an item has no verdict and none grows."""
+        return self.summary.stable
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in one sentence."""
+        return verdict_sentence(self.summary)
+
+    def items(self) -> pd.DataFrame:
+        """One row for each operating point with each outage: status, verdict and least damping [%]."""
+        return items_table(self.summary).frame()
+
+    def modes(self) -> pd.DataFrame:
+        """One row for each mode: where it is damped least, and how much there."""
+        return modes_table(self.summary).frame()
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor screen --json`` prints, as JSON's types."""
+        return as_json(self.summary)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``items.csv``, ``modes.csv``, ``screening.json`` and the page ``screening.html`` into a folder."""
+        place = made_folder(Path(folder))
+        items_table(self.summary).save(place / ITEMS)
+        _every_mode(self.summary).save(place / MODES)
+        save_json(self.as_json(), place / SUMMARY)
+        write_text(place / PAGE, _page(self.summary))
+        return [place / name for name in (ITEMS, MODES, SUMMARY, PAGE)]
+
+    def __repr__(self) -> str:
+        return f"<Screening of {self.result.plan.case.name}: {self.verdict}>"
+
+    def _repr_html_(self) -> str:
+        lines = [self.verdict, what_was_counted(self.summary)]
+        return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
+
+
+def _least(item: ScreenedItem) -> ModeAt | None:
+    return ModeAt(item, item.record.critical[0]) if item.record.critical else None
+
+
+def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
+    """Every operating point with every outage."""
+    return ColumnTable("Items", (
+        Column("Point", lambda item: item.point.name, name="point"),
+        Column("Outage", lambda item: item.outage.name, name="outage"),
+        Column("", lambda item: item.point.hours, name="hours"),
+        Column("What", lambda item: str(item.record.status), name="status"),
+        Column("", lambda item: item.record.stable, name="stable"),
+        Column("", lambda item: item.record.counted, name="counted"),
+        Column("", lambda item: None if (one := _least(item)) is None else one.damping, name="least_damping_percent"),
+        Column("", lambda item: None if (one := _least(item)) is None else one.frequency, name="frequency_hz"),
+        Column("", lambda item: "; ".join(filter(None, (item.record.text, *item.record.warnings))), name="why"),
+        Column("Why", lambda item: item.record.text),
+    ), summary.result.items, left=4)  # fmt: skip
+
+
+def _every_mode(summary: Summary) -> ColumnTable[tuple[ModeAt, str]]:
+    """The critical modes of every item, in the items' order, with the names of the modes that they are."""
+    names = {(id(one.item), one.place): mode.name for mode in summary.modes for one in mode.at}
+    rows = [(ModeAt(item, place), names[id(item), place]) for item in summary.result.items
+            for place in item.record.critical]  # fmt: skip
+    return ColumnTable("Modes", (
+        Column("", lambda row: row[0].item.point.name, name="point"),
+        Column("", lambda row: row[0].item.outage.name, name="outage"),
+        Column("", lambda row: row[1], name="mode"),
+        Column("", lambda row: row[0].value.real, name="real"),
+        Column("", lambda row: row[0].value.imag, name="imag"),
+        Column("", lambda row: row[0].frequency, name="frequency_hz"),
+        Column("", lambda row: row[0].damping, name="damping_percent"),
+        Column("", lambda row: " ".join(f"{name}:{share:.3f}" for name, share in row[0].participation(3)),
+               name="participation"),
+        Column("", lambda row: next((f"{n}:{max(abs(p), abs(q)):.4g}" for n, p, q in row[0].ranking(1)), ""),
+               name="converter"),
+    ), rows)  # fmt: skip
+
+
+def verdict(summary: Summary) -> str:
+    """The verdict as rich markup, and what it rests on."""
+    return f"{verdict_of(summary).markup()}\n{escape_markup(what_was_counted(summary))}"
+
+
+def overview(summary: Summary, most: int = 12) -> ColumnTable[OutageRow]:
+    """Outages and points: the least damping of each, by points where these are few, else at the worst one."""
+    plan, rows = summary.result.plan, by_outage(summary)
+    at = {(item.outage.name, item.point.name): item for item in summary.result.items}
+    title = f"Least damping [%] below {100 * plan.wanted.damping:g} %, worst outage first"
+    columns = [Column[OutageRow]("Outage", lambda row: row.name)]
+
+    def at_point(name: str) -> Column[OutageRow]:
+        return Column(name, lambda row: at.get((row.name, name)), _cell)
+
+    if 1 < len(plan.points) <= _FEW:
+        return ColumnTable(title, [*columns, *(at_point(point.name) for point in plan.points)], rows, 1, most, ITEMS)
+    columns += [
+        Column("Worst point", lambda row: (row.worst or row.unjudged[0]).point.name),
+        Column("Mode", lambda row: row.least, _who),
+        Column("Damping [%]", lambda row: row.worst, _cell),
+        Column("Not judged", lambda row: f"{len(row.unjudged)} of {row.points}" if row.unjudged else ""),
+    ]
+    return ColumnTable(title, columns, rows, 3, most, ITEMS)
+
+
+def _who(mode: ModeAt | None) -> str:
+    if mode is None:
+        return ""
+    return f"{mode.frequency:.2f} Hz ({', '.join(name for name, _ in mode.participation(2))})"
+
+
+def _cell(item: ScreenedItem | None) -> str | Marked:
+    """The least damping at an item, or what became of it."""
+    if item is None or item.record.status is not Status.COMPUTED:
+        return "–" if item is None else str(item.record.status)
+    if item.record.stable is False:
+        return Marked("UNSTABLE", "bad")
+    return "more" if (least := _least(item)) is None else damping(least.damping)
+
+
+def modes_table(summary: Summary, most: int = 12, *, whole: bool = False) -> ColumnTable[ScreenedMode]:
+    """Each mode where it is damped least, and the converter whose damping controller moves it most there.
+
+    ``whole``: with eigenvalue and participation, for which a terminal is too narrow.
+    """
+    more: list[Column[ScreenedMode]] = [
+        Column("λ [rad/s]", lambda mode: mode.worst.value, eigenvalue_text),
+        Column("Participation", lambda mode: ", ".join(f"{name} {x:.2f}" for name, x in mode.worst.participation(4))),
+    ]
+
+    def best(mode: ScreenedMode) -> tuple[str, float | None]:
+        return next(((n, max(abs(p), abs(q))) for n, p, q in mode.worst.ranking(1)), ("–", None))
+
+    return ColumnTable("Modes, each where it is damped least", (
+        Column("Mode", lambda mode: mode.name, name="mode"),
+        Column("Point", lambda mode: mode.worst.item.point.name, name="point"),
+        Column("Outage", lambda mode: mode.worst.item.outage.name, name="outage"),
+        Column("", lambda mode: mode.worst.frequency, name="frequency_hz"),
+        Column("Damping [%]", lambda mode: mode.worst.damping, damping, "damping_percent"),
+        Column("Items", lambda mode: len(mode.at), name="items"),
+        *(more if whole else ()),
+        Column("Converter", lambda mode: best(mode)[0]),
+        Column("by gain [rad/s]", lambda mode: best(mode)[1], ".3g"),
+    ), summary.modes, 3, most, MODES)  # fmt: skip
+
+
+def remarks(summary: Summary) -> list[str]:
+    """What was not computed, and what is unusual, counted and named."""
+    texts = []
+    for status, number in summary.counts.items():
+        if status is Status.COMPUTED:
+            continue
+        named = [item for item in summary.failures() if item.record.status is status]
+        texts.append(f"{status}: {number} of {len(summary.result.items)}:")
+        texts += [f"  {where(item)}: {item.record.text}" for item in named[:_SHOWN]]
+        texts += [f"  … and {number - _SHOWN} more, in items.csv"] if number > _SHOWN else []
+    warned = [(text, item) for item in summary.result.items for text in item.record.warnings]
+    kinds, first = Counter(text for text, _ in warned), dict(reversed(warned))
+    texts += [
+        f"at {number} of {len(summary.result.items)}, first at {where(first[text])}: {text}"
+        for text, number in kinds.most_common(_SHOWN)
+    ]
+    if len(kinds) > _SHOWN:
+        texts.append(f"… and {len(kinds) - _SHOWN} more warnings, in items.csv")
+    return texts
+
+
+def as_json(summary: Summary) -> dict[str, Any]:
+    """The summary as JSON's types."""
+    result = summary.result
+    return {
+        "case": result.plan.case.name,
+        "scenario": result.plan.prepared.name,
+        "points": len(result.plan.points),
+        "outages": len(result.plan.outages) - 1,
+        "items": len(result.items),
+        "complete": result.complete,
+        "stable": summary.stable,
+        "counted_at_all_frequencies": summary.counted,
+        "slowest_growth_counted": summary.slowest,
+        "nothing_restores": [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free],
+        "counts": {str(status): number for status, number in summary.counts.items()},
+        "unstable": [_where(item) for item in summary.unstable],
+        "failures": [_where(item) | {"status": str(item.record.status), "why": item.record.text}
+                     for item in summary.failures()],
+        "modes": [
+            {
+                "name": mode.name,
+                "worst": _where(mode.worst.item)
+                | {
+                    "real": mode.worst.value.real,
+                    "imag": mode.worst.value.imag,
+                    "frequency_hz": mode.worst.frequency,
+                    "damping_percent": mode.worst.damping,
+                },
+                "participation": dict(mode.worst.participation()),
+                "converters": [
+                    {"component": name, "residue_p": abs(p), "residue_q": abs(q)}
+                    for name, p, q in mode.worst.ranking()
+                ],
+                "items": len(mode.at),
+                "hours": mode.hours,
+            }
+            for mode in summary.modes
+        ],
+    }  # fmt: skip
+
+
+def _where(item: ScreenedItem) -> dict[str, Any]:
+    return {"point": item.point.name, "outage": item.outage.name, "place": item.point.place}
+
+
+def _page(summary: Summary) -> str:
+    """One file that needs no other: what is worst, when, with which outage, and where a damping controller helps."""
+    plan, figures = summary.result.plan, Figures()
+    content = [("Outages", overview(summary, 20).html())] if len(plan.outages) > 1 else []
+    content += [("Modes", modes_table(summary, 20, whole=True).html())]
+    content += [("Damping and how long", _durations(summary, figures))]
+    if len(plan.points) > 1:
+        content.append(("Damping over the points", _over_points(summary, figures)))
+    content.append(("All critical modes", _plane(summary, figures)))
+    content.append(("Where a damping controller helps", _ranking(summary)))
+    if failed := list(summary.failures()):
+        shown = ColumnTable("Points and outages without modes", items_table(summary).columns, failed, 4, 20, ITEMS)
+        content.append(("Not computed", shown.html()))
+    title = f"{plan.case.table.title or plan.case.name}: screening"
+    kind = f"{plan.prepared.title}, {len(plan.points)} operating points, {len(plan.outages) - 1} outages"
+    findings = paragraphs(summary.stable, [verdict_sentence(summary), what_was_counted(summary)])
+    return document(title, kind, findings, content)
+
+
+def _durations(summary: Summary, figures: Figures) -> str:
+    parts = []
+    for outages, text in ((False, "the intact network"), (True, "the worst outage of each point")):
+        if outages and len(summary.result.plan.outages) < 2:
+            continue
+        curves = []
+        for k, mode in enumerate(_longest(summary)):
+            hours, percent = duration(mode, outages=outages)
+            if len(hours):
+                steps = np.repeat(np.concatenate([[0.0], hours]), 2)[1:-1]
+                curves.append(ChartCurve(mode.name, colour(k + 1), steps, np.repeat(percent, 2)))
+        if curves:
+            key = legend((curve.label, curve.colour) for curve in curves)
+            chart = line_chart(f"Damping and duration, {text}", "Hours with at most this damping", "Damping [%]",
+                               curves, 260)  # fmt: skip
+            picture, _ = figures.add(key + chart, f"For how long each mode is damped by at most so much, {text}.")
+            parts.append(picture)
+    return "".join(parts) or "<p>No critical mode was found.</p>"
+
+
+def _longest(summary: Summary) -> list[ScreenedMode]:
+    """The least damped of those that are there most of the time."""
+    most = max((len(mode.at) for mode in summary.modes), default=0)
+    return [mode for mode in summary.modes if len(mode.at) >= most / 4][:_CURVES]
+
+
+def _over_points(summary: Summary, figures: Figures) -> str:
+    place = {point.name: float(k) for k, point in enumerate(summary.result.plan.points)}
+    curves = []
+    for k, mode in enumerate(_longest(summary)):
+        intact = [one for one in mode.at if not one.item.outage.elements]
+        if len(intact) > 1:
+            at = np.array([place[one.item.point.name] for one in intact])
+            curves.append(ChartCurve(mode.name, colour(k + 1), at, np.array([one.damping for one in intact])))
+    if not curves:
+        return "<p>No critical mode was followed over several points.</p>"
+    key = legend((curve.label, curve.colour) for curve in curves)
+    chart = line_chart("Damping over the points", "Operating point, in the file's order", "Damping [%]", curves, 260)
+    return figures.add(key + chart, "Damping of the modes in the intact network.")[0]
+
+
+def _plane(summary: Summary, figures: Figures) -> str:
+    every = [(k, one) for k, mode in enumerate(summary.modes) for one in mode.at]
+    shown = every if len(every) <= _MOST_MARKS else every[:: len(every) // _MOST_MARKS + 1]
+    marks = [
+        Mark(
+            one.value.real, one.frequency, colour(k + 1),
+            f"{one.item.point.name}, {one.item.outage.name}\n{one.frequency:.3f} Hz, {one.damping:.2f} %",
+            "dot" if one.item.outage.elements else "cross",
+        )
+        for k, one in shown
+    ]  # fmt: skip
+    text = "Critical modes of all points and outages; crosses: the intact network, dots: outages."
+    if len(shown) < len(every):
+        text += f" {len(shown)} of {len(every)} are shown."
+    return figures.add(complex_plane("Critical modes", marks), text)[0]
+
+
+def _ranking(summary: Summary) -> str:
+    parts = [
+        "<p>Size of the residue from a converter's power reference to its own frequency: so far a damping controller "
+        "there moves the eigenvalue by unit gain [pu of its rating by pu of frequency], if its phase is right and its "
+        "gain small.</p>"
+    ]
+    columns: tuple[Column[tuple[str, complex, complex]], ...] = (
+        Column("Converter", lambda row: row[0]),
+        Column("through P [rad/s]", lambda row: abs(row[1]), ".4f"),
+        Column("through Q [rad/s]", lambda row: abs(row[2]), ".4f"),
+    )
+    parts += [
+        ColumnTable(
+            f"{mode.name}, at {mode.worst.item.point.name}, {mode.worst.item.outage.name}", columns, found
+        ).html()
+        for mode in summary.modes[:_CURVES]
+        if (found := mode.worst.ranking())
+    ]
+    return "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"
+
+
+STUDY = PointStudy(run_screening, Screening, StretchTask)

@@ -1,0 +1,177 @@
+"""A sweep as Python has it: the modes over a grid of parameters, as tables, files and pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import InputError
+from orchestrator.late import pd, xr
+from orchestrator.points.study import PointStudy
+from orchestrator.report.notebook import Axes, axes_or_new, page
+from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.results.staging import new_run_id, staged
+from orchestrator.safe_files import made_folder
+from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
+from orchestrator.sweep.point import SweepPointTask
+from orchestrator.sweep.sweep import SweepResult, run_sweep
+
+
+class ParameterSweep:
+    """The modes of scenarios over a grid of parameters. `Case.sweep` makes it.
+
+    Attributes
+    ----------
+    result
+        All points, and the modes followed over them.
+    samples
+        The modes' figures at every point, for tables and plots.
+    limits
+        How far the parameter may go in each scenario, where ``until`` asks for it.
+    """
+
+    def __init__(self, result: SweepResult) -> None:
+        self.result = result
+        self.samples = Samples(result)
+        self.limits = tuple(result.limits)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What failed, was refined or was not recognised, one sentence each."""
+        from orchestrator.sweep import tables  # noqa: PLC0415 - imports Matplotlib, a second
+
+        return tables.remarks(self.samples)
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Everything over scenario, varied parameters and trajectory, as in ``sweep.nc``."""
+        return sweep_dataset(self.samples)
+
+    def __getitem__(self, name: str) -> xr.Dataset:
+        """One mode as it was followed, over scenario and varied parameters; NaN where it is not.
+
+        Parameters
+        ----------
+        name
+            Of the followed mode, as `table` has it under ``mode``.
+
+        Raises
+        ------
+        InputError
+            If no mode was followed under this name, with the names that there are.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> sweep = gfor.load("two_area").sweep({"grid.X_L": [0.1, 0.2]}, ["gfor"])
+        >>> sweep["electromechanical"].damping.dims
+        ('scenario', 'grid.X_L')
+        """
+        data = self.dataset
+        names = data["trajectory_name"].values
+        known = sorted({str(one) for one in names.ravel() if one})
+        if name not in known:
+            raise InputError(f"no mode was followed as {name!r}; the followed modes: {', '.join(known) or 'none'}")
+        found = [
+            data.isel(scenario=[s], trajectory=int(t)).drop_vars(["trajectory", "trajectory_name"])
+            for s, t in zip(*(names == name).nonzero(), strict=True)
+        ]
+        return xr.concat(found, "scenario")
+
+    def table(self) -> pd.DataFrame:
+        """One row for every mode at every point: eigenvalue [1/s, rad/s], frequency, damping ratio, the mode's name.
+
+        ``named`` says whether the case's name falls on the mode there.
+        """
+        rows = [
+            {"scenario": sweep.prepared.name, **self.samples.setting(place), "mode": trajectory.name}
+            | eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"])
+            | {"named": bool(sample["named"])}
+            for sweep in self.result.scenarios
+            for trajectory in sweep.trajectories
+            for place, sample in self.samples.of(sweep, trajectory)
+        ]
+        axes = [axis.key for axis in self.samples.axes]
+        figures = ["real", "imag", "frequency_hz", "damping_percent", "named"]
+        return pd.DataFrame(rows, columns=["scenario", *axes, "mode", *figures])
+
+    def failures(self) -> pd.DataFrame:
+        """The points that have no modes, and why."""
+        rows = [
+            {"scenario": sweep.prepared.name, **self.samples.setting(place), "error": error}
+            for sweep, place, error in self.result.failures()
+        ]
+        return pd.DataFrame(rows, columns=["scenario", *(axis.key for axis in self.samples.axes), "error"])
+
+    def as_json(self) -> dict[str, Any]:
+        """The same as ``gfor sweep --json`` prints, as JSON's types."""
+        return sweep_json(self.samples)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write ``sweep.nc``, ``sweep.csv`` and the plots, as ``gfor sweep`` does.
+
+        Parameters
+        ----------
+        folder
+            Folder for the files; it is made where it is missing.
+
+        Returns
+        -------
+        list of Path
+            Paths of the files.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be made.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> sweep = gfor.load("infinite_bus").sweep(["gfor.P_0=0.4,0.6"], ["dip"], frequencies=(0, 100))
+        >>> [path.name for path in sweep.save("results")][:2]
+        ['sweep.nc', 'sweep.csv']
+        """
+        from orchestrator.sweep.plots import save_sweep_plots  # noqa: PLC0415 - a second to import
+
+        place = made_folder(Path(folder))
+        with staged(place, new_run_id()) as staging:
+            tables = save_sweep(self.samples, staging)
+            plots = save_sweep_plots(self.samples, staging)
+        return [place / name for name in (*tables, *(path.name for path in plots))]
+
+    def plot(self, ax: Axes = None) -> Axes:
+        """The modes in the complex plane; a circle where each begins.
+
+        Parameters
+        ----------
+        ax
+            Matplotlib Axes; by default those of a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        from orchestrator.sweep.plots import draw_trajectories  # noqa: PLC0415 - a second to import
+
+        axes = axes_or_new(ax, 8.0, 6.2)
+        if not draw_trajectories(axes, self.samples):
+            raise InputError("no point of the sweep has a mode that could be drawn; see its failures()")
+        axes.legend(loc="best", fontsize="small")
+        return axes
+
+    def __repr__(self) -> str:
+        names = ", ".join(axis.key for axis in self.samples.axes)
+        return f"<ParameterSweep of {self.result.plan.case.name} over {names}: {self._points()}>"
+
+    def _points(self) -> str:
+        failed = sum(1 for _ in self.result.failures())
+        return f"{self.result.plan.number_of_points} points, {failed} of them without modes"
+
+    def _repr_html_(self) -> str:
+        words = {True: "stable at all points", False: "UNSTABLE at some points", None: "stability not known"}
+        lines = [self._points(), *(f"{s.prepared.title}: {words[s.stable]}" for s in self.result.scenarios)]
+        return page(repr(self).strip("<>").partition(":")[0], lines, self.table())
+
+
+STUDY = PointStudy(run_sweep, ParameterSweep, SweepPointTask, lambda plan: plan.scenarios)
