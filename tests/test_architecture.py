@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.points.key import code_files
+from orchestrator.points.code import code_files, needed_modules
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
@@ -24,6 +24,7 @@ FLOORS = (
     ("orchestrator.results", "orchestrator.points", "orchestrator.interop", "orchestrator.watch"),
     ("orchestrator.report",),
     ("orchestrator.study",),
+    ("orchestrator.operating_points",),
     ("orchestrator.black_box", "orchestrator.oscillations", "orchestrator.pod_design", "orchestrator.sweep"),
     ("orchestrator.screening", "orchestrator.sensitivities", "orchestrator.interactions", "orchestrator.immittance"),
     ("orchestrator.certification", "orchestrator.coordinated_design", "orchestrator.siting"),
@@ -204,34 +205,26 @@ POINTS = ("sweep.point", "screening.point", "coordinated_design.point", "interac
 
 
 def test_every_kept_point_is_known_here():
-    """Whoever gives a `PointStore` results names what computes them in a module ``…point``."""
-    keeping = {
-        name for name, tree in MODULES.items() if {"kept_or_computed", "all_points"} & set(_code_of(tree).split())
-    }
-    graph = imports()
-    computing = {f"orchestrator.{name}" for name in POINTS}
-    for name in keeping - {"orchestrator.points.points"}:
-        assert graph[name] & computing, name
+    """Whoever computes points has the kind of their task in a module ``…point``, whose code names their files."""
+    kinds = {name for name, tree in MODULES.items() for node in tree.body if isinstance(node, ast.ClassDef)
+             if {ast.unparse(base) for base in node.bases} & {"Task", "BenchTask"}}  # fmt: skip
+    assert kinds == {f"orchestrator.{name}" for name in POINTS}
 
 
-def test_kept_points_are_worth_nothing_once_their_code_changes():
+@pytest.mark.parametrize("name", POINTS)
+def test_kept_points_are_worth_nothing_once_their_code_changes(name):
     """What computes a point, and all that this imports, is in the hash that names the point's file."""
-    graph, pending = imports(), [f"orchestrator.{name}" for name in POINTS]
-    needed = set()
+    graph, pending, needed = imports(), [f"orchestrator.{name}"], set()
     while pending:
-        name = pending.pop()
-        if name not in needed and within(name, "orchestrator"):
-            needed.add(name)
-            pending += graph[name]
+        one = pending.pop()
+        if one not in needed and within(one, "orchestrator") and one != "orchestrator":
+            needed.add(one)
+            pending += graph[one]
     assert len(needed) > 50
-    assert {name for name in MODULES if name.startswith("orchestrator.watch.")} <= needed
-    hashed = {file.resolve() for file in code_files()}
-    for name in needed - {"orchestrator"}:
-        module, package = (
-            (ROOT / name.replace(".", "/")).with_suffix(".py"),
-            ROOT / name.replace(".", "/") / "__init__.py",
-        )
-        assert {module, package} & hashed, name
+    assert needed <= needed_modules(f"orchestrator.{name}")
+    assert {(ROOT / n.replace(".", "/")) for n in needed} <= {
+        path for file in code_files() for path in (file.with_suffix(""), file.parent)
+    }
 
 
 def test_there_is_no_cycle():

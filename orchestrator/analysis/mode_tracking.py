@@ -7,7 +7,7 @@ point. A similarity above a half therefore means that most of mode a is in mode 
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,10 +47,6 @@ class ModeSet:
 
         values = np.array([mode.eigenvalue for mode in modes], dtype=complex)
         return cls(values, rows(m.left for m in modes), rows(m.shape for m in modes), names)
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """The arrays of the set, without the names."""
-        return {"eigenvalues": self.eigenvalues, "left": self.left, "right": self.right}
 
     @property
     def frequencies(self) -> NDArray[np.float64]:

@@ -9,7 +9,6 @@ from typing import Any, Unpack
 import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.executors import choose_executor
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
 from orchestrator.api.studies import (
@@ -40,8 +39,8 @@ from orchestrator.interactions.study import plan_interactions
 from orchestrator.interactions.view import STUDY as INTERACTIONS
 from orchestrator.interactions.view import Interactions
 from orchestrator.pod_design.view import ControllerDesign
-from orchestrator.points.point_study import Plan, PointStudy, Result, Shown
 from orchestrator.points.store import POINTS
+from orchestrator.points.study import Plan, PointStudy, Result, Shown, choose_executor
 from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.screening.request import ScreeningRequest
@@ -585,7 +584,7 @@ def _studied(
 ) -> Shown:
     """Plan a study and compute it; a folder that keeps its points is kept from other commands meanwhile."""
     workers, scheduler, tls = where
-    executor = choose_executor(workers, scheduler, (study.worker,), tls)
+    executor = choose_executor(workers, scheduler, study.imports, tls)
     planned = plan()
     question(study.prepared(planned), above=1)
     kept = None if folder is None else _folder(folder)

@@ -1,7 +1,7 @@
 """One point of the study: one reactance of the line, with or without the converter. It can run in another process."""
 
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -11,18 +11,14 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import Mode, find_spectrum
 from orchestrator.analysis.stability import Stability, judge
-from orchestrator.analysis.threads import alone
 from orchestrator.arrays import Numbers
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import Case
 from orchestrator.certification.frequency import bus_frequency
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
-from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.failure import Failure, failure_kept
-from orchestrator.points.key import same_case
-from orchestrator.points.signals import signal_arrays, take_signals
-from orchestrator.points.store import Arrays
+from orchestrator.points.task import Kept, Task, computed
 from orchestrator.study.modes import modes_of, running
 from orchestrator.watch.watch import Watch
 
@@ -34,20 +30,8 @@ CONVERTER = "converter"
 POWER, FREQUENCY = "sg1.p", "bus_2.frequency"
 
 
-@dataclass(frozen=True)
-class CertificatePointTask:
-    """A scenario of the study's case file at one reactance."""
-
-    case: str
-    fingerprint: str
-    scenario: str
-    X_L: float
-    key: str
-    black_box: bool = False
-
-
 @dataclass
-class PointResult:
+class PointResult(Kept):
     X_L: float
     scenario: str
     modes: ModeSet | None = None
@@ -77,40 +61,33 @@ class PointResult:
         """Failed points are not kept: the cause, such as a missing licence, may be gone next time."""
         return self.failure is None
 
-    @classmethod
-    def lost(cls, task: CertificatePointTask, error: WorkerLostError) -> Self:
-        return cls(task.X_L, task.scenario, failure=Failure.lost(error))
 
-    def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
-        header = {name: value for name, value in vars(self).items() if name not in ("modes", "times", "signals")}
-        modes = self.modes.arrays() if self.modes is not None else {}
-        return header | {"names": self.modes and self.modes.names}, {**modes, **signal_arrays(self.times, self.signals)}
+@dataclass(frozen=True)
+class CertificatePointTask(Task):
+    """A scenario of the study's case file at one reactance."""
 
-    @classmethod
-    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """The result that was stored in this form; None if the file has another form."""
-        try:
-            names, (times, signals) = header.pop("names"), take_signals(arrays)
-            modes = None if names is None else ModeSet(**arrays, names=tuple(names))
-            header["warnings"] = tuple(header["warnings"])
-            header["findings"]  # a stored point without findings was not watched, and is computed again
-            return cls(**header, modes=modes, times=times, signals=signals)
-        except (KeyError, TypeError, ValueError):
-            return None
+    record = PointResult
+    X_L: float
+    black_box: bool = False
+
+    def failed(self, failure: Failure) -> PointResult:
+        return PointResult(self.X_L, self.study.scenario, failure=failure)
 
 
 def compute_point(task: CertificatePointTask) -> PointResult:
-    """Steady state, modes and response of one point; a failure becomes part of the result."""
-    case = same_case(task.case, task.fingerprint)
-    result = PointResult(task.X_L, task.scenario)
-    with failure_kept(result), alone():
+    """Steady state, modes and response of one point; a failure leaves what was found before it."""
+    return computed(task, _result)
+
+
+def _result(task: CertificatePointTask, case: Case) -> PointResult:
+    result = PointResult(task.X_L, task.study.scenario)
+    with failure_kept(result):
         _compute(case, task, result)
     return result
 
 
 def _compute(case: Case, task: CertificatePointTask, result: PointResult) -> None:
-    (prepared,) = case.prepare([task.scenario], {"grid.X_L": task.X_L})
+    prepared = task.study.prepare(case, {"grid.X_L": task.X_L})
     watch = Watch(prepared)
     with running(prepared) as master:
         misfits = misfits_of(master)

@@ -1,6 +1,6 @@
 """Points of a damping test, computed anew and compared with what was certified."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,9 @@ from orchestrator.certification.point import CONVERTER, CertificatePointTask, Po
 from orchestrator.certification.request import same_reactance
 from orchestrator.certification.verification import Verification
 from orchestrator.errors import InputError
-from orchestrator.points.executor import Executor, WorkerLostError
-from orchestrator.points.key import fingerprint, key_of, reference_to
+from orchestrator.points.executor import Executor
+from orchestrator.points.points import CountReport, Work, nobody
+from orchestrator.points.task import StudyCase
 
 TOLERANCE = 1e-5
 """Largest difference of a recomputed eigenvalue relative to its size, and of a signal relative to its range. Different
@@ -46,28 +47,19 @@ def chosen_points(content: dict[str, Any], wanted: Sequence[float] = (), *, ever
 
 
 def verify_points(
-    folder: Path,
-    content: dict[str, Any],
-    reactances: Sequence[float],
-    executor: Executor,
-    report: Callable[[int, int], None] = lambda done, total: None,
+    folder: Path, content: dict[str, Any], reactances: Sequence[float], executor: Executor, report: CountReport = nobody
 ) -> Verification:
     """Compute points anew, with and without the converter, and compare them with what was certified."""
     found = Verification()
     case = load_case(folder / CASE)
-    place, mark = reference_to(case), fingerprint(case)
+    study = {name: StudyCase.of(case.prepare([name], {"grid.X_L": reactances[0]})[0]) for name in (WITHOUT, WITH)}
     points = {p["X_L"]: p for p in content["points"]}
-    places = [(points[X_L], scenario) for X_L in reactances for scenario in (WITHOUT, WITH)]
-    tasks = [
-        CertificatePointTask(place, mark, scenario, p["X_L"], key_of({"verify": [mark, scenario, p["X_L"]]}),
-                  bool(content["black_box"]) and scenario == WITH) for p, scenario in places
-    ]  # fmt: skip
+    tasks = [CertificatePointTask(study[scenario], X_L, bool(content["black_box"]) and scenario == WITH)
+             for X_L in reactances for scenario in (WITHOUT, WITH)]  # fmt: skip
     with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
-        for done, (index, outcome) in enumerate(executor.run(compute_point, tasks), start=1):
-            point, scenario = places[index]
-            again = PointResult.lost(tasks[index], outcome) if isinstance(outcome, WorkerLostError) else outcome
-            _compare_point(point, scenario, again, data, str(content["signal"]), found)
-            report(done, len(tasks))
+        for index, again in Work(executor, report=report).each(compute_point, tasks):
+            task = tasks[index]
+            _compare_point(points[task.X_L], task.study.scenario, again, data, str(content["signal"]), found)
     return found
 
 

@@ -16,8 +16,8 @@ from orchestrator.certification.refusal import refusing
 from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
 from orchestrator.points.executor import Executor
-from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import CountReport, all_points
+from orchestrator.points.points import CountReport, Work, nobody
+from orchestrator.points.task import StudyCase
 
 
 @dataclass
@@ -89,7 +89,7 @@ class Certification(Certificate[PointVerdict]):
 
 
 def certify(
-    request: CertificationRequest, executor: Executor, folder: Path, report: CountReport = lambda done, total: None
+    request: CertificationRequest, executor: Executor, folder: Path, report: CountReport = nobody
 ) -> Certification:
     """Compute all points and judge them."""
     request.check()
@@ -105,13 +105,14 @@ def certify(
         laid(trial)
     prepared = laid(folder)
     tasks = tasks_of(prepared, request, controllers)
-    found, stored = all_points(PointResult, compute_point, tasks, executor, folder, report)
-    points = {(task.scenario, task.X_L): point for task, point in zip(tasks, found, strict=True)}
+    work = Work.into(folder, executor, report)
+    found = work.all(compute_point, tasks)
+    points = {(task.study.scenario, task.X_L): point for task, point in zip(tasks, found, strict=True)}
     event, having = prepared[WITH].events[0].time, prepared[WITH]
     verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
     description = having.system.components[CONVERTER].description
     return Certification(
-        request, description, verdicts, controllers, event, having.case.path, having.values, points, stored=stored
+        request, description, verdicts, controllers, event, having.case.path, having.values, points, stored=work.stored
     )
 
 
@@ -130,14 +131,5 @@ def _tasks(
     prepared: PreparedScenario, values: dict[str, Value], reactances: Sequence[float], *, black_box: bool
 ) -> list[CertificatePointTask]:
     # The case file names the binding, if there is one. The binding's effect is part of the scenario's content.
-    content = {
-        "case": BASE.read_text(encoding="utf-8"),
-        **scenario_content(prepared),
-        "overrides": sorted(values.items()),
-        "black box": black_box,
-    }
-    place, mark = reference_to(prepared.case), fingerprint(prepared.case)
-    return [
-        CertificatePointTask(place, mark, prepared.name, X_L, key_of({**content, "X_L": X_L}), black_box)
-        for X_L in reactances
-    ]
+    study = StudyCase.of(prepared, text=BASE.read_text(encoding="utf-8"), overrides=sorted(values.items()))
+    return [CertificatePointTask(study, X_L, black_box) for X_L in reactances]

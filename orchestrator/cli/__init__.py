@@ -168,7 +168,7 @@ def _done(words: Sequence[str]) -> int:
 
 
 def _origin(words: Sequence[str]) -> dict[str, str]:
-    from orchestrator.points.key import code_hash  # noqa: PLC0415 - only where results are written
+    from orchestrator.points.code import code_hash  # noqa: PLC0415 - only where results are written
 
     return {"command": shlex.join(["gfor", *words]), "code": code_hash()}
 

@@ -17,7 +17,7 @@ from orchestrator.cli.verdict import NOT_MET
 from orchestrator.coordinated_design import view, words
 from orchestrator.coordinated_design.study import ALL, PointsDesign, PointsDesignRequest, plan_points_design
 from orchestrator.coordinated_design.verdict import PointsVerdict
-from orchestrator.screening.record import Status
+from orchestrator.operating_points.item import Status
 
 A_DESIGN = "a design is made for one scenario"
 

@@ -3,10 +3,10 @@
 import argparse
 from collections.abc import Sequence
 
-from orchestrator.api import executors
 from orchestrator.asked import read_whole
 from orchestrator.cli.arguments import option
 from orchestrator.errors import InputError
+from orchestrator.points import study
 from orchestrator.points.executor import Executor
 
 
@@ -19,4 +19,4 @@ def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
 def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:
     if options.scheduler is not None and options.workers is not None:
         raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
-    return executors.choose_executor(options.workers, options.scheduler, imports, options.tls)
+    return study.choose_executor(options.workers, options.scheduler, imports, options.tls)

@@ -14,9 +14,9 @@ from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_
 from orchestrator.cli.study import add_study_arguments, folder_of, last_line, present, working_in
 from orchestrator.cli.terminal import make_console, make_errors, print_parts
 from orchestrator.errors import InputError
+from orchestrator.operating_points.item import Status
 from orchestrator.points.store import POINTS
 from orchestrator.safe_files import made_folder
-from orchestrator.screening.record import Status
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import Shard, plan_screening
 from orchestrator.screening.summary import Summary

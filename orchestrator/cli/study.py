@@ -15,7 +15,7 @@ from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, print_questions
 from orchestrator.cli.verdict import add_verdict_argument
-from orchestrator.points.point_study import Plan, PointStudy, Result, Shown
+from orchestrator.points.study import Plan, PointStudy, Result, Shown
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
@@ -44,7 +44,7 @@ def working_in(
 
     Gives the plan and what computes it.
     """
-    executor, progress = choose_executor(options, (study.worker,)), Progressing(folder)
+    executor, progress = choose_executor(options, study.imports), Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on):
         planned = plan()
         print_questions(study.prepared(planned), as_json=options.json)

@@ -1,58 +1,31 @@
-"""One operating point with its outage for a design: its whole spectrum, its modes, and its open POD loops.
-
-Everything here can be sent to another process or another machine.
-"""
+"""One operating point with its outage for a design: its whole spectrum, its modes, and its open POD loops."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any, Self
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from orchestrator.analysis.apart import standing_apart
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.linearization import Blocks, continuous
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, ZERO, Mode, find_spectrum, index_of_rightmost
 from orchestrator.analysis.slope_linearization import gives_slopes
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.analysis.threads import alone as on_one_thread
 from orchestrator.arrays import Complex
 from orchestrator.cases.case import Case
-from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.coordinated_design.measured_loops import measure
 from orchestrator.coordinated_design.open_loops import OpenLoops, PodPlace
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError
-from orchestrator.points.executor import WorkerLostError
-from orchestrator.points.key import same_case
-from orchestrator.points.store import Arrays
-from orchestrator.screening.bench import ScreeningBench
-from orchestrator.screening.point import without_references
-from orchestrator.screening.preparation import ACCEPT, ItemPreparation, failure
-from orchestrator.screening.record import Item, Status
+from orchestrator.operating_points.bench import PointBench
+from orchestrator.operating_points.item import Item, Status
+from orchestrator.operating_points.preparation import ACCEPT, ItemPreparation, failure
+from orchestrator.points.codec import plain
+from orchestrator.points.failure import Failure
+from orchestrator.points.task import Kept, Task, computed
 from orchestrator.study.naming import named_modes
 
 _MOST_STATES = 2500  # all eigenvalues of larger systems take too long for a design
-_SHOWN = 3
-
-
-@dataclass(frozen=True)
-class PointsTask:
-    """Operating points with outages that are computed together.
-
-    ``case``, ``fingerprint``, ``scenario``, ``layers``, ``step_size``, ``trust_fmus``: As in
-    `orchestrator.screening.point.StretchTask`.
-    """
-
-    case: str
-    fingerprint: str
-    scenario: str
-    layers: tuple[ParameterFile, ...]
-    step_size: float | None
-    items: tuple[Item, ...]
-    places: tuple[PodPlace, ...]  # loops that are measured; none where only the modes are asked for
-    key: str
-    trust_fmus: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,11 +57,8 @@ class PointModes:
         return int((np.abs(self.values) <= ZERO).sum()) - self.clocks
 
 
-_LOOP_ARRAYS = ("A", "U", "V", "D", "right", "left", "rest")
-
-
 @dataclass(frozen=True)
-class PointsRecord:
+class PointsRecord(Kept):
     """The points of a task, in its order."""
 
     points: tuple[PointModes, ...]
@@ -97,54 +67,37 @@ class PointsRecord:
     def lasting(self) -> bool:
         return all(point.lasting for point in self.points)
 
-    @classmethod
-    def lost(cls, task: Any, error: WorkerLostError) -> Self:
-        return cls(tuple(PointModes(Status.LOST, str(error), lasting=False) for _ in task.items))
 
-    def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
-        plain = [f.name for f in fields(PointModes) if f.name not in ("values", "loops")]
-        entries, arrays = [], Arrays()
-        for k, point in enumerate(self.points):
-            entry = {name: getattr(point, name) for name in plain}
-            arrays[f"values{k}"] = point.values
-            if point.loops is not None:
-                loops = point.loops
-                entry["loops"] = {"places": [place.name for place in loops.places], "names": list(loops.names)}
-                known = {name: getattr(loops, name) for name in _LOOP_ARRAYS}
-                arrays |= {f"{name}{k}": array for name, array in known.items() if array is not None}
-            entries.append(entry)
-        return {"points": entries}, arrays
+@dataclass(frozen=True)
+class PointsTask(Task):
+    """Operating points with outages that are computed together."""
 
-    @classmethod
-    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """The record that was stored in this form; None if the file has another form."""
-        try:
-            return cls(tuple(_restored(entry, arrays, k) for k, entry in enumerate(header["points"])))
-        except (KeyError, TypeError, ValueError):
-            return None
+    record = PointsRecord
+    items: tuple[Item, ...]
+    places: tuple[PodPlace, ...]  # loops that are measured; none where only the modes are asked for
 
+    def content(self) -> Any:
+        """Where the points stand in their file does not count."""
+        said = [[item.values, item.out, item.lost] for item in self.items]
+        return plain([said, self.places])
 
-def _restored(entry: dict[str, Any], arrays: Arrays, k: int) -> PointModes:
-    tuples = {name: tuple(entry[name]) for name in ("warnings", "swinging", "who")}
-    said, loops = entry.pop("loops", None), None
-    if said is not None:
-        own = {name: arrays.get(f"{name}{k}") for name in _LOOP_ARRAYS}
-        places = tuple(PodPlace.of(name) for name in said["places"])
-        loops = OpenLoops(**own, places=places, names=tuple(said["names"]))  # type: ignore[arg-type]
-    rest = entry | tuples | {"status": Status(entry["status"])}
-    return PointModes(**rest, values=arrays[f"values{k}"], loops=loops)
+    def failed(self, failure: Failure) -> PointsRecord:
+        one = PointModes(Status.of(failure), failure.text, lasting=failure.lasting)
+        return PointsRecord((one,) * len(self.items))
 
 
 def compute_points(task: PointsTask) -> PointsRecord:
     """Compute all points of a task; failures become records as well."""
-    case = same_case(task.case, task.fingerprint, task.trust_fmus)
-    with on_one_thread(), ScreeningBench() as bench:
-        preparation = ItemPreparation(case, task.scenario, task.layers, task.step_size)
+    return computed(task, _of_task)
+
+
+def _of_task(task: PointsTask, case: Case) -> PointsRecord:
+    with PointBench() as bench:
+        preparation = ItemPreparation(case, task.study.scenario, task.study.layers, task.study.step_size)
         return PointsRecord(tuple(_points(task, case, preparation, bench)))
 
 
-def _points(task: PointsTask, case: Case, preparation: ItemPreparation, bench: ScreeningBench) -> Iterator[PointModes]:
+def _points(task: PointsTask, case: Case, preparation: ItemPreparation, bench: PointBench) -> Iterator[PointModes]:
     for item in task.items:
         warnings: tuple[str, ...] = ()
         try:
@@ -158,7 +111,7 @@ def _points(task: PointsTask, case: Case, preparation: ItemPreparation, bench: S
 
 
 def _at(
-    case: Case, bench: ScreeningBench, master: Master, places: Sequence[PodPlace], warnings: tuple[str, ...]
+    case: Case, bench: PointBench, master: Master, places: Sequence[PodPlace], warnings: tuple[str, ...]
 ) -> PointModes:
     """The modes of a running system, and its loops."""
     find_operating_point(master, accept=ACCEPT)
@@ -168,18 +121,13 @@ def _at(
             f"components {', '.join(silent[:3])} do not give their derivatives; a design over operating points needs "
             "them of all FMUs"
         )
-    known = {name: without_references(bench.linearized(name)) for name in master.components}
-    blocks = Blocks(master, known=known, without_step=True)
-    model = continuous(blocks)
+    linear = bench.linear_model()
+    model, blocks, warnings = linear.model, linear.blocks, (*warnings, *linear.doubts)
     if len(model.names) > _MOST_STATES:
         raise AnalysisError(f"the system has {len(model.names)} states; a design needs all eigenvalues, of at most "
                             f"{_MOST_STATES}")  # fmt: skip
-    doubtful = [f"{n}: {', '.join(c.doubtful[:_SHOWN])}" for n, c in known.items() if c.doubtful]
-    if doubtful:
-        text = f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:_SHOWN])}"
-        warnings = (*warnings, text)
     loops = measure(master, model, blocks, places) if places else None
-    found = _modes(case, model, loops, warnings, doubtful=bool(doubtful))
+    found = _modes(case, model, loops, warnings, doubtful=bool(linear.doubts))
     return replace(found, warnings=(*warnings, *standing_apart(master, model, found.zeros)))
 
 

@@ -1,7 +1,5 @@
 """A design over operating points and outages: open loops of all points, the search, and all modes computed anew."""
 
-import hashlib
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -20,22 +18,17 @@ from orchestrator.cases.schema import Value
 from orchestrator.coordinated_design.following import with_followed_names
 from orchestrator.coordinated_design.objective import Aim, RatedPoint, worth_of_all
 from orchestrator.coordinated_design.open_loops import PodPlace
-from orchestrator.coordinated_design.point import PointModes, PointsRecord, PointsTask, compute_points
+from orchestrator.coordinated_design.point import PointModes, PointsTask, compute_points
 from orchestrator.coordinated_design.ranking import RankedConverter, best_first, ranked
 from orchestrator.coordinated_design.search import SettingSearch, Tried
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict, judged, least_of
 from orchestrator.errors import AnalysisError, InputError
+from orchestrator.operating_points.plan import OperatingPoints, read_operating_points
 from orchestrator.pod_design.closed_loop import PodSetting, check_tunable
 from orchestrator.pod_design.target import check_range, find_target, with_controller
-from orchestrator.points.executor import Executor
-from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import CountReport, kept_or_computed
-from orchestrator.points.store import PointStore
-from orchestrator.screening.outages import Outage
-from orchestrator.screening.points_file import OperatingCase
-from orchestrator.screening.record import Item
-from orchestrator.screening.study import plan_screening
+from orchestrator.points.points import Work, nobody
+from orchestrator.points.task import StudyCase
 from orchestrator.study.naming import modes_named
 
 ALL = "all"  # stands for all electromechanical modes
@@ -73,14 +66,15 @@ class PointsDesignRequest:
 class PointsDesignPlan:
     request: PointsDesignRequest
     case: Case
-    prepared: PreparedScenario
+    read: OperatingPoints
     groups: tuple[PodGroup, ...]
     candidates: tuple[PodPlace, ...]
-    points: tuple[OperatingCase, ...]
-    outages: tuple[Outage, ...]
-    items: tuple[Item, ...]
     off: Mapping[str, Value]
     aim: Aim
+
+    @property
+    def prepared(self) -> PreparedScenario:
+        return self.read.prepared
 
     @property
     def layers(self) -> tuple[ParameterFile, ...]:
@@ -95,7 +89,7 @@ def plan_points_design(
     """Check a design over operating points, and build the FMUs that it needs.
 
     ``points``: CSV file with the operating points, as `gfor screen` takes it.
-    ``outages``: as `orchestrator.screening.outages.read_outages` takes them.
+    ``outages``: as `orchestrator.operating_points.outages.read_outages` takes them.
     """
     groups = _groups(case, request)
     known = [table.name for table in case.table.analysis.modes]
@@ -109,22 +103,20 @@ def plan_points_design(
         off |= {f"{place.name}.enabled": False, f"{place.name}.T_S1": 0.0, f"{place.name}.T_S2": 0.0}
     off |= {f"{place.name}.N_S": float(group.stages) for group in groups for place in group.places}
     overrides = {key: value for key, value in request.overrides.items() if key not in off} | off
-    screened = plan_screening(case, points, outages, scenario, overrides, request.step_size, None, request.parameters)
-    plans = screened.prepared.system.components
+    read = read_operating_points(case, points, outages, scenario, overrides, request.step_size, request.parameters)
+    plans = read.prepared.system.components
     for group in groups:
         for bound in request.gain_bounds:
             check_range(plans, group.components, f"{group.controller}.K", bound, "--gain-bounds")
     for place in candidates:
         check_tunable(place.component, plans[place.component].description, place.controller)
-    items = tuple(item for task in screened.tasks for item in task.items)
-    clash = {key for item in items for key in item.values} & {*off, *(f"{p.name}.K" for p in candidates)}
+    clash = {key for item in read.items for key in item.values} & {*off, *(f"{p.name}.K" for p in candidates)}
     if clash:
         raise InputError(f"{points}: the column for {min(clash)} sets what is to be designed; leave it out")
     naming = partial(naming_of, case) if request.modes else None
     aim = Aim(request.modes, request.least_damping, naming)
-    return PointsDesignPlan(case=case, request=request, prepared=screened.prepared, groups=groups,
-                            candidates=candidates, points=screened.points, outages=screened.outages, items=items,
-                            off=off, aim=aim)  # fmt: skip
+    return PointsDesignPlan(case=case, request=request, read=read, groups=groups, candidates=candidates, off=off,
+                            aim=aim)  # fmt: skip
 
 
 def naming_of(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -> Mapping[str, Mode]:
@@ -194,19 +186,15 @@ class PointsDesign:
 
 
 def design_over_points(
-    plan: PointsDesignPlan,
-    executor: Executor,
-    store: PointStore,
-    report: CountReport = lambda done, total: None,
-    stage: Callable[[str], None] = lambda text: None,
+    plan: PointsDesignPlan, work: Work, stage: Callable[[str], None] = lambda text: None
 ) -> PointsDesign:
     """Find the settings, and compute all modes anew with them.
 
     ``plan``: as `plan_points_design` gives it.
-    ``report``: called with the numbers of points done and in all, first without and then with the controllers.
+    ``work``: counts the points first without and then with the controllers.
     """
     stage("operating points without the controllers")
-    before = modes_at(plan, plan.off, plan.candidates, executor, store, lambda n, of: report(n, 2 * of))
+    before = modes_at(plan, plan.off, plan.candidates, replace(work, report=lambda n, of: work.report(n, 2 * of)))
     usable = [k for k, point in enumerate(before) if point.loops is not None]
     if not usable:
         raise AnalysisError(f"no operating point has modes, so nothing can be designed; the first: {before[0].text}")
@@ -227,7 +215,8 @@ def design_over_points(
         found = search.with_least_gain(found, wanted + _SPARE)
     settings = tuple(space.group_settings(found.x))
     stage("operating points with the controllers")
-    after = modes_at(plan, values_of(plan.groups, settings), (), executor, store, lambda n, of: report(of + n, 2 * of))
+    then = replace(work, report=lambda n, of: work.report(of + n, 2 * of))
+    after = modes_at(plan, values_of(plan.groups, settings), (), then)
     after = with_followed_names(plan.aim.names, before, after, space.setting(found.x))
     stage("ranking")
     every = dict.fromkeys(plan.candidates, largest)
@@ -235,14 +224,11 @@ def design_over_points(
     places = [place for group in plan.groups for place in group.places]
     designed = (places[0], settings[0]) if len(places) == 1 and not reached else None  # the least gain is not the best
     alone = ranked(plan.candidates, _stages(plan), alike, largest, frequency, plan.request.ranked, designed)
-    ranking = best_first(
-        [
-            _confirmed(plan, one, before, after if designed and one.place == designed[0] else None, executor, store)
-            for one in alone
-        ]
-    )
+    known = {designed[0]: after} if designed else {}
+    quietly = replace(work, report=nobody)
+    ranking = best_first([_confirmed(plan, one, before, known.get(one.place), quietly) for one in alone])
     predicted = {point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated}
-    where = [(plan.points[item.point], plan.outages[item.outage]) for item in plan.items]
+    where = [plan.read.of(item) for item in plan.read.items]
     points = tuple(judged(where, before, after, plan.aim, predicted))
     return PointsDesign(plan, frequency, settings, found, points, ranking, search.evaluations, compared)
 
@@ -252,8 +238,7 @@ def _confirmed(
     one: RankedConverter,
     before: Sequence[PointModes],
     known: Sequence[PointModes] | None,
-    executor: Executor,
-    store: PointStore,
+    work: Work,
 ) -> RankedConverter:
     """A ranked converter with the least damping that its setting gives where all modes are computed anew."""
     if one.setting is None:
@@ -261,7 +246,7 @@ def _confirmed(
     group = PodGroup(one.place.controller, (one.place.component,), (one.place.component,), one.stages)
     values = {**plan.off, **values_of([group], [one.setting])}
     points = known or with_followed_names(
-        plan.aim.names, before, modes_at(plan, values, (), executor, store), {one.place: one.setting}
+        plan.aim.names, before, modes_at(plan, values, (), work), {one.place: one.setting}
     )
     return replace(one, worst=least_of(points, plan.aim))
 
@@ -301,41 +286,14 @@ def values_of(groups: Sequence[PodGroup], settings: Sequence[PodSetting]) -> dic
 
 
 def modes_at(
-    plan: PointsDesignPlan,
-    values: Mapping[str, Value],
-    places: Sequence[PodPlace],
-    executor: Executor,
-    store: PointStore,
-    report: CountReport = lambda done, total: None,
+    plan: PointsDesignPlan, values: Mapping[str, Value], places: Sequence[PodPlace], work: Work
 ) -> list[PointModes]:
     """The modes of all operating points and outages with some values, from the power flow on.
 
     ``values``: by ``component.variable``; they go before all layers.
     ``places``: loops that are measured as well.
-    ``executor`` and ``store``: where the points are computed, and what keeps them.
     """
-    layers = (*plan.layers, OptionValues.of(values))
-    content = {
-        "design over points": plan.case.text,
-        **scenario_content(plan.prepared),
-        "layers": [list(layer.values.items()) for layer in layers],
-        "step": plan.request.step_size,
-        "places": [place.name for place in places],
-    }
-    common = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-    reference, mark = reference_to(plan.case), fingerprint(plan.case)
-    tasks = []
-    for first in range(0, len(plan.items), TOGETHER):
-        part = plan.items[first : first + TOGETHER]
-        said = [[sorted(item.values.items()), list(item.out)] for item in part]
-        tasks.append(PointsTask(reference, mark, plan.prepared.name, layers, plan.request.step_size, part,
-                                tuple(places), key_of({"points": common, "items": said}),
-                                plan.case.trust_fmus))  # fmt: skip
-
-    def count(done: int, total: int) -> None:
-        report(round(len(plan.items) * done / max(1, total)), len(plan.items))
-
-    found: dict[int, PointsRecord] = {}
-    for index, record, _ in kept_or_computed(PointsRecord, compute_points, tasks, executor, store, count):
-        found[index] = record
-    return [point for index in range(len(tasks)) for point in found[index].points]
+    study = StudyCase.of(plan.prepared, (*plan.layers, OptionValues.of(values)), plan.request.step_size)
+    parts = [plan.read.items[k : k + TOGETHER] for k in range(0, len(plan.read.items), TOGETHER)]
+    tasks = [PointsTask(study, part, tuple(places)) for part in parts]
+    return [point for record in work.all(compute_points, tasks, list(map(len, parts))) for point in record.points]

@@ -8,8 +8,8 @@ import numpy as np
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.coordinated_design.objective import UNMOVED, Aim, Watched, Worth, floors_of, growth, split, worth_of
 from orchestrator.coordinated_design.point import PointModes
-from orchestrator.screening.outages import Outage
-from orchestrator.screening.points_file import OperatingCase
+from orchestrator.operating_points.outages import Outage
+from orchestrator.operating_points.points_file import OperatingCase
 
 ASTRAY = 1e-3
 """From this difference of damping ratios on, the search's linear models and the modes computed anew disagree."""

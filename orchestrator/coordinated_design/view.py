@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.parameter_files import parameter_file_text
+from orchestrator.coordinated_design.point import PointsTask
 from orchestrator.coordinated_design.ranking import RankedConverter
 from orchestrator.coordinated_design.study import PointsDesign, design_over_points, values_of
 from orchestrator.coordinated_design.verdict import JudgedPoint, PlacedMode, PointsVerdict
@@ -15,7 +16,7 @@ from orchestrator.coordinated_design.words import verdict_sentence, what_it_rest
 from orchestrator.late import pd
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.view import parameter_file_path
-from orchestrator.points.point_study import PointStudy
+from orchestrator.points.study import PointStudy
 from orchestrator.report.notebook import page
 from orchestrator.report.table import Column, ColumnTable
 from orchestrator.report.tables import PlainTable, make_table
@@ -121,8 +122,8 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "gain_bounds": list(request.gain_bounds),
         "worst_damping_ratio": {"before": verdict.worst_before, "after": verdict.worst},
         "limiting": None if limiting is None else _where(limiting) | {"mode": _mode(limiting.target)},
-        "points": len(plan.points),
-        "outages": len(plan.outages) - 1,
+        "points": len(plan.read.points),
+        "outages": len(plan.read.outages) - 1,
         "items": len(verdict.points),
         "failed": [_where(point) | {"why": point.why_not} for point in verdict.failed],
         "unstable": [_where(point) for point in verdict.unstable],
@@ -274,4 +275,4 @@ def provenance(design: PointsDesign, command: str) -> list[str]:
     ]
 
 
-STUDY = PointStudy(design_over_points, CoordinatedDesign, "orchestrator.coordinated_design.worker")
+STUDY = PointStudy(design_over_points, CoordinatedDesign, PointsTask)

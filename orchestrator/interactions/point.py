@@ -1,48 +1,19 @@
-"""One system of a study of interactions: its task, and its modes with the participation of every component.
-
-Everything here can be sent to another process or another machine.
-"""
+"""One system of a study of interactions: its task, and its modes with the participation of every component."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 from orchestrator.analysis.linear_model import IDENTIFIED
 from orchestrator.analysis.modes import Mode, damping_percent
-from orchestrator.analysis.threads import alone
 from orchestrator.black_box.coupled_modes import modes_with_boxes
 from orchestrator.cases.case import Case
-from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import ComponentTable
 from orchestrator.interactions.exchange import exchanged_case, require_same_flow
-from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.failure import Failure
-from orchestrator.points.key import same_case
-from orchestrator.points.store import Arrays
+from orchestrator.points.task import Kept, Task, computed
 from orchestrator.study.modes import ModesResult, compute_modes, running
-
-
-@dataclass(frozen=True)
-class SystemTask:
-    """A scenario with the devices of one system.
-
-    ``case``, ``fingerprint``, ``scenario``, ``layers``, ``step_size``, ``frequency_range``, ``trust_fmus``: As in
-    `orchestrator.sweep.point.SweepPointTask`.
-    """
-
-    case: str
-    fingerprint: str
-    scenario: str
-    layers: tuple[ParameterFile, ...]
-    step_size: float | None
-    frequency_range: tuple[float, float]
-    # tables of the devices that are other than the case's, by component, as their keys and values.
-    exchanged: dict[str, dict[str, Any]]
-    voltages: dict[str, tuple[float, float]]  # real and imaginary part [pu] of every bus voltage of the power flow
-    black_box: bool  # whether components that hide their states are identified
-    key: str  # name of the point's file
-    trust_fmus: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,7 +44,7 @@ class SharedMode:
 
 
 @dataclass(frozen=True)
-class SystemRecord:
+class SystemRecord(Kept):
     modes: tuple[SharedMode, ...] = ()  # oscillations of the range, least damped first
     # the mode that grows fastest, at any frequency; None where nothing is known to grow
     growing: SharedMode | None = None
@@ -88,50 +59,29 @@ class SystemRecord:
     failure: Failure | None = None  # why there are no modes; None where there are
 
     @property
-    def error(self) -> str | None:
-        """The message of the failure."""
-        return None if self.failure is None else self.failure.text
-
-    @property
-    def lasting(self) -> bool:
-        return self.failure is None or self.failure.lasting
-
-    @property
     def stable(self) -> bool | None:
         """The verdict; None where it is not known."""
         found: bool | None = self.stability.get("stable")
         return found
 
-    @classmethod
-    def lost(cls, _: SystemTask, error: WorkerLostError) -> Self:
-        return cls(failure=Failure.lost(error))
 
-    def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header for a `PointStore`; there are no arrays."""
-        return asdict(self), {}
+@dataclass(frozen=True)
+class SystemTask(Task):
+    """A scenario with the devices of one system."""
 
-    @classmethod
-    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """The record that was stored in this form; None if the file has another form."""
-        try:
-            growing = header["growing"]
-            lists = {name: tuple(header[name]) for name in ("warnings", "identified")}
-            modes = tuple(SharedMode(**mode) for mode in header["modes"])
-            own = lists | {"modes": modes, "growing": None if growing is None else SharedMode(**growing),
-                           "failure": Failure.restored(header["failure"])}  # fmt: skip
-            return None if arrays else cls(**header | own)
-        except (KeyError, TypeError, ValueError):
-            return None
+    record = SystemRecord
+    frequency_range: tuple[float, float]  # of the modes [Hz]
+    # tables of the devices that are other than the case's, by component, as their keys and values.
+    exchanged: dict[str, dict[str, Any]]
+    files: dict[str, list[str]]  # what stands for the files of these devices, by component
+    black_box: bool  # whether components that hide their states are identified
+    # real and imaginary part [pu] of every bus voltage of the power flow
+    voltages: dict[str, tuple[float, float]] = field(compare=False)
 
 
 def compute_system(task: SystemTask) -> SystemRecord:
-    """Prepare, compare the power flow, find the modes; a failure becomes a record as well."""
-    case = same_case(task.case, task.fingerprint, task.trust_fmus)
-    with alone():
-        try:
-            return _record(_modes(case, task))
-        except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other systems
-            return SystemRecord(failure=Failure.of(error))
+    """Prepare, compare the power flow, find the modes."""
+    return computed(task, lambda task, case: _record(_modes(case, task)))
 
 
 def tables_of(exchanged: Mapping[str, Mapping[str, Any]]) -> dict[str, ComponentTable]:
@@ -141,7 +91,7 @@ def tables_of(exchanged: Mapping[str, Mapping[str, Any]]) -> dict[str, Component
 
 def _modes(case: Case, task: SystemTask) -> ModesResult:
     changed = exchanged_case(case, tables_of(task.exchanged))
-    (prepared,) = changed.prepare([task.scenario], {}, task.step_size, None, task.layers)
+    prepared = task.study.prepare(changed, {})
     require_same_flow({bus: complex(*parts) for bus, parts in task.voltages.items()}, prepared)
     if not task.black_box:
         return compute_modes(prepared, task.frequency_range)

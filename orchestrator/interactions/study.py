@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from orchestrator.cases.case import Case
@@ -15,10 +16,9 @@ from orchestrator.interactions.places import Place, groups_of, places_of, vendor
 from orchestrator.interactions.point import SystemRecord, SystemTask, compute_system
 from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.interactions.systems import Exchanged, Kind, SystemName, assignments, systems_of_vendors
-from orchestrator.points.executor import Executor
-from orchestrator.points.key import component_content, fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import CountReport, kept_or_computed
-from orchestrator.points.store import PointStore
+from orchestrator.points.key import component_content
+from orchestrator.points.points import Work
+from orchestrator.points.task import StudyCase
 
 Placed = Mapping[str, tuple[ComponentTable, Any]]
 
@@ -48,24 +48,16 @@ class InteractionsPlan:
             return frozenset(self.places)
         return frozenset(self.places) - frozenset(self.systems[name])
 
+    @cached_property
+    def study(self) -> StudyCase:
+        """What all systems have in common."""
+        return StudyCase.of(self.prepared, self.layers, self.step_size)
+
     def task(self, exchanged: Exchanged) -> SystemTask:
         tables = {name: table.model_dump(exclude_defaults=True) for name, table in exchanged.items()}
-        content = {
-            "case": self.case.text,
-            **scenario_content(self.prepared),
-            "layers": [list(layer.values.items()) for layer in self.layers],
-            "step": self.step_size,
-            "range": list(self.request.frequency_range),
-            "exchanged": tables,
-            "files": {name: self.files[_content_name(table)] for name, table in exchanged.items()},
-            "black_box": self.request.black_box,
-        }
+        files = {name: self.files[_content_name(table)] for name, table in exchanged.items()}
         voltages = {bus: (v.real, v.imag) for bus, v in voltages_of(self.prepared.power_flow).items()}
-        return SystemTask(
-            reference_to(self.case), fingerprint(self.case), self.prepared.name, self.layers, self.step_size,
-            self.request.frequency_range, tables, voltages, self.request.black_box, key_of(content),
-            self.case.trust_fmus,
-        )  # fmt: skip
+        return SystemTask(self.study, self.request.frequency_range, tables, files, self.request.black_box, voltages)
 
 
 @dataclass
@@ -118,27 +110,16 @@ def plan_interactions(
     )
 
 
-def run_interactions(
-    plan: InteractionsPlan, executor: Executor, store: PointStore, report: CountReport = lambda done, total: None
-) -> InteractionsResult:
+def run_interactions(plan: InteractionsPlan, work: Work) -> InteractionsResult:
     """Compute the systems that are not stored yet; systems of the same devices are computed once.
 
     ``plan``: A plan that `plan_interactions` has checked.
     """
-    result = InteractionsResult(plan)
-    tasks: dict[str, SystemTask] = {}
-    named: dict[str, list[SystemName]] = {}
-    for name, exchanged in plan.systems.items():
-        task = plan.task(exchanged)
-        tasks[task.key] = task
-        named.setdefault(task.key, []).append(name)
-    wanted, found = list(tasks.values()), dict[SystemName, SystemRecord]()
-    for index, record, stored in kept_or_computed(SystemRecord, compute_system, wanted, executor, store, report):
-        found |= dict.fromkeys(named[wanted[index].key], record)
-        result.stored += stored
-        result.computed += not stored
-    result.records = {name: found[name] for name in plan.systems}
-    return result
+    tasks = {name: plan.task(exchanged) for name, exchanged in plan.systems.items()}
+    wanted = {task.key: task for task in tasks.values()}
+    found = dict(zip(wanted, work.all(compute_system, list(wanted.values())), strict=True))
+    records = {name: found[task.key] for name, task in tasks.items()}
+    return InteractionsResult(plan, records, work.computed, work.stored)
 
 
 def _scenario(case: Case, wanted: str | None) -> str:

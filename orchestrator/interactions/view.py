@@ -16,12 +16,12 @@ from orchestrator.interactions.judgement import (
     plan_text,
 )
 from orchestrator.interactions.places import by_group
-from orchestrator.interactions.point import SharedMode
+from orchestrator.interactions.point import SharedMode, SystemTask
 from orchestrator.interactions.study import InteractionsResult, run_interactions
 from orchestrator.interactions.systems import Kind, SystemName
 from orchestrator.interactions.words import damping_text, frequency_text, sentences, stand_in_sentence, verdict_word
 from orchestrator.late import pd
-from orchestrator.points.point_study import PointStudy
+from orchestrator.points.study import PointStudy
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, paragraphs
 from orchestrator.report.notebook import page
@@ -347,4 +347,4 @@ def _colour(system: JudgedSystem) -> str:
     return "#" + "".join(f"{value:02x}" for value in mixed)
 
 
-STUDY = PointStudy(run_interactions, Interactions, "orchestrator.interactions.worker")
+STUDY = PointStudy(run_interactions, Interactions, SystemTask)

@@ -17,7 +17,7 @@ class KeptFigures:
         """The arrays of something, computed where they are not there yet."""
         if self._store is None:
             return compute()
-        key = key_of({**self._content, **what})
+        key = key_of({**self._content, **what}, "orchestrator.pod_design.design")
         found = self._store.load(key)
         if found is not None:
             return found[1]

@@ -1,9 +1,9 @@
 """A point that cannot be computed says why; the other points stand."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -30,11 +30,6 @@ class Failure:
     @classmethod
     def lost(cls, error: Exception) -> Self:
         return cls(ErrorKind.WORKER_LOST, str(error), False)
-
-    @classmethod
-    def restored(cls, kept: Mapping[str, Any] | None) -> Self | None:
-        """The failure from its form as JSON, None where there was none."""
-        return None if kept is None else cls(ErrorKind(kept["kind"]), kept["text"], kept["lasting"])
 
     def __str__(self) -> str:
         return self.text

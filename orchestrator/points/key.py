@@ -1,16 +1,14 @@
-"""A hash over everything that the result of a point depends on. It names the point's file, and a worker compares it to
-refuse a changed case or changed code.
+"""A hash over everything that the result of a point depends on, which names the point's file; and the hash by which a
+worker refuses a changed case or changed code.
 """
 
 import hashlib
 import json
 from collections.abc import Mapping
-from functools import cache, lru_cache
-from importlib.metadata import version
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from fmus.toolchain.extras import installed_version
 from orchestrator.cases.case import BUILT_IN, Case, load_case
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
@@ -18,20 +16,17 @@ from orchestrator.coupling.imperfections import described
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import BoundDescription
-
-_ROOT = Path(__file__).parents[1]
-_SHOWING = ("acceptance", "api", "cli", "interop", "report")
-"""Packages whose code does not change the result of any point; a test checks that the code of a point never imports
-them."""
+from orchestrator.points.code import code_hash, numbers_hash
 
 
-LIBRARIES = ("numpy", "scipy", "casadi")
-"""What computes the figures beside this package's own code; another version may give others."""
+def digest(content: Mapping[str, Any]) -> str:
+    """Hash of JSON's types."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
-def key_of(content: Mapping[str, Any]) -> str:
-    """Name of a point whose result depends on the content [JSON's types], on this package's code and on `LIBRARIES`."""
-    return hashlib.sha256(json.dumps({**content, "code": code_hash()}, sort_keys=True).encode()).hexdigest()[:32]
+def key_of(content: Mapping[str, Any], module: str) -> str:
+    """Name of a point whose result depends on the content [JSON's types], and on what a module computes."""
+    return digest({**content, "code": numbers_hash(module)})
 
 
 def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:
@@ -91,28 +86,3 @@ def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
 def _file_hash(path: Path, mtime_ns: int, size: int) -> str:
     """SHA-256 of a file as it is now; the time of its last change keeps the cache from giving an older file's hash."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-@cache
-def library_versions() -> dict[str, str]:
-    """Versions of `LIBRARIES`; empty text for one that is not installed."""
-    return {library: installed_version(library) for library in LIBRARIES}
-
-
-@cache
-def code_hash() -> str:
-    """Hash of the versions and of the code, C included, that a point's result depends on."""
-    hasher = hashlib.sha256(f"{version('gfor-cosim')}\0{json.dumps(library_versions())}".encode())
-    for file in code_files():
-        hasher.update(file.relative_to(_ROOT).as_posix().encode() + b"\0" + file.read_bytes())
-    return hasher.hexdigest()
-
-
-def code_files() -> list[Path]:
-    """Files of this package whose change makes all kept points worthless, sorted."""
-    rooms = [path for path in _ROOT.iterdir() if path.is_dir() and path.name not in _SHOWING]
-    files = [file for room in rooms for ending in ("py", "c", "h") for file in room.rglob(f"*.{ending}")]
-    return sorted([*files, *_ROOT.glob("*.py")])
-
-
-code_hash()  # now, so that it is the hash of what is loaded

@@ -1,85 +1,71 @@
 """Many points of a study: those that are kept are read, the others computed, and kept as soon as they are there."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from orchestrator.points.executor import Executor, WorkerLostError
-from orchestrator.points.store import POINTS, Arrays, PointStore
+from orchestrator.points.failure import Failure
+from orchestrator.points.store import POINTS, PointStore
+from orchestrator.points.task import Task
 
 CountReport = Callable[[int, int], None]  # callback: how many points are done, of how many
 
-
-class Keyed(Protocol):
-    @property
-    def key(self) -> str:
-        """Name of the point's file, as `key_of` makes it."""
-        ...
+AnyTask = TypeVar("AnyTask", bound=Task)
+Point = TypeVar("Point")
 
 
-class Keepable(Protocol):
-    @property
-    def lasting(self) -> bool:
-        """Whether computing the point again would give the same result. Only such results are kept."""
-        ...
+def nobody(done: int, total: int) -> None:
+    """For a count that nobody wants."""
 
-    def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
-        ...
 
-    @classmethod
-    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """The result that was stored in this form; None if the file has another form."""
-        ...
+@dataclass
+class Work:
+    """Where the points of a study are computed, what keeps them, and whom it tells how far it is."""
+
+    executor: Executor
+    store: PointStore | None = None  # None keeps nothing
+    report: CountReport = nobody
+    # computed, stored: how many were computed now, and how many were read from an earlier start
+    computed: int = 0
+    stored: int = 0
 
     @classmethod
-    def lost(cls, task: Any, error: WorkerLostError) -> Self:
-        """The result of a point whose worker died."""
-        ...
+    def into(cls, folder: Path, executor: Executor, report: CountReport = nobody) -> Self:
+        """Work whose points are kept in the folder of a study's results."""
+        return cls(executor, PointStore(folder / POINTS), report)
 
+    def each(
+        self, compute: Callable[[AnyTask], Point], tasks: Sequence[AnyTask], sizes: Sequence[int] | None = None
+    ) -> Iterator[tuple[int, Point]]:
+        """Yield, in any order, the index of each task and its record.
 
-Task = TypeVar("Task", bound=Keyed)
-Point = TypeVar("Point", bound=Keepable)
+        ``sizes``: as how many points each task counts; as one where None.
+        """
+        counts = sizes or [1] * len(tasks)
+        total, missing = self.computed + self.stored + sum(counts), list[int]()
+        for index, task in enumerate(tasks):
+            found = None if self.store is None else self.store.load(task.key)
+            point = task.record.restored(*found) if found else None
+            if point is None:
+                missing.append(index)
+            else:
+                self.stored += counts[index]
+                yield index, point
+        self.report(self.computed + self.stored, total)
+        for number, outcome in self.executor.run(compute, [tasks[index] for index in missing]):
+            task, index = tasks[missing[number]], missing[number]
+            done: Any = task.failed(Failure.lost(outcome)) if isinstance(outcome, WorkerLostError) else outcome
+            if self.store is not None and done.lasting:
+                self.store.save(task.key, *done.stored())
+            self.computed += counts[index]
+            self.report(self.computed + self.stored, total)
+            yield index, done
 
-
-def kept_or_computed(
-    kind: type[Point],
-    compute: Callable[[Task], Point],
-    tasks: Sequence[Task],
-    executor: Executor,
-    store: PointStore,
-    report: CountReport,
-) -> Iterator[tuple[int, Point, bool]]:
-    """Yield, in any order, the index of each task, its point, and whether the point was already stored."""
-    missing: list[int] = []
-    for index, task in enumerate(tasks):
-        found = store.load(task.key)
-        point = kind.restored(*found) if found else None
-        if point is None:
-            missing.append(index)
-        else:
-            yield index, point, True
-    done = len(tasks) - len(missing)
-    report(done, len(tasks))
-    for number, outcome in executor.run(compute, [tasks[index] for index in missing]):
-        index = missing[number]
-        computed = kind.lost(tasks[index], outcome) if isinstance(outcome, WorkerLostError) else outcome
-        if computed.lasting:
-            store.save(tasks[index].key, *computed.stored())
-        done += 1
-        report(done, len(tasks))
-        yield index, computed, False
-
-
-def all_points(
-    kind: type[Point],
-    compute: Callable[[Task], Point],
-    tasks: Sequence[Task],
-    executor: Executor,
-    folder: Path,
-    report: CountReport,
-) -> tuple[list[Point], int]:
-    """The points in the order of their tasks, kept in a study's folder, and how many of them were stored there."""
-    store = PointStore(folder / POINTS)
-    done = sorted(kept_or_computed(kind, compute, tasks, executor, store, report), key=lambda entry: entry[0])
-    return [point for _, point, _ in done], sum(was_stored for *_, was_stored in done)
+    def all(
+        self, compute: Callable[[AnyTask], Point], tasks: Sequence[AnyTask], sizes: Sequence[int] | None = None
+    ) -> list[Point]:
+        """The records in the order of their tasks."""
+        found = dict(self.each(compute, tasks, sizes))
+        return [found[index] for index in range(len(tasks))]

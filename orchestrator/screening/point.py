@@ -1,6 +1,6 @@
 """A stretch of a screening: some operating points with their outages, computed one after the other.
 
-Everything here can be sent to another process or another machine. A stretch starts from scratch, so its result does not
+A stretch starts from scratch, so its result does not
 depend on where and when it is computed.
 """
 
@@ -11,43 +11,44 @@ from typing import Any
 import numpy as np
 
 from orchestrator.analysis.apart import standing_apart
-from orchestrator.analysis.linearization import Blocks, continuous
+from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.mode_tracking import ModeSet, match
 from orchestrator.analysis.slope_linearization import gives_slopes
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.analysis.threads import alone as on_one_thread
 from orchestrator.cases.case import Case
-from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.points.key import same_case
-from orchestrator.screening.bench import DRIVEN, OBSERVED, ScreeningBench
+from orchestrator.operating_points.bench import DRIVEN, OBSERVED, PointBench
+from orchestrator.operating_points.item import Item, Status
+from orchestrator.operating_points.preparation import ACCEPT, ItemPreparation, failure
+from orchestrator.points.codec import plain
+from orchestrator.points.failure import Failure
+from orchestrator.points.task import Task, computed
 from orchestrator.screening.modes import CriticalRegion, FoundModes, find_modes_here, residue
-from orchestrator.screening.preparation import ACCEPT, ItemPreparation, failure
-from orchestrator.screening.record import Item, ItemRecord, Status, StretchRecord
+from orchestrator.screening.record import ItemRecord, StretchRecord
 from orchestrator.study.modes import modes_from
 
 
 @dataclass(frozen=True)
-class StretchTask:
-    """Operating points with outages that are computed together.
+class StretchTask(Task):
+    """Operating points with outages that are computed together."""
 
-    ``case``, ``fingerprint``, ``scenario``, ``layers``, ``step_size``, ``trust_fmus``: As in
-    `orchestrator.sweep.point.SweepPointTask`.
-    """
-
-    case: str
-    fingerprint: str
-    scenario: str
-    layers: tuple[ParameterFile, ...]
-    step_size: float | None
+    record = StretchRecord
     wanted: CriticalRegion
     anchor: Item  # the intact network at the first point, from which the rest is reached
     items: tuple[Item, ...]  # what is computed, in this order
-    key: str  # name of the stretch's file
-    trust_fmus: bool = False
     whole: bool = False  # whether growing eigenvalues are counted at all items, rather than at the ends
     sharing: SharingRule | None = None  # how units share an outage; as the case says where None
+
+    def content(self) -> Any:
+        """Where the points stand in their file does not count."""
+        chain = (self.anchor, *self.items)
+        said = [[item.point - self.anchor.point, item.intact, item.values, item.out, item.lost] for item in chain]
+        return plain([said, self.wanted, self.whole, self.sharing])
+
+    def failed(self, failure: Failure) -> StretchRecord:
+        one = ItemRecord(Status.of(failure), failure.text, lasting=failure.lasting)
+        return StretchRecord((one,) * (1 + len(self.items)))
 
 
 @dataclass
@@ -58,16 +59,19 @@ class _Result:
 
 def compute_stretch(task: StretchTask) -> StretchRecord:
     """Compute all items of a stretch; failures become records as well."""
-    case = same_case(task.case, task.fingerprint, task.trust_fmus)
-    with on_one_thread(), ScreeningBench() as bench:
-        worker = _Worker(task, case, bench)
-        return worker.stretch()
+    return computed(task, _stretch)
+
+
+def _stretch(task: StretchTask, case: Case) -> StretchRecord:
+    with PointBench() as bench:
+        return _Worker(task, case, bench).stretch()
 
 
 class _Worker:
-    def __init__(self, task: StretchTask, case: Case, bench: ScreeningBench) -> None:
+    def __init__(self, task: StretchTask, case: Case, bench: PointBench) -> None:
         self._task, self._bench = task, bench
-        self._preparation = ItemPreparation(case, task.scenario, task.layers, task.step_size, task.sharing)
+        study = task.study
+        self._preparation = ItemPreparation(case, study.scenario, study.layers, study.step_size, task.sharing)
         self._alone: dict[Any, Any] = {}
 
     def stretch(self) -> StretchRecord:
@@ -121,8 +125,8 @@ class _Worker:
         last = results[intact[-1]].found if intact else None
         return StretchRecord(
             tuple(result.record for result in results),
-            None if first is None else first.modes,
-            None if last is None else last.modes,
+            None if first is None else _as_kept(first.modes),
+            None if last is None else _as_kept(last.modes),
             intact[-1] if intact else 0,
             self._bench.perturbed,
             self._bench.reused,
@@ -164,17 +168,14 @@ class _Worker:
             warnings = (*warnings, *result.warnings)
             record = self._item_record(found, {}, point.residual, warnings, certain=True)
             return _Result(replace(record, map_steps=result.model.period), found)
-        whole = {name: self._bench.linearized(name) for name in master.components}
-        narrow = {name: without_references(c) for name, c in whole.items()}
-        model = continuous(Blocks(master, known=narrow, without_step=True))
-        doubtful = [f"{n}: {', '.join(c.doubtful[:3])}" for n, c in whole.items() if c.doubtful]
-        if doubtful:
-            warnings = (*warnings, f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:3])}")
+        linear = self._bench.linear_model()
+        model, whole = linear.model, linear.components
+        warnings = (*warnings, *linear.doubts)
         own = self._own_eigenvalues(whole) if count else np.zeros(0, dtype=complex)
         found = find_modes_here(model, own, wanted, None if neighbour is None else neighbour.modes, count=count)
         warnings = (*warnings, *standing_apart(master, model, found.zeros))
         residues = _residues(found.modes, whole)
-        record = self._item_record(found, residues, point.residual, warnings, certain=not doubtful)
+        record = self._item_record(found, residues, point.residual, warnings, certain=not linear.doubts)
         return _Result(record, found)
 
     def _item_record(
@@ -227,23 +228,22 @@ def _reference(items: list[Item], results: list[_Result], k: int) -> int | None:
     return choice[-1] if choice else None
 
 
-def without_references(c: Any) -> Any:
-    """A converter's linear model without the references that damping controllers act on."""
-    m = len(c.inputs) - (len(DRIVEN) if c.observed else 0)
-    return replace(c, inputs=c.inputs[:m], B_c=c.B_c[:, :m], D=c.D[:, :m], observed=())
+def _as_kept(modes: ModeSet) -> ModeSet:
+    """With vectors of half the size, by which stretches are joined."""
+    return replace(modes, left=modes.left.astype(np.complex64), right=modes.right.astype(np.complex64))
 
 
 def _shares(modes: ModeSet) -> dict[str, Any]:
     """Participation of every component, shape (m,)."""
     if not len(modes.eigenvalues):
         return {}
-    factors, shares = modes.participation(), dict[str, Any]()
+    factors = modes.participation()
     owners = [name.partition(".")[0] for name in modes.names]
     order = {owner: k for k, owner in enumerate(dict.fromkeys(owners))}
     sums = np.zeros((len(factors), len(order)))
     for k, owner in enumerate(owners):
         sums[:, order[owner]] += factors[:, k]
-    return {owner: sums[:, k].astype(np.float32) for owner, k in order.items()} | shares
+    return {owner: sums[:, k].astype(np.float32) for owner, k in order.items()}
 
 
 def _residues(modes: ModeSet, whole: Mapping[str, Any]) -> dict[str, Any]:

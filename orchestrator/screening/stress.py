@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.screening.columns import Elements
-from orchestrator.screening.points_file import OperatingCase
-from orchestrator.screening.record import Status
+from orchestrator.operating_points.columns import Elements
+from orchestrator.operating_points.item import Status
+from orchestrator.operating_points.points_file import OperatingCase
 from orchestrator.screening.study import ScreenedItem, ScreeningPlan
 from orchestrator.screening.summary import ModeAt, Summary
 

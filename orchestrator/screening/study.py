@@ -1,7 +1,5 @@
 """A screening: operating points times outages, in stretches that are computed, kept, and joined."""
 
-import hashlib
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,25 +7,20 @@ from pathlib import Path
 
 from orchestrator.analysis.mode_tracking import match
 from orchestrator.cases.case import Case
-from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.errors import InputError
-from orchestrator.points.executor import Executor
-from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import CountReport, kept_or_computed
-from orchestrator.points.store import PointStore
-from orchestrator.screening.columns import Elements
+from orchestrator.operating_points.item import Item
+from orchestrator.operating_points.outages import Outage
+from orchestrator.operating_points.plan import OperatingPoints, read_operating_points
+from orchestrator.operating_points.points_file import OperatingCase
+from orchestrator.points.points import Work
+from orchestrator.points.task import StudyCase
 from orchestrator.screening.modes import CriticalRegion
-from orchestrator.screening.outages import Outage, read_outages
 from orchestrator.screening.point import StretchTask, compute_stretch
-from orchestrator.screening.points_file import OperatingCase, read_points
-from orchestrator.screening.record import Item, ItemRecord, StretchRecord
+from orchestrator.screening.record import ItemRecord, StretchRecord
 
 STRETCH = 48  # operating points with outages that are computed one from the other before the next full search
-_MOST = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -51,21 +44,14 @@ class Shard:
 
 
 @dataclass(frozen=True)
-class ScreeningPlan:
-    # case, prepared: the case, and its scenario as it is without the values of any point
-    case: Case
-    prepared: PreparedScenario
-    layers: tuple[ParameterFile, ...]  # as in `orchestrator.sweep.sweep.SweepPlan`
-    # points, outages: operating points, and outages; the first outage is the intact network
-    points: tuple[OperatingCase, ...]
-    outages: tuple[Outage, ...]
+class ScreeningPlan(OperatingPoints):
     wanted: CriticalRegion
     tasks: tuple[StretchTask, ...]
 
     @property
     def number_of_items(self) -> int:
         """Operating points times outages."""
-        return sum(len(task.items) for task in self.tasks)
+        return len(self.items)
 
 
 def plan_screening(
@@ -83,74 +69,22 @@ def plan_screening(
 ) -> ScreeningPlan:
     """Check a screening, and build the FMUs that it needs.
 
-    ``points``: CSV file with the operating points; None for the case's own.
-    ``outages``: as `read_outages` takes them.
-    ``scenario``: its name; the first one where None.
-    ``overrides``: values by ``component.variable`` that hold at every point.
-    ``step_size``: communication step [s]; the case's where None.
+    The points and outages: as `read_operating_points` takes them.
     ``wanted``: which modes are critical; from 0.1 to 2 Hz with less than 20 % damping where None.
     ``whole``: whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of
     stretches.
     ``sharing``: how units share an outage; as the case says where None.
     """
-    name = scenario or next(iter(case.scenarios))
-    (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
-    layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
-    elements = Elements.of(prepared)
-    own = OperatingCase("case", 1.0, {}, (), str(case.path))
-    rows = [own] if points is None else read_points(points, prepared, elements)
-    lost = read_outages(outages, elements)
-    if len(rows) * len(lost) > _MOST:
-        raise InputError(
-            f"{points}: {len(rows)} operating points with {len(lost)} outages are {len(rows) * len(lost)}; at most "
-            f"{_MOST} are computed: split the file"
-        )
+    read = read_operating_points(case, points, outages, scenario, overrides, step_size, parameters)
     asked = wanted or CriticalRegion(0.1, 2.0, 0.2)
-    tasks = _tasks(case, prepared, layers, rows, lost, step_size, asked, whole=whole, sharing=sharing)
-    return ScreeningPlan(case, prepared, layers, tuple(rows), tuple(lost), asked, tuple(tasks))
-
-
-def _tasks(
-    case: Case,
-    prepared: PreparedScenario,
-    layers: tuple[ParameterFile, ...],
-    points: Sequence[OperatingCase],
-    outages: Sequence[Outage],
-    step_size: float | None,
-    wanted: CriticalRegion,
-    *,
-    whole: bool,
-    sharing: SharingRule | None,
-) -> list[StretchTask]:
-    items = [
-        Item(p, o, point.values, tuple(dict.fromkeys((*point.out, *outage.elements))),
-             tuple(name for name in outage.elements if name not in point.out))
-        for p, point in enumerate(points)
-        for o, outage in enumerate(outages)
-        if o == 0 or set(outage.elements) - set(point.out)
-    ]  # fmt: skip
-    content = {
-        "case": case.text,
-        **scenario_content(prepared),
-        "layers": [list(layer.values.items()) for layer in layers],
-        "step": step_size,
-        "wanted": [wanted.lowest_hz, wanted.highest_hz, wanted.damping],
-        "whole": whole,
-        "sharing": sharing,
-    }
-    common = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-    reference, mark = reference_to(case), fingerprint(case)
+    study = StudyCase.of(read.prepared, read.layers, step_size)
     tasks = []
-    for first in range(0, len(items), STRETCH):
-        part = tuple(items[first : first + STRETCH])
-        point = points[part[0].point]
+    for first in range(0, len(read.items), STRETCH):
+        part = read.items[first : first + STRETCH]
+        point = read.points[part[0].point]
         anchor = Item(part[0].point, 0, point.values, point.out)
-        said = [[sorted(item.values.items()), list(item.out), list(item.lost), item.intact] for item in (anchor, *part)]
-        points_of = [item.point - part[0].point for item in part]
-        key = key_of({"screening": common, "items": said, "points": points_of})
-        tasks.append(StretchTask(reference, mark, prepared.name, layers, step_size, wanted, anchor, part, key,
-                                 case.trust_fmus, whole, sharing))  # fmt: skip
-    return tasks
+        tasks.append(StretchTask(study, asked, anchor, part, whole, sharing))
+    return ScreeningPlan(**vars(read), wanted=asked, tasks=tuple(tasks))
 
 
 @dataclass(frozen=True)
@@ -178,36 +112,20 @@ class ScreeningResult:
         return len(self.items) == self.plan.number_of_items
 
 
-def run_screening(
-    plan: ScreeningPlan,
-    executor: Executor,
-    store: PointStore,
-    report: CountReport = lambda done, total: None,
-    shard: Shard | None = None,
-) -> ScreeningResult:
+def run_screening(plan: ScreeningPlan, work: Work, shard: Shard | None = None) -> ScreeningResult:
     """Compute the stretches that are not stored yet, and follow the modes over all of them.
 
     ``plan``: as `plan_screening` gives it.
     ``shard``: the part to compute; all where None.
     """
     part = shard or Shard()
-    places = [k for k in range(len(plan.tasks)) if part.has(k)]
-    tasks = [plan.tasks[k] for k in places]
-    sizes = [len(task.items) for task in tasks]
-    found: dict[int, StretchRecord] = {}
-    result = ScreeningResult(plan)
-
-    def report_items(done: int, total: int) -> None:
-        report(round(sum(sizes) * done / max(1, total)), sum(sizes))
-
-    for index, record, stored in kept_or_computed(StretchRecord, compute_stretch, tasks, executor, store, report_items):
-        found[places[index]] = record.as_kept
-        result.stored += sizes[index] * stored
-        result.computed += sizes[index] * (not stored)
-        result.perturbed += record.perturbed
-        result.reused += record.reused
-    result.items = _joined(plan, found)
-    return result
+    tasks = {k: task for k, task in enumerate(plan.tasks) if part.has(k)}
+    sizes = [len(task.items) for task in tasks.values()]
+    found = dict(zip(tasks, work.all(compute_stretch, list(tasks.values()), sizes), strict=True))
+    return ScreeningResult(
+        plan, _joined(plan, found), work.computed, work.stored,
+        sum(record.perturbed for record in found.values()), sum(record.reused for record in found.values()),
+    )  # fmt: skip
 
 
 def _joined(plan: ScreeningPlan, found: Mapping[int, StretchRecord]) -> list[ScreenedItem]:
@@ -232,8 +150,7 @@ def _joined(plan: ScreeningPlan, found: Mapping[int, StretchRecord]) -> list[Scr
         task = plan.tasks[k]
         for place, one in enumerate(task.items, start=1):
             item = record.items[place]
-            chosen = plan.points[one.point], plan.outages[one.outage]
-            items.append(ScreenedItem(*chosen, item, tuple(numbers[place])))
+            items.append(ScreenedItem(*plan.of(one), item, tuple(numbers[place])))
         if record.last is not None:
             before, before_numbers = record, numbers
     return items

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.analysis.modes import damping_percent
-from orchestrator.screening.record import Status
+from orchestrator.operating_points.item import Status
 from orchestrator.screening.study import ScreenedItem, ScreeningResult
 
 _LEADING = 2

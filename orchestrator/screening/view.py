@@ -10,7 +10,8 @@ import numpy as np
 from rich.markup import escape as escape_markup
 
 from orchestrator.late import pd
-from orchestrator.points.point_study import PointStudy
+from orchestrator.operating_points.item import Status
+from orchestrator.points.study import PointStudy
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, colour, paragraphs
@@ -19,7 +20,7 @@ from orchestrator.report.table import Column, ColumnTable, Marked, damping
 from orchestrator.report.tables import eigenvalue_text
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import made_folder, write_text
-from orchestrator.screening.record import Status
+from orchestrator.screening.point import StretchTask
 from orchestrator.screening.stress import OutageRow, by_outage
 from orchestrator.screening.study import ScreenedItem, ScreeningResult, run_screening
 from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration
@@ -357,4 +358,4 @@ def _ranking(summary: Summary) -> str:
     return "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"
 
 
-STUDY = PointStudy(run_screening, Screening, "orchestrator.screening.worker")
+STUDY = PointStudy(run_screening, Screening, StretchTask)

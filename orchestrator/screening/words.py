@@ -7,9 +7,10 @@ import numpy as np
 from orchestrator.analysis.critical_modes import DENSE
 from orchestrator.analysis.eigenvalue_count import GROWING
 from orchestrator.analysis.stability import zeros_in_words
+from orchestrator.operating_points.item import Status
 from orchestrator.report.verdict import VerdictSentence
 from orchestrator.screening.modes import UNSTABLE
-from orchestrator.screening.record import ItemRecord, Status
+from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.stress import not_judged
 from orchestrator.screening.study import ScreenedItem
 from orchestrator.screening.summary import ModeAt, Summary

@@ -16,9 +16,9 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable, Value
 from orchestrator.errors import CosimError, InputError
-from orchestrator.screening.outages import INTACT, read_outages
-from orchestrator.screening.preparation import ItemPreparation, failure
-from orchestrator.screening.record import Item
+from orchestrator.operating_points.item import Item
+from orchestrator.operating_points.outages import INTACT, read_outages
+from orchestrator.operating_points.preparation import ItemPreparation, failure
 from orchestrator.sensitivities.sensitivities import damping_change
 from orchestrator.siting.confirmation import Confirmation, confirmed
 from orchestrator.siting.placing import converter, foreign, name_at, placed

@@ -14,7 +14,8 @@ from typing import Any
 
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.points.key import code_hash, component_content, library_versions
+from orchestrator.points.code import code_hash, library_versions
+from orchestrator.points.key import component_content
 
 Keys = tuple[str, ...]
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,12 +17,11 @@ from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import CaseError, InputError, Problem
-from orchestrator.points.executor import Executor
-from orchestrator.points.points import CountReport, kept_or_computed
-from orchestrator.points.store import PointStore
+from orchestrator.points.points import Work
+from orchestrator.points.task import StudyCase
 from orchestrator.sweep.axes import Axis, Vary, grid_places, refuse_doubles, resolve
 from orchestrator.sweep.limit import COARSE, Ending, ParameterLimit, Until, least_damping, mode_behind, search
-from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point, make_task
+from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point
 from orchestrator.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
 REFINEMENTS = 5  # how often the way between two points is halved where a mode is not recognised from one to the other
@@ -54,9 +54,13 @@ class SweepPlan:
         given = [axis.sets(_value_at(axis, position)) for axis, position in zip(self.axes, place, strict=True)]
         return {key: value for one in given for key, value in one.items()}
 
+    @cached_property
+    def studies(self) -> dict[str, StudyCase]:
+        """What the points of a scenario have in common."""
+        return {one.name: StudyCase.of(one, self.layers, self.step_size) for one in self.scenarios}
+
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
-        varied = self.values(place)
-        return make_task(prepared, self.layers, varied, self.step_size, self.frequency_range)
+        return SweepPointTask(self.studies[prepared.name], self.values(place), self.frequency_range)
 
 
 def _value_at(axis: Axis, position: float) -> Value:
@@ -181,9 +185,7 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
     return [Problem(marks.get(p.place, p.place), p.text) for p in idle_everywhere(idle)]
 
 
-def run_sweep(
-    plan: SweepPlan, executor: Executor, store: PointStore, report: CountReport = lambda done, total: None
-) -> SweepResult:
+def run_sweep(plan: SweepPlan, work: Work) -> SweepResult:
     """Compute the points that are not stored yet, then follow the modes. Further points are added where a mode is not
     recognised.
 
@@ -192,51 +194,37 @@ def run_sweep(
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
     wanted: list[tuple[ScenarioSweep, GridPlace]] = [(sweep, place) for sweep in result.scenarios for place in grid]
-    _fill(result, wanted, executor, store, report)
+    _fill(result, wanted, work)
     if plan.until is not None:
-        result.limits = [_limit(result, sweep, executor, store, report) for sweep in result.scenarios]
+        result.limits = [_limit(result, sweep, work) for sweep in result.scenarios]
     for depth in range(1, REFINEMENTS + 1):
         gaps = [(s, place) for s in result.scenarios for place in _gaps(plan, s, 0.5 ** (depth - 1))]
         if not gaps:
             break
         result.refined += len(gaps)
-        _fill(result, gaps, executor, store, report)
+        _fill(result, gaps, work)
     names = [table.name for table in plan.case.table.analysis.modes]
+    result.computed, result.stored = work.computed, work.stored
     for sweep in result.scenarios:
         sweep.trajectories = find_trajectories(sweep.points, names, plan.frequency_range)
     return result
 
 
-def _fill(
-    result: SweepResult,
-    wanted: Sequence[tuple[ScenarioSweep, GridPlace]],
-    executor: Executor,
-    store: PointStore,
-    report: CountReport,
-) -> None:
+def _fill(result: SweepResult, wanted: Sequence[tuple[ScenarioSweep, GridPlace]], work: Work) -> None:
     tasks = [result.plan.task(sweep.prepared, place) for sweep, place in wanted]
-    before = result.stored + result.computed
-
-    def report_all(done: int, total: int) -> None:
-        report(before + done, before + total)
-
-    for index, record, stored in kept_or_computed(PointRecord, compute_point, tasks, executor, store, report_all):
+    for index, record in work.each(compute_point, tasks):
         sweep, place = wanted[index]
         sweep.points[place] = record
-        result.stored += stored
-        result.computed += not stored
 
 
-def _limit(
-    result: SweepResult, sweep: ScenarioSweep, executor: Executor, store: PointStore, report: CountReport
-) -> ParameterLimit:
+def _limit(result: SweepResult, sweep: ScenarioSweep, work: Work) -> ParameterLimit:
     plan, (axis,) = result.plan, result.plan.axes
     until = plan.until or Until()
     count = len(axis.values)
 
     def kind_at(place: float) -> Ending:
         if (place,) not in sweep.points:
-            _fill(result, [(sweep, (place,))], executor, store, report)
+            _fill(result, [(sweep, (place,))], work)
             result.refined += 1
         return until.kind(sweep.points[(place,)])
 

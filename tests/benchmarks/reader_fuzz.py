@@ -34,9 +34,9 @@ from orchestrator.cases.psse.raw import read_raw
 from orchestrator.errors import CosimError
 from orchestrator.fmi.archive import read_model_description_text
 from orchestrator.fmi.description import parse_description, read_description
+from orchestrator.operating_points.columns import Elements
+from orchestrator.operating_points.points_file import read_points
 from orchestrator.results.comtrade.reading import read_comtrade
-from orchestrator.screening.columns import Elements
-from orchestrator.screening.points_file import read_points
 from orchestrator.ssp.names import STUDY_TYPE, SYSTEM_FILE
 from tests.cases.psse import raw
 from tests.cases.psse.test_dyr import CASE as DYR_CASE

@@ -12,9 +12,10 @@ import numpy as np
 
 from orchestrator.analysis.threads import alone
 from orchestrator.cases.case import load_case
+from orchestrator.operating_points.item import Status
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
-from orchestrator.screening.record import Status
 from orchestrator.screening.study import plan_screening, run_screening
 
 
@@ -37,7 +38,7 @@ def screened(case, scenario, points, outages, folder):
     plan = plan_screening(case, points, outages, scenario)
     before = processor_seconds()
     with alone():
-        result = run_screening(plan, Serial(), PointStore(folder))
+        result = run_screening(plan, Work(Serial(), PointStore(folder)))
     computed = sum(item.record.status is Status.COMPUTED for item in result.items)
     return len(result.items), computed, processor_seconds() - before
 

@@ -23,17 +23,19 @@ COUNT = 20_000_000
 
 def sweep(points: int, executor: str, folder: str) -> None:
     """Print the seconds of a sweep's points; run by ``python -c``, so that all imports count in the whole."""
-    from orchestrator.api.executors import choose_executor  # noqa: PLC0415
     from orchestrator.cases.case import load_case  # noqa: PLC0415
+    from orchestrator.points.points import Work  # noqa: PLC0415
     from orchestrator.points.store import PointStore  # noqa: PLC0415
+    from orchestrator.points.study import choose_executor  # noqa: PLC0415
     from orchestrator.sweep.axes import parse_vary  # noqa: PLC0415
+    from orchestrator.sweep.point import SweepPointTask  # noqa: PLC0415
     from orchestrator.sweep.sweep import plan_sweep, run_sweep  # noqa: PLC0415
 
     where = (int(executor), None) if executor.isdigit() else (None, executor)
-    chosen = choose_executor(*where, ["orchestrator.sweep.worker"])
+    chosen = choose_executor(*where, [SweepPointTask.__module__])
     plan = plan_sweep(load_case("two_area"), [parse_vary(f"grid.X_L=0.01:0.6:{points}")])
     start = time.perf_counter()
-    result = run_sweep(plan, chosen, PointStore(Path(folder)))
+    result = run_sweep(plan, Work(chosen, PointStore(Path(folder))))
     chosen.close()
     print(json.dumps([time.perf_counter() - start, result.computed]))
 

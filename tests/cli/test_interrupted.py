@@ -11,8 +11,8 @@ from orchestrator.cli import sweep as sweep_command
 from orchestrator.cli.checkpoints import Checkpoints
 from orchestrator.cli.interrupted import is_interrupt
 from orchestrator.coupling.progress import Progress
-from orchestrator.points.point_study import PointStudy
 from orchestrator.points.store import PointStore
+from orchestrator.points.study import PointStudy
 from orchestrator.study import run as study
 
 RUN = ("run", "infinite_bus", "--scenario", "dip", "--stop", "1.3")

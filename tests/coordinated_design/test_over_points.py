@@ -29,6 +29,7 @@ from orchestrator.coordinated_design.words import remarks, verdict_sentence
 from orchestrator.errors import InputError
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import lead_lag_turning
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 
@@ -83,8 +84,8 @@ def test_a_closed_loop_is_that_of_the_fmus(name, points, store, monkeypatch):
         P: PodSetting(90.0, lead_lag_turning(-40.0, 4.0, 2)),
         Q: PodSetting(150.0, lead_lag_turning(25.0, 3.0, 2)),
     }
-    opened = modes_at(plan, plan.off, plan.candidates, Serial(), store)
-    closed = modes_at(plan, study.values_of(plan.groups, list(setting.values())), (), Serial(), store)
+    opened = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
+    closed = modes_at(plan, study.values_of(plan.groups, list(setting.values())), (), Work(Serial(), store))
     for before, after in zip(opened, closed, strict=True):
         expected = near(after.values)
         assert len(expected) >= 4
@@ -99,8 +100,8 @@ def test_a_closed_loop_is_that_of_the_fmus(name, points, store, monkeypatch):
 
 def test_kept_points_are_those_that_were_computed(planned, store):
     plan = planned("pod_p")
-    first = modes_at(plan, plan.off, plan.candidates, Serial(), store)
-    again = modes_at(plan, plan.off, plan.candidates, Serial(), store)
+    first = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
+    again = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
     for one, other in zip(first, again, strict=True):
         assert np.array_equal(one.values, other.values)
         assert np.array_equal(one.loops.U, other.loops.U)
@@ -112,7 +113,7 @@ def test_kept_points_are_those_that_were_computed(planned, store):
 def test_the_design_is_not_worse_than_a_scan(planned, store):
     """The search against all combinations of turn, centre and gain on a grid, over all points."""
     plan = planned("pod_p")
-    rated = rated_of(plan, modes_at(plan, plan.off, plan.candidates, Serial(), store))
+    rated = rated_of(plan, modes_at(plan, plan.off, plan.candidates, Work(Serial(), store)))
     space = SettingSpace(plan.groups, (0.0, 400.0), 3.6)
     search = SettingSearch(space, rated)
     grid = product(np.linspace(-120, 120, 17), (0.5, 1.0, 2.0, 4.0), np.geomspace(5, 400, 12))
@@ -131,7 +132,7 @@ def test_two_controllers_are_not_worse_than_one(planned, store):
     both, one = planned("pod_p", "pod_q"), planned("pod_p")
     found = {}
     for plan in (one, both):
-        rated = rated_of(plan, modes_at(plan, plan.off, plan.candidates, Serial(), store))[:2]
+        rated = rated_of(plan, modes_at(plan, plan.off, plan.candidates, Work(Serial(), store)))[:2]
         found[len(plan.groups)] = SettingSearch(SettingSpace(plan.groups, (0.0, 400.0), 3.6), rated).best(starts=1)
     assert found[2].worth.worst >= found[1].worth.worst - 1e-4
 
@@ -139,7 +140,7 @@ def test_two_controllers_are_not_worse_than_one(planned, store):
 @pytest.mark.slow
 def test_the_wanted_damping_is_reached_with_the_least_gain(planned, store):
     plan = planned("pod_p", outages="gfor", damping=0.15)
-    design = design_over_points(plan, Serial(), store)
+    design = design_over_points(plan, Work(Serial(), store))
     verdict = design.verdict
     moved = [one for one in verdict.known if one.outage.name == "intact"]
     assert min(one.target.damping_ratio for one in moved) == pytest.approx(0.15, abs=3e-4)
@@ -175,7 +176,7 @@ def test_a_point_that_a_nominal_design_destabilises_is_seen(case, tmp_path, stor
         path = tmp_path / f"{name}.csv"
         path.write_text(f"name,grid.X_L\n{rows}")
         request = PointsDesignRequest(("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
-        verdicts[name] = design_over_points(plan_points_design(case, request, path), Serial(), store).verdict
+        verdicts[name] = design_over_points(plan_points_design(case, request, path), Work(Serial(), store)).verdict
     assert verdicts["nominal"].stable is True
     assert verdicts["all"].stable is False
     assert [one.point.name for one in verdicts["all"].unstable] == ["long"]
@@ -193,7 +194,7 @@ def test_a_wrong_sign_of_a_loop_is_seen(planned, store, monkeypatch):
 
     monkeypatch.setattr(point, "measure", wrong)
     chosen(monkeypatch, [0.0, 0.0, 0.15])
-    design = design_over_points(planned("pod_p", damping=0.12), Serial(), store)
+    design = design_over_points(planned("pod_p", damping=0.12), Work(Serial(), store))
     verdict = design.verdict
     assert verdict.astray
     assert any("the search was led astray" in text for text in remarks(verdict))
@@ -217,7 +218,7 @@ def test_harm_that_the_search_did_not_show_is_told(case, tmp_path, store, monkey
     path = tmp_path / "long.csv"
     path.write_text("name,grid.X_L\nlong,0.6\n")
     request = PointsDesignRequest(("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
-    verdict = design_over_points(plan_points_design(case, request, path), Serial(), store).verdict
+    verdict = design_over_points(plan_points_design(case, request, path), Work(Serial(), store)).verdict
     assert verdict.stable is False
     assert len(verdict.unforeseen) == blind
     assert any("its linear models showed no harm to other modes, and there is" in t for t in remarks(verdict)) is blind
@@ -246,13 +247,13 @@ def test_a_fast_mode_that_a_lead_drives_stays_in_a_reduced_system(monkeypatch):
 def test_points_without_modes_leave_the_verdict_not_known(planned, store, monkeypatch):
     """All else is fine, but the only line's outage cuts the system in two."""
     chosen(monkeypatch, [0.03, 0.7, 0.19])
-    verdict = design_over_points(planned("pod_p", outages="L", damping=0.1), Serial(), store).verdict
+    verdict = design_over_points(planned("pod_p", outages="L", damping=0.1), Work(Serial(), store)).verdict
     assert verdict.met is None
     assert verdict.stable is None
     assert len(verdict.failed) == 4
     assert "4 of 8 have no modes (4 islanding)" in verdict_sentence(verdict)
     assert "bus_2 cut off" in " ".join(remarks(verdict))
-    fine = design_over_points(planned("pod_p", damping=0.1), Serial(), store).verdict
+    fine = design_over_points(planned("pod_p", damping=0.1), Work(Serial(), store)).verdict
     assert fine.met is True
     assert "REACHED: 10 % at all 4 points" in verdict_sentence(fine)
 
@@ -260,7 +261,7 @@ def test_points_without_modes_leave_the_verdict_not_known(planned, store, monkey
 def test_a_mode_that_is_pushed_down_is_harm(planned, store):
     """Other modes are held to what they had in their band of frequencies."""
     plan = planned("pod_p", modes=("electromechanical",), least_damping=0.05)
-    found = modes_at(plan, plan.off, plan.candidates, Serial(), store)
+    found = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
     rated = rated_of(plan, found, 1e5)
     weak, strong = (
         {P: PodSetting(gain, lead_lag_turning(turn, 7.2, 2))} for gain, turn in ((20.0, 0.0), (2000.0, -120.0))
@@ -276,11 +277,11 @@ def test_a_name_follows_its_mode_from_the_loops_that_are_open(planned, points, s
     nothing."""
     points.write_text("name,grid.X_L,load\nshort,0.05,1\nlonger,0.3,1\n")
     plan = planned("pod_p", modes=("electromechanical",))
-    before = modes_at(plan, plan.off, plan.candidates, Serial(), store)
+    before = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
     gain = 250.0
     setting = {P: PodSetting(gain, lead_lag_turning(40.0, 4.5, 2))}
     values = values_of(plan.groups, list(setting.values()))
-    after = modes_at(plan, values, (), Serial(), store)
+    after = modes_at(plan, values, (), Work(Serial(), store))
     lying = [replace(one, named={"electromechanical": one.swinging[-1]}) for one in after]
     found = with_followed_names(["electromechanical"], before, after, setting)
     borne = 0
@@ -309,7 +310,7 @@ def test_a_name_that_cannot_be_followed_is_borne_by_none(planned, points, store,
 
     monkeypatch.setattr(following, "follow_along", meets)
     plan = planned("pod_p", modes=("electromechanical",), damping=0.1)
-    verdict = design_over_points(plan, Serial(), store).verdict
+    verdict = design_over_points(plan, Work(Serial(), store)).verdict
     assert all(one.unnamed for one in verdict.known)
     assert "its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count" in " ".join(
         remarks(verdict)
@@ -319,7 +320,7 @@ def test_a_name_that_cannot_be_followed_is_borne_by_none(planned, points, store,
 def test_a_mode_that_is_named_counts_alone(planned, points, store):
     points.write_text(LINES.replace("long,0.5", "long,0.7"))
     plan = planned("pod_p", modes=("electromechanical",))
-    found = modes_at(plan, plan.off, plan.candidates, Serial(), store)
+    found = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))
     for one in found:
         named = RatedPoint(0, one.loops, plan.aim, {P: 400.0}).worth({}).worst
         every = RatedPoint(0, one.loops, Aim((), 0.05), {P: 400.0}).worth({}).worst
@@ -333,7 +334,7 @@ def test_a_mode_that_is_named_counts_alone(planned, points, store):
 
 def test_sensitivities_of_a_step_are_those_of_the_eigenvalues(planned, store):
     plan = planned("pod_p", "pod_q")
-    rated = rated_of(plan, modes_at(plan, plan.off, plan.candidates, Serial(), store))
+    rated = rated_of(plan, modes_at(plan, plan.off, plan.candidates, Work(Serial(), store)))
     space = SettingSpace(plan.groups, (0.0, 400.0), 3.6)
     search, x, h = SettingSearch(space, rated), np.array([-0.1, 0.3, 0.1, 0.2, -0.2, 0.3]), 1e-4
     for mode, slopes in search._rows(rated[1], x):
@@ -349,7 +350,7 @@ def test_sensitivities_of_a_step_are_those_of_the_eigenvalues(planned, store):
 
 def test_converters_are_ranked_by_what_a_controller_there_gives(planned, store):
     plan = planned("pod_p", "pod_q")
-    found = modes_at(plan, plan.off, plan.candidates, Serial(), store)[:1]
+    found = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))[:1]
     stages = dict.fromkeys(plan.candidates, 2)
     first, second = ranking.ranked(plan.candidates, stages, rated_of(plan, found), 400.0, 3.6, 0)
     assert (first.place, second.place) == (P, Q)
@@ -449,10 +450,10 @@ def test_that_a_damping_cannot_be_had_needs_a_grid(planned, store, monkeypatch):
     """Without one only the best that was found is said; and a search that was cut short is helped by the grid."""
     monkeypatch.setattr(SettingSearch, "best", lambda search: search.tried(search._space.vector([90.0], [3.0], [5.0])))
     plan = planned("pod_p", damping=0.8)
-    helped = design_over_points(plan, Serial(), store).verdict
+    helped = design_over_points(plan, Work(Serial(), store)).verdict
     assert "CANNOT be had with K ≤ 400 pu: best" in verdict_sentence(helped)
     monkeypatch.setattr(SettingSearch, "over_grid", lambda search, found: (found, 0))
-    alone = design_over_points(plan, Serial(), store).verdict
+    alone = design_over_points(plan, Work(Serial(), store)).verdict
     assert "CANNOT" not in verdict_sentence(alone)
     assert "no grid of settings was compared" in verdict_sentence(alone)
     assert helped.worst > alone.worst + 0.05

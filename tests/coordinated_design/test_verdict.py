@@ -6,9 +6,9 @@ import pytest
 from orchestrator.coordinated_design.objective import Aim
 from orchestrator.coordinated_design.point import PointModes
 from orchestrator.coordinated_design.verdict import PointsVerdict, judged
-from orchestrator.screening.outages import Outage
-from orchestrator.screening.points_file import OperatingCase
-from orchestrator.screening.record import Status
+from orchestrator.operating_points.item import Status
+from orchestrator.operating_points.outages import Outage
+from orchestrator.operating_points.points_file import OperatingCase
 
 WHERE = [(OperatingCase("now", 1.0, {}, (), "points.csv:2"), Outage("intact"))]
 

@@ -8,6 +8,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.interactions.study import plan_interactions, run_interactions
 from orchestrator.interactions.view import Interactions
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from tests.pages.markdown import ROOT, blocks
@@ -40,7 +41,7 @@ def studied(path=None, overrides=None, **wanted):
     plan = plan_interactions(
         load_case(path or folder() / "park.toml"), InteractionsRequest(**wanted), overrides=overrides
     )
-    return Interactions(run_interactions(plan, Serial(), PointStore(folder() / "points")))
+    return Interactions(run_interactions(plan, Work(Serial(), PointStore(folder() / "points"))))
 
 
 park = cache(studied)

@@ -7,12 +7,12 @@ import sys
 import pytest
 
 from fmus.toolchain.extras import MissingLibraryError
-from orchestrator.api.executors import choose_executor
 from orchestrator.errors import CosimError, ErrorKind, InputError
 from orchestrator.points.dask_cluster import TLS_FILES, DaskCluster
 from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
+from orchestrator.points.study import choose_executor
 from tests.points.small_tasks import always_die, die_once, double, fail, sleepy_double, waits
 
 NUMBERS = range(8)

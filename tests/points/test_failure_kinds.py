@@ -17,11 +17,13 @@ from orchestrator.errors import (
     Problem,
     StartError,
 )
+from orchestrator.operating_points.item import Item, Status
+from orchestrator.operating_points.preparation import failure
+from orchestrator.points.codec import packed, unpacked
 from orchestrator.points.failure import Failure
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
-from orchestrator.screening.preparation import failure
-from orchestrator.screening.record import Item, Status
 from orchestrator.screening.study import plan_screening, run_screening
 
 ROOT = Path(__file__).parents[2]
@@ -51,7 +53,7 @@ def test_a_status_follows_from_the_kind_alone(error, status, lasting):
     assert (found, lasts) == (status, lasting)
     assert "the power flow asks it for more" in text
     kept = Failure.of(error)
-    assert Failure.restored({"kind": str(kept.kind), "text": kept.text, "lasting": kept.lasting}) == kept
+    assert unpacked(Failure, *packed(kept)) == kept
 
 
 def test_a_component_that_refuses_its_own_values_has_no_other_operating_point():
@@ -71,7 +73,9 @@ def test_an_overloaded_converter_has_one_status_opened_anew_and_reset(tmp_path):
     for name, rows in (("opened", over.format("over")), ("reset", "usual,\n" + over.format("over"))):
         path = tmp_path / f"{name}.csv"
         path.write_text("name,gfor.P_0\n" + rows)
-        found.append(run_screening(plan_screening(case, path, None, "gfor"), Serial(), PointStore(tmp_path / name)))
+        found.append(
+            run_screening(plan_screening(case, path, None, "gfor"), Work(Serial(), PointStore(tmp_path / name)))
+        )
     opened, reset = (result.items[-1].record for result in found)
     assert found[1].items[0].record.status is Status.COMPUTED
     assert (opened.status, opened.text, opened.lasting) == (reset.status, reset.text, reset.lasting)
@@ -119,7 +123,7 @@ def is_message(node: ast.AST) -> bool:
         return isinstance(node.slice, ast.Constant) and node.slice.value in _MESSAGES
     if isinstance(node, ast.Attribute):
         return node.attr in _MESSAGES and node.attr != "words"
-    return isinstance(node, ast.Name) and node.id in ("error", "message", "sentence", "verdict")
+    return isinstance(node, ast.Name) and node.id in ("error", "message", "sentence", "verdict", "answer", "remark")
 
 
 def is_error(node: ast.AST) -> bool:
@@ -139,6 +143,7 @@ def searches(tree: ast.AST) -> list[int]:
     [
         '"power flow" in str(error)', "_HIDES in (record.error or '')", 'error.status.startswith("hang")',
         'verdict.sentence().partition(":")', 'str(error).rpartition("; ")', '"x" in problem.text',
+        'answer.startswith("no error")',
         'stability["sentence"].removeprefix("UNSTABLE: ")', 'verdict_sentence(summary).partition(":")',
     ],
 )  # fmt: skip

@@ -14,16 +14,16 @@ from orchestrator.analysis.modes import find_modes
 from orchestrator.cases.case import load_case
 from orchestrator.cli import main
 from orchestrator.errors import InputError
+from orchestrator.operating_points.bench import PointBench, without_references
+from orchestrator.operating_points.columns import Elements
+from orchestrator.operating_points.item import Status
+from orchestrator.operating_points.outages import read_outages
+from orchestrator.operating_points.points_file import read_points
 from orchestrator.points.dask_cluster import DaskCluster
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening import modes, study
-from orchestrator.screening.bench import ScreeningBench
-from orchestrator.screening.columns import Elements
-from orchestrator.screening.outages import read_outages
-from orchestrator.screening.point import without_references
-from orchestrator.screening.points_file import read_points
-from orchestrator.screening.record import Status
 from orchestrator.screening.study import Shard, plan_screening, run_screening
 from orchestrator.screening.summary import Summary, duration
 from orchestrator.study.modes import compute_modes
@@ -46,7 +46,7 @@ def day(tmp_path):
 
 
 def screened(plan, folder, shard=None):
-    return run_screening(plan, Serial(), PointStore(folder), shard=shard)
+    return run_screening(plan, Work(Serial(), PointStore(folder)), shard=shard)
 
 
 def test_modes_are_those_of_the_system_without_a_step(two_area, day, tmp_path):
@@ -89,7 +89,7 @@ def test_a_residue_is_the_shift_by_unit_gain(two_area, tmp_path):
     result = screened(plan_screening(case, path, None, "gfor"), tmp_path / "points")
     record = result.items[0].record
     k = record.critical[0]
-    with ScreeningBench() as bench:
+    with PointBench() as bench:
         master = bench.master(prepared)
         models = {name: bench.linearized(name) for name in master.components}
         c = models["gfor"]
@@ -211,14 +211,14 @@ def test_what_is_not_computed_is_named_and_counted(gfor, day, tmp_path):
 
 def test_an_error_of_ours_is_no_failure_of_an_fmu(gfor, day, tmp_path, monkeypatch):
     """The points beside it are computed, the place is named, and the command does not end as if all were well."""
-    linearized = ScreeningBench.linearized
+    linearized = PointBench.linearized
 
     def slip(bench, name):
         if name == "gfor" and bench.perturbed > 4:
             raise IndexError("boolean index did not match")
         return linearized(bench, name)
 
-    monkeypatch.setattr(ScreeningBench, "linearized", slip)
+    monkeypatch.setattr(PointBench, "linearized", slip)
     options = ("--scenario", "gfor", "--points", day, "--workers", "1", "--out", tmp_path / "out")
     code, out, error = gfor("screen", "two_area", *options)
     said = " ".join(error.split())
@@ -296,10 +296,10 @@ def test_an_unstable_point_fails_where_asked(gfor, tmp_path):
 def test_reset_fmus_are_as_new(two_area):
     case, first, _ = two_area
     (second,) = case.prepare(["gfor"], {"grid.X_L": 0.3})
-    with ScreeningBench() as bench:
+    with PointBench() as bench:
         bench.master(first)
         used = {name: bench.linearized(name).A_c for name in bench.master(second).components}
-    with ScreeningBench() as bench:
+    with PointBench() as bench:
         fresh = {name: bench.linearized(name).A_c for name in bench.master(second).components}
     assert all(np.array_equal(used[name], fresh[name]) for name in fresh)
 
@@ -307,16 +307,16 @@ def test_reset_fmus_are_as_new(two_area):
 def test_only_fmus_of_ours_serve_the_next_point(two_area, monkeypatch):
     """Exports of a well-known tool stand still after fmi2Reset."""
     _, prepared, _ = two_area
-    with ScreeningBench() as bench:
+    with PointBench() as bench:
         first = bench.master(prepared)
         assert bench.master(prepared) is first
-        monkeypatch.setattr("orchestrator.screening.bench.is_ours", lambda path: "gfor" not in path.name)
+        monkeypatch.setattr("orchestrator.operating_points.bench.is_ours", lambda path: "gfor" not in path.name)
         assert bench.master(prepared) is not first
 
 
 def test_equal_components_are_linearised_once(two_area):
     _, prepared, _ = two_area
-    with ScreeningBench() as bench:
+    with PointBench() as bench:
         for _ in range(2):
             for name in bench.master(prepared).components:
                 bench.linearized(name)
@@ -412,7 +412,7 @@ def test_a_dask_cluster_screens_what_one_process_does(two_area, day, tmp_path, m
     plan = plan_screening(two_area[0], day, None, "gfor")
     alone = screened(plan, tmp_path / "alone")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        together = run_screening(plan, DaskCluster(cluster.scheduler_address), PointStore(tmp_path / "together"))
+        together = run_screening(plan, Work(DaskCluster(cluster.scheduler_address), PointStore(tmp_path / "together")))
     assert together.computed == alone.computed == 5
     for one, other in zip(alone.items, together.items, strict=True):
         assert one.record.eigenvalues.tobytes() == other.record.eigenvalues.tobytes()

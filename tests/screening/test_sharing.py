@@ -11,12 +11,13 @@ import orchestrator.api.case as gfor_face
 from orchestrator.analysis.modes import find_modes
 from orchestrator.cases.sharing import Reserve, SharingRule, droop_gain, power_limits, shares
 from orchestrator.errors import ErrorKind, InputError
+from orchestrator.operating_points.columns import Elements
+from orchestrator.operating_points.item import Item, Status
+from orchestrator.operating_points.outages import what_remains
+from orchestrator.operating_points.preparation import ItemPreparation
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
-from orchestrator.screening.columns import Elements
-from orchestrator.screening.outages import what_remains
-from orchestrator.screening.preparation import ItemPreparation
-from orchestrator.screening.record import Item, Status
 from orchestrator.screening.study import plan_screening, run_screening
 from orchestrator.study.modes import compute_modes
 from tests.screening.five_machines import DROOPS, POWERS, RATINGS, five_machines
@@ -31,7 +32,7 @@ def screened(case, folder, outages, text="name\nonly\n", sharing=None):
     path = folder / "points.csv"
     path.write_text(text)
     plan = plan_screening(case, path, outages, "base", sharing=sharing)
-    return run_screening(plan, Serial(), PointStore(folder / "points")).items
+    return run_screening(plan, Work(Serial(), PointStore(folder / "points"))).items
 
 
 def critical(item):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from orchestrator.screening.record import ItemRecord, Status
+from orchestrator.operating_points.item import Status
+from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.stress import by_outage, not_judged
 from orchestrator.screening.study import ScreenedItem, ScreeningResult, plan_screening
 from orchestrator.screening.summary import Summary

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from orchestrator.operating_points.item import Status
 from orchestrator.screening.modes import CriticalRegion
-from orchestrator.screening.record import Status
 from orchestrator.screening.study import ScreeningResult
 from orchestrator.screening.summary import Summary
 

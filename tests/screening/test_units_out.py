@@ -8,10 +8,11 @@ from orchestrator.analysis.modes import find_modes
 from orchestrator.cases.case import load_case
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import AnalysisError
+from orchestrator.operating_points.item import Status
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening import modes
-from orchestrator.screening.record import Status
 from orchestrator.screening.study import plan_screening, run_screening
 from orchestrator.study.modes import compute_modes
 
@@ -26,7 +27,7 @@ def screened(case, tmp_path, text, outages=None, scenario="base", sharing=None):
     path = tmp_path / "points.csv"
     path.write_text(text)
     plan = plan_screening(case, path, outages, scenario, sharing=sharing)
-    return run_screening(plan, Serial(), PointStore(tmp_path / "points"))
+    return run_screening(plan, Work(Serial(), PointStore(tmp_path / "points")))
 
 
 def critical(item):

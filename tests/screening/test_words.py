@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.operating_points.item import Status
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
-from orchestrator.screening.record import ItemRecord, Status
+from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.study import plan_screening, run_screening
 from orchestrator.screening.summary import Summary
 from orchestrator.screening.view import as_json, remarks
@@ -43,7 +45,7 @@ def screened(tmp_path_factory):
     wanted = replace(plan_screening(load_case("two_area"), path, None, "gfor").wanted, lowest_hz=1.0)
     plan = plan_screening(load_case("two_area"), path, None, "gfor", wanted=wanted)
     for _ in range(2):  # computed, and then kept
-        result = run_screening(plan, Serial(), PointStore(folder / "points"))
+        result = run_screening(plan, Work(Serial(), PointStore(folder / "points")))
     return result
 
 
@@ -83,7 +85,7 @@ def test_an_item_is_stable_only_where_all_growth_was_counted(monkeypatch, tmp_pa
     path.write_text("name,gfor.in_service\nin,1\n")
     plan = plan_screening(load_case("two_area"), path, None, "gfor")
     for _ in range(2):  # computed, and then kept
-        result = run_screening(plan, Serial(), PointStore(tmp_path / "points"))
+        result = run_screening(plan, Work(Serial(), PointStore(tmp_path / "points")))
     (item,) = result.items
     assert (item.record.stable, item.record.counted) == (stable, counted)
     if stable:

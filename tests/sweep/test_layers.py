@@ -5,9 +5,10 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.parameter_files import read_parameter_file
+from orchestrator.points.task import StudyCase
 from orchestrator.sweep import point
 from orchestrator.sweep.axes import Vary
-from orchestrator.sweep.point import compute_point, make_task
+from orchestrator.sweep.point import SweepPointTask, compute_point
 from orchestrator.sweep.sweep import plan_sweep
 from tests.sweep.sweep_case import two_oscillators
 
@@ -80,12 +81,12 @@ def test_what_is_varied_goes_before_every_other_value(case, write, values_at, fi
 def test_a_task_of_its_own_keeps_that_order(case, write, values_at):
     (prepared,) = case.file.prepare(["one"])
     layer = read_parameter_file(write('"a1.gain" = 9.0', '"?1.gain" = 4.0'))
-    task = make_task(prepared, [layer], {"a1.gain": 3.0}, None, (0.1, 2.0))
+    task = SweepPointTask(StudyCase.of(prepared, [layer]), {"a1.gain": 3.0}, (0.1, 2.0))
     assert {key: value for key, value in values_at(task).items() if key in ("a1.gain", "b1.gain")} == {
         "a1.gain": 3.0,
         "b1.gain": 4.0,
     }
-    same = make_task(prepared, [], {"a1.gain": 3.0}, None, (0.1, 2.0))
+    same = SweepPointTask(StudyCase.of(prepared), {"a1.gain": 3.0}, (0.1, 2.0))
     assert same.key != task.key
 
 

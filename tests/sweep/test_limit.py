@@ -8,6 +8,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
+from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import parse_vary
@@ -116,7 +117,7 @@ def told(gfor, loop, *options):
 def limit_of(loop, vary, damping=0.0):
     """The same without a command, as JSON's types."""
     plan = planned(loop, vary, until=Until(damping))
-    return run_sweep(plan, Serial(), PointStore(loop.parent / "points")).limits[0].as_json()
+    return run_sweep(plan, Work(Serial(), PointStore(loop.parent / "points"))).limits[0].as_json()
 
 
 def test_the_limit_of_a_loop_is_that_of_hurwitz(gfor, loop):

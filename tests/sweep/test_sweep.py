@@ -15,6 +15,7 @@ from orchestrator.errors import ErrorKind, InputError
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.points.dask_cluster import DaskCluster
 from orchestrator.points.failure import Failure
+from orchestrator.points.points import Work
 from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
@@ -41,7 +42,7 @@ def case(tmp_path):
 
 def sweep(case, folder, *vary, executor=None, **settings):
     plan = plan_sweep(load_case(case), [parse_vary(text) for text in vary], **settings)
-    return run_sweep(plan, executor or Serial(), PointStore(folder))
+    return run_sweep(plan, Work(executor or Serial(), PointStore(folder)))
 
 
 def curve(scenario, name):
@@ -255,7 +256,7 @@ def test_whole_numbers_have_only_whole_numbers_in_between(case, tmp_path, monkey
     fine, seen = compute_point(plan.task(plan.scenarios[0], (0,))), set()
     monkeypatch.setattr(sweep_module, "is_ambiguous", lambda *_: True)
     monkeypatch.setattr(sweep_module, "compute_point", lambda task: seen.add(task.overrides["a1.gain"]) or fine)
-    run_sweep(plan, Serial(), PointStore(tmp_path / "p"))
+    run_sweep(plan, Work(Serial(), PointStore(tmp_path / "p")))
     assert all(value == int(value) for value in seen)
     assert between <= seen - set(values)
     assert bool(between) == bool(seen - set(values))

@@ -2,38 +2,24 @@
 
 import os
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
 from orchestrator.analysis.device_start import misfits_of
-from orchestrator.analysis.threads import alone
 from orchestrator.arrays import Numbers
+from orchestrator.cases.case import Case
 from orchestrator.cases.schema import Value
 from orchestrator.certification.codes.bench_case import BENCH
 from orchestrator.errors import ComponentError, CosimError, ErrorKind
-from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.failure import Failure, failure_kept
-from orchestrator.points.key import same_case
-from orchestrator.points.signals import signal_arrays, take_signals
-from orchestrator.points.store import Arrays
+from orchestrator.points.task import Kept, Task, computed
 from orchestrator.study.modes import running
 from orchestrator.watch.watch import Watch
 
 
-@dataclass(frozen=True)
-class BenchTask:
-    """A row's case file."""
-
-    row: str
-    case: str
-    fingerprint: str
-    key: str
-    changes: tuple[tuple[str, Value], ...] = ()  # values by ``component.variable`` that are others than the case file's
-
-
 @dataclass
-class BenchResult:
+class BenchResult(Kept):
     row: str
     times: Numbers = field(default_factory=lambda: np.empty(0))
     signals: dict[str, Numbers] = field(default_factory=dict)  # by the bench's names, each of the shape of ``times``
@@ -46,31 +32,28 @@ class BenchResult:
         """Failed rows are not kept: the cause, such as a missing licence, may be gone next time."""
         return self.failure is None
 
-    @classmethod
-    def lost(cls, task: BenchTask, error: WorkerLostError) -> Self:
-        """The result of a row whose worker died."""
-        return cls(task.row, failure=Failure.lost(error))
 
-    def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
-        header = {"row": self.row, "findings": self.findings, "seconds": self.seconds}
-        return header, signal_arrays(self.times, self.signals)
+@dataclass(frozen=True)
+class BenchTask(Task):
+    """A row's case file."""
 
-    @classmethod
-    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """The result that was stored in this form; None if the file has another form."""
-        try:
-            return cls(header["row"], *take_signals(arrays), header["findings"], header["seconds"])
-        except (KeyError, TypeError, ValueError):
-            return None
+    record: ClassVar[Any] = BenchResult
+    row: str
+    changes: tuple[tuple[str, Value], ...] = ()  # values by ``component.variable`` that are others than the case file's
+
+    def failed(self, failure: Failure) -> Any:
+        return BenchResult(self.row, failure=failure)
 
 
 def compute_row(task: BenchTask) -> BenchResult:
     """Run a row; a failure becomes part of the result."""
-    case = same_case(task.case, task.fingerprint)
+    return computed(task, row_result)
+
+
+def row_result(task: BenchTask, case: Case) -> BenchResult:
     result, begin = BenchResult(task.row), _processor_time()
-    with failure_kept(result), alone():
-        (prepared,) = case.prepare((), dict(task.changes))
+    with failure_kept(result):
+        prepared = task.study.prepare(case, dict(task.changes))
         watch = Watch(prepared)
         ended: CosimError | None = None
         with running(prepared) as master:

@@ -16,8 +16,8 @@ from orchestrator.certification.refusal import refusing
 from orchestrator.certification.request import GIVEN, CertificationRequest, shown
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 from orchestrator.points.executor import Executor
-from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import CountReport, all_points
+from orchestrator.points.points import CountReport, Work, nobody
+from orchestrator.points.task import StudyCase
 
 
 @dataclass
@@ -63,7 +63,7 @@ def certify_code(
     executor: Executor,
     folder: Path,
     rows: Sequence[str] = (),
-    report: CountReport = lambda done, total: None,
+    report: CountReport = nobody,
 ) -> CodeCertificate:
     """Run a code's rows and judge them."""
     request.check()
@@ -73,11 +73,12 @@ def certify_code(
         _tasks(request, chosen[:1], f_n, trial)
     report(0, len(chosen))
     tasks = _tasks(request, chosen, f_n, folder)
-    found, stored = all_points(BenchResult, compute_row, tasks, executor, folder, report)
+    work = Work.into(folder, executor, report)
+    found = work.all(compute_row, tasks)
     results = {row.name: result for row, result in zip(chosen, found, strict=True)}
     verdicts = [judge_row(row, results[row.name], f_n) for row in chosen]
     description = bound_fmu(request.fmu, request.binding)
-    return CodeCertificate(request, description, verdicts, code, f_n, results, stored=stored)
+    return CodeCertificate(request, description, verdicts, code, f_n, results, stored=work.stored)
 
 
 def _tasks(request: CertificationRequest, rows: Sequence[CodeRow], f_n: float, folder: Path) -> list[BenchTask]:
@@ -85,8 +86,6 @@ def _tasks(request: CertificationRequest, rows: Sequence[CodeRow], f_n: float, f
     tasks = []
     for row in rows:
         path = write_row(request, row.name, row.title, row.programme(f_n), f_n, folder)
-        case = load_case(path)
-        (prepared,) = case.prepare()
-        content = {"bench": row.name, "text": case.text, **scenario_content(prepared)}
-        tasks.append(BenchTask(row.name, reference_to(case), fingerprint(case), key_of(content)))
+        (prepared,) = load_case(path).prepare()
+        tasks.append(BenchTask(StudyCase.of(prepared), row.name))
     return tasks

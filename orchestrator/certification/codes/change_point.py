@@ -2,35 +2,22 @@
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Self
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from orchestrator.cases.case import Case
 from orchestrator.certification.codes.all_codes import code_for
-from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
+from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, row_result
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
-from orchestrator.points.executor import WorkerLostError
 from orchestrator.points.failure import Failure
-from orchestrator.points.store import Arrays
+from orchestrator.points.task import Kept, computed
 from orchestrator.watch.finding import UNSTABLE
 
 ENDED = "runs"  # criterion of a run that ends early; its value is the time of the end
 _TIMED = ("stable", ENDED)
 """Criteria without a figure of their own that are the further off the earlier something goes wrong."""
-
-
-@dataclass(frozen=True)
-class ChangeTask:
-    code: str
-    f_n: float
-    bench: BenchTask
-    declared: tuple[tuple[str, float], ...] = ()
-
-    @property
-    def key(self) -> str:
-        """Name of the result's file."""
-        return self.bench.key
 
 
 @dataclass(frozen=True)
@@ -45,7 +32,7 @@ class ChangedCriterion:
 
 
 @dataclass
-class ChangeResult:
+class ChangeResult(Kept):
     criteria: tuple[ChangedCriterion, ...] = ()
     mark: str = ""  # hash of the response: two responses with one mark agree to the last bit
     failure: Failure | None = None
@@ -54,30 +41,28 @@ class ChangeResult:
     def lasting(self) -> bool:
         return self.failure is None
 
-    @classmethod
-    def lost(cls, _: ChangeTask, error: WorkerLostError) -> Self:
-        """The result of a row whose worker died."""
-        return cls(failure=Failure.lost(error))
 
-    def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
-        return {"criteria": [asdict(criterion) for criterion in self.criteria], "mark": self.mark}, {}
+@dataclass(frozen=True)
+class ChangeTask(BenchTask):
+    record = ChangeResult
+    code: str = ""
+    f_n: float = 0.0
+    declared: tuple[tuple[str, float], ...] = ()
 
-    @classmethod
-    def restored(cls, header: dict[str, Any], arrays: Arrays) -> Self | None:
-        """The result that was stored in this form; None if the file has another form."""
-        try:
-            return cls(tuple(ChangedCriterion(**entry) for entry in header["criteria"]), header["mark"])
-        except (KeyError, TypeError):
-            return None
+    def failed(self, failure: Failure) -> Any:
+        return ChangeResult(failure=failure)
 
 
 def compute_change(task: ChangeTask) -> ChangeResult:
     """Run and judge a changed row; a failure becomes part of the result."""
-    result = compute_row(task.bench)
+    return computed(task, _judged)
+
+
+def _judged(task: ChangeTask, case: Case) -> ChangeResult:
+    result = row_result(task, case)
     if result.failure is not None:
         return ChangeResult(failure=result.failure)
-    row = next(row for row in code_for(task.code, dict(task.declared)).rows if row.name == task.bench.row)
+    row = next(row for row in code_for(task.code, dict(task.declared)).rows if row.name == task.row)
     verdict = judge_row(row, result, task.f_n)
     return ChangeResult(margins_with_time(verdict, result.findings, task.f_n), mark_of(result))
 

@@ -1,7 +1,7 @@
 """Rows of a code's certificate, computed anew and compared with what was certified."""
 
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -21,8 +21,9 @@ from orchestrator.certification.points_anew import differ_signal
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.verification import Verification
 from orchestrator.errors import InputError
-from orchestrator.points.executor import Executor, WorkerLostError
-from orchestrator.points.key import fingerprint, key_of, reference_to
+from orchestrator.points.executor import Executor
+from orchestrator.points.points import CountReport, Work, nobody
+from orchestrator.points.task import StudyCase
 from orchestrator.watch.finding import UNSTABLE
 
 DRAWN = 1  # so many rows are drawn by chance beside the one with the narrowest margin
@@ -50,29 +51,20 @@ def chosen_rows(content: dict[str, Any], wanted: Sequence[str] = (), *, every: b
 
 
 def verify_rows(
-    folder: Path,
-    content: dict[str, Any],
-    names: Sequence[str],
-    executor: Executor,
-    report: Callable[[int, int], None] = lambda done, total: None,
+    folder: Path, content: dict[str, Any], names: Sequence[str], executor: Executor, report: CountReport = nobody
 ) -> Verification:
     """Compute rows anew, from the code's table and the FMU in the folder, and compare them with what was certified."""
     found = Verification()
     code = code_for(content["code"], content["declared"])
     rows = {row.name: row for row in code.rows}
     chosen = [rows[name] for name in names if _as_the_table(folder, content, code, rows[name], found)]
-    tasks = []
-    for row in chosen:
-        case = load_case(folder / case_name(row.name))
-        mark = fingerprint(case)
-        tasks.append(BenchTask(row.name, reference_to(case), mark, key_of({"verify": [mark, row.name]})))
+    cases = [load_case(folder / case_name(row.name)) for row in chosen]
+    tasks = [BenchTask(StudyCase.of(case.prepare()[0]), row.name) for row, case in zip(chosen, cases, strict=True)]
     with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
-        for done, (index, outcome) in enumerate(executor.run(compute_row, tasks), start=1):
-            again = BenchResult.lost(tasks[index], outcome) if isinstance(outcome, WorkerLostError) else outcome
+        for index, again in Work(executor, report=report).each(compute_row, tasks):
             row = chosen[index]
             fault, agreed = _compared(row, content, data, again)
             (found.faults if fault else found.agreed).append(f"row {row.name}{f': {fault}' if fault else agreed}")
-            report(done, len(tasks))
     return found
 
 

@@ -13,7 +13,6 @@ from typing import TypeVar
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.certification.codes.bench_case import DUPLICATE, PLANT, case_name
-from orchestrator.certification.codes.bench_point import BenchTask
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.change_point import (
     ChangedCriterion,
@@ -30,8 +29,8 @@ from orchestrator.coupling.step_awareness import INTERNAL_STEP, STEP_PARAMETER
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.points.executor import Executor
-from orchestrator.points.key import fingerprint, key_of, reference_to, scenario_content
-from orchestrator.points.points import CountReport, all_points
+from orchestrator.points.points import CountReport, Work, nobody
+from orchestrator.points.task import StudyCase
 from orchestrator.sensitivities.parameters import Parameter, parameters_in
 
 CHANGE = 0.05  # by which part of itself a parameter is changed to either side; of 1 of its unit where it is 0
@@ -128,9 +127,7 @@ def _why_not(info: VariableInfo, unknown: Sequence[str], named: bool) -> str:
     return "not asked for" if named or info.variability == "tunable" else "fixed: --fixed takes it"
 
 
-def run_changes(
-    plan: ChangePlan, executor: Executor, report: CountReport = lambda done, total: None
-) -> list[CriterionNeeds]:
+def run_changes(plan: ChangePlan, executor: Executor, report: CountReport = nobody) -> list[CriterionNeeds]:
     """Run the changed rows and work out the slopes; runs are kept as they come."""
     results = _computed(plan, plan.tasks, executor, report)
     found = []
@@ -152,7 +149,7 @@ def run_changes(
 
 def confirm_changes(
     plan: ChangePlan, needs: Sequence[CriterionNeeds], executor: Executor,
-    report: CountReport = lambda done, total: None,
+    report: CountReport = nobody,
 ) -> None:  # fmt: skip
     """Run for each failed criterion the change of one parameter that the straight line asks for.
 
@@ -193,8 +190,8 @@ Place = TypeVar("Place")
 def _computed(
     plan: ChangePlan, tasks: Mapping[Place, ChangeTask], executor: Executor, report: CountReport
 ) -> dict[Place, ChangeResult]:
-    done, _ = all_points(ChangeResult, compute_change, list(tasks.values()), executor, plan.folder, report)
-    return dict(zip(tasks, done, strict=True))
+    work = Work.into(plan.folder, executor, report)
+    return dict(zip(tasks, work.all(compute_change, list(tasks.values())), strict=True))
 
 
 def _task(certificate: CodeCertificate, folder: Path, row: str, parameter: Parameter, change: float) -> ChangeTask:
@@ -204,10 +201,8 @@ def _task(certificate: CodeCertificate, folder: Path, row: str, parameter: Param
     places = [name for name in (PLANT, DUPLICATE) if name in prepared.system.components]
     changes = tuple((f"{name}.{parameter.variable}", value) for name in places)
     declared = tuple(sorted(certificate.code.declared.items()))
-    content = {"bench": row, "code table": certificate.code.key, "f_n": certificate.f_n, "text": prepared.case.text,
-               **scenario_content(prepared), "changes": changes, "declared": declared}  # fmt: skip
-    bench = BenchTask(row, reference_to(prepared.case), fingerprint(prepared.case), key_of(content), changes)
-    return ChangeTask(certificate.code.key, certificate.f_n, bench, declared)
+    code = certificate.code.key
+    return ChangeTask(StudyCase.of(prepared), row, changes, code, certificate.f_n, declared)
 
 
 @lru_cache(maxsize=32)

@@ -1,10 +1,13 @@
 """FMUs that serve one operating point after the other, and the linear models that were made of them."""
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
+from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearization import Blocks, continuous
 from orchestrator.analysis.slope_linearization import covers, linearize_slopes
 from orchestrator.analysis.state_access import StateAccess
 from orchestrator.cases.prepare import PreparedScenario
@@ -19,10 +22,21 @@ from orchestrator.study.start_errors import start_error
 DRIVEN, OBSERVED = ("droop.delta_P_ref", "droop.delta_Q_ref"), ("omega",)
 """Of a converter: where damping controllers act, and what they measure."""
 
+_SHOWN = 3
 _KEPT = 2000  # linear models that are kept at once
 
 
-class ScreeningBench:
+@dataclass(frozen=True)
+class PointModel:
+    """The linear model of a running system without a communication step, and those of its components."""
+
+    model: LinearModel
+    blocks: Blocks
+    components: dict[str, ComponentLinearization]  # with what damping controllers act on and measure
+    doubts: tuple[str, ...]  # a warning where a limit is so close that the model is doubtful
+
+
+class PointBench:
     """Holds the FMUs of one operating point; the next one gets the same FMUs, reset, where it has the same."""
 
     def __init__(self) -> None:
@@ -77,6 +91,15 @@ class ScreeningBench:
             self.reused += 1
         return self._models[key]
 
+    def linear_model(self) -> PointModel:
+        """That of the running system."""
+        assert self._master is not None
+        whole = {name: self.linearized(name) for name in self._master.components}
+        blocks = Blocks(self._master, known={n: without_references(c) for n, c in whole.items()}, without_step=True)
+        doubtful = [f"{name}: {', '.join(c.doubtful[:_SHOWN])}" for name, c in whole.items() if c.doubtful]
+        text = f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:_SHOWN])}"
+        return PointModel(continuous(blocks), blocks, whole, (text,) if doubtful else ())
+
     def close(self) -> None:
         """Free the FMUs; calling it again does nothing."""
         master, self._master = self._master, None
@@ -97,6 +120,12 @@ def is_converter(variables: Any) -> bool:
     return all(name in variables for name in (*DRIVEN, *OBSERVED)) and not any(
         name.startswith("machine.") for name in variables
     )
+
+
+def without_references(c: Any) -> Any:
+    """A converter's linear model without the references that damping controllers act on."""
+    m = len(c.inputs) - (len(DRIVEN) if c.observed else 0)
+    return replace(c, inputs=c.inputs[:m], B_c=c.B_c[:, :m], D=c.D[:, :m], observed=())
 
 
 def _same_fmus(master: Master, prepared: PreparedScenario) -> bool:

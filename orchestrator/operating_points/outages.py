@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
-from orchestrator.screening.columns import Elements
+from orchestrator.operating_points.columns import Elements
 
 INTACT = "intact"  # name of the network without an outage
 _KINDS = ("n-1", "lines", "units")

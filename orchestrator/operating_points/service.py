@@ -7,8 +7,8 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.system import System
-from orchestrator.screening.columns import Elements
-from orchestrator.screening.outages import Remains
+from orchestrator.operating_points.columns import Elements
+from orchestrator.operating_points.outages import Remains
 
 _DEAD_CHARGING = 1e-3  # part of its charging that a dead line keeps: a bus without any has no voltage
 

@@ -9,7 +9,7 @@ from orchestrator.cases.csv_rows import PLACE, Row, place_of, rows_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
-from orchestrator.screening.columns import IN_SERVICE, Elements, Reading, Setting, reading_of
+from orchestrator.operating_points.columns import IN_SERVICE, Elements, Reading, Setting, reading_of
 
 _LABELS = ("time", "name")
 

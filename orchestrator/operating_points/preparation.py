@@ -14,29 +14,15 @@ from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import Dispatch, SharingRule, in_words
 from orchestrator.coupling.system import System
 from orchestrator.errors import CosimError, ErrorKind, InputError, StartError
+from orchestrator.operating_points.columns import Elements
+from orchestrator.operating_points.item import Item, Status
+from orchestrator.operating_points.outages import Remains, what_remains
+from orchestrator.operating_points.service import switched_off, without_units
 from orchestrator.points.failure import Failure
-from orchestrator.screening.columns import Elements
-from orchestrator.screening.outages import Remains, what_remains
-from orchestrator.screening.record import Item, Status
-from orchestrator.screening.service import switched_off, without_units
 
 ACCEPT = 1e-9  # largest change of a state over a communication step with which the power flow's point is a steady state
 
 _PACKAGE = Path(__file__).parent.parent
-
-_STATUS = {
-    ErrorKind.ISLANDING: Status.ISLANDING,
-    ErrorKind.INPUT: Status.VALUES,
-    ErrorKind.VALUES: Status.VALUES,
-    ErrorKind.UNITS: Status.VALUES,
-    ErrorKind.POWER_FLOW: Status.POWER_FLOW,
-    ErrorKind.START: Status.STEADY_STATE,
-    ErrorKind.STEADY_STATE: Status.STEADY_STATE,
-    ErrorKind.HIDDEN_STATES: Status.MODES,
-    ErrorKind.ANALYSIS: Status.MODES,
-}
-"""What an error of each kind makes of an item; of any other kind, an FMU failed."""
-
 
 _OPERATING = {"P_0", "Q_0", "v_0", "theta_0", "S_n", "connected"}
 """What a component that refuses others of its values was not given by the power flow."""
@@ -165,7 +151,7 @@ def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:
     found = Failure.of(error)
     if not isinstance(error, (CosimError, np.linalg.LinAlgError)):
         return Status.INTERNAL, unexpected(error), found.lasting
-    status = _STATUS.get(found.kind, Status.FMU)
+    status = Status.of(found)
     if isinstance(error, StartError) and status is Status.STEADY_STATE:
         given = {key.partition(".")[2] for key in item.values if key.partition(".")[0] == error.component}
         status = Status.VALUES if given - _OPERATING else status

@@ -1,0 +1,72 @@
+"""The operating points and outages of a study, each point with each outage."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.cases.case import Case
+from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
+from orchestrator.errors import InputError
+from orchestrator.operating_points.columns import Elements
+from orchestrator.operating_points.item import Item
+from orchestrator.operating_points.outages import Outage, read_outages
+from orchestrator.operating_points.points_file import OperatingCase, read_points
+
+_MOST = 1_000_000
+
+
+@dataclass(frozen=True)
+class OperatingPoints:
+    # case, prepared: the case, and its scenario as it is without the values of any point
+    case: Case
+    prepared: PreparedScenario
+    layers: tuple[ParameterFile, ...]  # parameter files, and after them the values of the command line; weakest first
+    # points, outages: operating points, and outages; the first outage is the intact network
+    points: tuple[OperatingCase, ...]
+    outages: tuple[Outage, ...]
+    items: tuple[Item, ...]  # each point with each outage that takes anything from it
+
+    def of(self, item: Item) -> tuple[OperatingCase, Outage]:
+        return self.points[item.point], self.outages[item.outage]
+
+
+def read_operating_points(
+    case: Case,
+    points: Path | None,
+    outages: str | None = None,
+    scenario: str | None = None,
+    overrides: Mapping[str, Value] | None = None,
+    step_size: float | None = None,
+    parameters: Sequence[ParameterFile] = (),
+) -> OperatingPoints:
+    """Prepare the scenario, which builds the FMUs that it needs, and read its points and outages.
+
+    ``points``: CSV file with the operating points; None for the case's own.
+    ``outages``: as `read_outages` takes them.
+    ``scenario``: its name; the first one where None.
+    ``overrides``: values by ``component.variable`` that hold at every point.
+    ``step_size``: communication step [s]; the case's where None.
+    """
+    name = scenario or next(iter(case.scenarios))
+    (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
+    layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
+    elements = Elements.of(prepared)
+    own = OperatingCase("case", 1.0, {}, (), str(case.path))
+    rows = [own] if points is None else read_points(points, prepared, elements)
+    lost = read_outages(outages, elements)
+    if len(rows) * len(lost) > _MOST:
+        raise InputError(
+            f"{points}: {len(rows)} operating points with {len(lost)} outages are {len(rows) * len(lost)}; at most "
+            f"{_MOST} are computed: split the file"
+        )
+    items = tuple(
+        Item(p, o, point.values, tuple(dict.fromkeys((*point.out, *outage.elements))),
+             tuple(name for name in outage.elements if name not in point.out))
+        for p, point in enumerate(rows)
+        for o, outage in enumerate(lost)
+        if o == 0 or set(outage.elements) - set(point.out)
+    )  # fmt: skip
+    return OperatingPoints(case, prepared, layers, tuple(rows), tuple(lost), items)

@@ -1,0 +1,70 @@
+"""A study of many points, and where they are computed."""
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Concatenate, Generic, TypeVar
+
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cores import number_of_cores
+from orchestrator.errors import InputError
+from orchestrator.points.dask_cluster import DaskCluster
+from orchestrator.points.executor import Executor
+from orchestrator.points.points import CountReport, Work
+from orchestrator.points.processes import Processes
+from orchestrator.points.serial import Serial
+from orchestrator.points.task import Task
+
+Plan = TypeVar("Plan")
+Result = TypeVar("Result")
+Shown = TypeVar("Shown")
+
+_WORKER = "orchestrator.points.worker"
+
+
+def choose_executor(
+    workers: int | None, scheduler: str | None, imports: Sequence[str], tls: str | Path | None = None
+) -> Executor:
+    """Where the points are computed.
+
+    ``workers``: number of processes on this machine; one for each core where None. ``scheduler``: address of a Dask
+    cluster, such as ``tcp://host:8786``; this machine where None. ``imports``: modules that each
+    worker imports before its first point. ``tls``: as `DaskCluster` takes it.
+    """
+    if scheduler is not None:
+        if workers not in (None, 1):
+            raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
+        return DaskCluster(scheduler, None if tls is None else Path(tls))
+    if tls is not None:
+        raise InputError(f"--tls {tls}: certificates are for a Dask cluster; name its address with --scheduler")
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        raise InputError(f"workers = {workers!r}; it must be a whole number of at least 1")
+    workers = workers or number_of_cores()
+    return Processes(workers, (_WORKER, *imports)) if workers > 1 else Serial()
+
+
+@dataclass(frozen=True)
+class PointStudy(Generic[Plan, Result, Shown]):
+    """A study of many points, from its plan to what users get."""
+
+    run: Callable[Concatenate[Plan, Work, ...], Result]  # computes all points of a plan
+    shown: Callable[[Result], Shown]  # what users get of its result
+    task: type[Task]  # whose module a worker imports
+    prepared: Callable[[Any], Sequence[PreparedScenario]] = lambda plan: [plan.prepared]  # the scenarios of a plan
+
+    @property
+    def imports(self) -> tuple[str, ...]:
+        return (self.task.__module__,)
+
+    def compute(
+        self, planned: Plan, executor: Executor, folder: str | Path | None, report: CountReport, *more: Any
+    ) -> Shown:
+        """Compute a plan, and close the executor.
+
+        ``folder``: its subfolder ``points`` keeps the points; without a folder they are forgotten. ``more``: further
+        arguments of the study.
+        """
+        with TemporaryDirectory() as passing, closing(executor):
+            return self.shown(self.run(planned, Work.into(Path(folder or passing), executor, report), *more))
