@@ -449,7 +449,7 @@ KICK = '[[events]]\ntype = "parameter_change"\ntime = 0.05\ncomponent = "burst"\
 def test_a_component_that_fails_in_the_middle(gfor, tmp_path):
     """ẋ = x² + 100 from 50 ms on: x = 10·tan(10·(t − 50 ms)), infinite at 207 ms."""
     folder = tmp_path / "out"
-    code, out, err = gfor("run", small_case(tmp_path, KICK), "--out", folder)
+    code, out, err = gfor("run", small_case(tmp_path, KICK), "--workers", 1, "--out", folder)
     assert code == 1
     assert "Traceback" not in out + err
     found = re.search(r"error: scenario 'one': component 'burst' at t = (\S+) s: fmi2DoStep returned \w+: (.*)", err)
