@@ -71,7 +71,7 @@ class CertificatePointTask(Task):
     black_box: bool = False
 
     def failed(self, failure: Failure) -> PointResult:
-        return PointResult(self.X_L, self.study.scenario, failure=failure)
+        return PointResult(self.X_L, self.scenario, failure=failure)
 
 
 def compute_point(task: CertificatePointTask) -> PointResult:
@@ -80,7 +80,7 @@ def compute_point(task: CertificatePointTask) -> PointResult:
 
 
 def _result(task: CertificatePointTask, case: Case) -> PointResult:
-    result = PointResult(task.X_L, task.study.scenario)
+    result = PointResult(task.X_L, task.scenario)
     with failure_kept(result):
         _compute(case, task, result)
     return result

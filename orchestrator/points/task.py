@@ -97,6 +97,10 @@ class Task:
     study: StudyCase
     record: ClassVar[Any]  # the class of what comes out, a dataclass with `Kept`
 
+    @property
+    def scenario(self) -> str:
+        return self.study.scenario
+
     @cached_property
     def key(self) -> str:
         """Name of the point's file: a hash of everything that the result depends on."""
