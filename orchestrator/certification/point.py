@@ -56,10 +56,7 @@ class PointResult(Kept):
     findings: list[dict[str, Any]] = field(default_factory=list)
     failure: Failure | None = None  # why there are no modes, or why the response is incomplete
 
-    @property
-    def lasting(self) -> bool:
-        """Failed points are not kept: the cause, such as a missing licence, may be gone next time."""
-        return self.failure is None
+    keeps_failures = False
 
 
 @dataclass(frozen=True)
