@@ -56,10 +56,7 @@ class PointResult(Kept):
     findings: list[dict[str, Any]] = field(default_factory=list)
     failure: Failure | None = None  # why there are no modes, or why the response is incomplete
 
-    @property
-    def lasting(self) -> bool:
-        """Failed points are not kept: the cause, such as a missing licence, may be gone next time."""
-        return self.failure is None
+    keeps_failures = False
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ class CertificatePointTask(Task):
     black_box: bool = False
 
     def failed(self, failure: Failure) -> PointResult:
-        return PointResult(self.X_L, self.study.scenario, failure=failure)
+        return PointResult(self.X_L, self.scenario, failure=failure)
 
 
 def compute_point(task: CertificatePointTask) -> PointResult:
@@ -80,7 +77,7 @@ def compute_point(task: CertificatePointTask) -> PointResult:
 
 
 def _result(task: CertificatePointTask, case: Case) -> PointResult:
-    result = PointResult(task.X_L, task.study.scenario)
+    result = PointResult(task.X_L, task.scenario)
     with failure_kept(result):
         _compute(case, task, result)
     return result

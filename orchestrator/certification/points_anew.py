@@ -59,7 +59,7 @@ def verify_points(
     with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
         for index, again in Work(executor, report=report).each(compute_point, tasks):
             task = tasks[index]
-            _compare_point(points[task.X_L], task.study.scenario, again, data, str(content["signal"]), found)
+            _compare_point(points[task.X_L], task.scenario, again, data, str(content["signal"]), found)
     return found
 
 

@@ -105,7 +105,7 @@ def certify(
     tasks = tasks_of(prepared, request, controllers)
     work = Work.into(folder, executor, report)
     found = work.all(compute_point, tasks)
-    points = {(task.study.scenario, task.X_L): point for task, point in zip(tasks, found, strict=True)}
+    points = {(task.scenario, task.X_L): point for task, point in zip(tasks, found, strict=True)}
     event, having = prepared[WITH].events[0].time, prepared[WITH]
     verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
     description = having.system.components[CONVERTER].description

@@ -1,18 +1,13 @@
 """The master: brings FMUs to life, exchanges their values, and steps them along a schedule."""
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
-from orchestrator.coupling.coupled import open_plan
 from orchestrator.coupling.events import Event, Forcing
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.run import Run
 from orchestrator.coupling.run_state import NOT_KEPT, Keeper
-from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.statistics import StepStatistics
 from orchestrator.coupling.stepping import Stepper
-from orchestrator.coupling.system import ComponentPlan, System
-from orchestrator.fmi.component import Component
 from orchestrator.fmi.interrupts import calls
 
 
@@ -34,17 +29,6 @@ class Master(Stepper):
     same inputs. Its partners were initialised with the first value.
     ``wires``: The connections that do more than carry a value.
     """
-
-    def __init__(
-        self,
-        system: System,
-        schedule: Schedule,
-        step_size: float,
-        stop_time: float | None = None,
-        opener: Callable[[str, ComponentPlan, Path], Component] = open_plan,
-        threads: int | None = 1,
-    ) -> None:
-        super().__init__(system, schedule, step_size, stop_time, opener, threads)
 
     def run(
         self,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.coupling.adaptive import AdaptiveLoop
-from orchestrator.coupling.coupled import CoupledComponents
+from orchestrator.coupling.coupled import CoupledComponents, open_plan
 from orchestrator.coupling.loop import make_loop
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.second_order import line_loop
@@ -26,8 +26,8 @@ class Stepper(CoupledComponents):
         system: System,
         schedule: Schedule,
         step_size: float,
-        stop_time: float | None,
-        opener: Callable[[str, ComponentPlan, Path], Component],
+        stop_time: float | None = None,
+        opener: Callable[[str, ComponentPlan, Path], Component] = open_plan,
         threads: int | None = 1,
     ) -> None:
         self.index = 0

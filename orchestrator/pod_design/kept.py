@@ -5,19 +5,20 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.points.key import key_of, scenario_content
+from orchestrator.points.key import key_of
 from orchestrator.points.store import Arrays, PointStore
+from orchestrator.points.task import StudyCase
 
 
 class KeptFigures:
-    def __init__(self, store: PointStore | None = None, content: Mapping[str, Any] | None = None) -> None:
-        self._store, self._content = store, dict(content or {})
+    def __init__(self, store: PointStore | None = None, mark: str = "") -> None:
+        self._store, self._mark = store, mark
 
     def get(self, what: Mapping[str, Any], compute: Callable[[], Arrays]) -> Arrays:
         """The arrays of something, computed where they are not there yet."""
         if self._store is None:
             return compute()
-        key = key_of({**self._content, **what}, "orchestrator.pod_design.design")
+        key = key_of({"design": self._mark, **what}, "orchestrator.pod_design.design")
         found = self._store.load(key)
         if found is not None:
             return found[1]
@@ -27,14 +28,8 @@ class KeptFigures:
 
 
 def figures_of(prepared: PreparedScenario, store: PointStore | None) -> KeptFigures:
-    groups = [list(group) for group in prepared.schedule.groups]
-    content = {
-        "design": prepared.case.text,
-        **scenario_content(prepared),
-        "step": prepared.step_size,
-        "schedule": [prepared.schedule.name, *groups],
-    }
-    return KeptFigures(store, content)
+    schedule = [prepared.schedule.name, *map(list, prepared.schedule.groups)]
+    return KeptFigures(store, StudyCase.of(prepared, step_size=prepared.step_size, schedule=schedule).mark)
 
 
 def digest(*arrays: Any) -> str:

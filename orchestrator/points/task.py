@@ -67,6 +67,7 @@ class Kept:
     """What comes out of a point; mixed into a dataclass, which `PointStore` keeps."""
 
     failure: Failure | None
+    keeps_failures = True  # False where the cause, such as a missing licence, may be gone next time
 
     @property
     def error(self) -> str | None:
@@ -76,7 +77,7 @@ class Kept:
     @property
     def lasting(self) -> bool:
         """Whether computing the point again would give the same. Only such records are kept."""
-        return self.failure is None or self.failure.lasting
+        return self.failure is None or (self.keeps_failures and self.failure.lasting)
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
         """Header and arrays for a `PointStore`."""
@@ -96,6 +97,10 @@ class Kept:
 class Task:
     study: StudyCase
     record: ClassVar[Any]  # the class of what comes out, a dataclass with `Kept`
+
+    @property
+    def scenario(self) -> str:
+        return self.study.scenario
 
     @cached_property
     def key(self) -> str:

@@ -115,7 +115,7 @@ def test_whose_share_counts_in_a_sweep(case, tmp_path, vary, fixed, shares):
     planned = plan_sweep(case(), [parse_vary(vary)], ["plain"], fixed, None,
                          parameters=[file])  # fmt: skip
     task = planned.task(planned.scenarios[0], (0,))
-    (ready,) = planned.case.prepare([task.scenario], task.overrides, None, None, task.layers)
+    (ready,) = planned.case.prepare([task.scenario], task.overrides, None, None, task.study.layers)
     v = ready.values
     found = tuple(v[f"gfor{n}.S_n"] / (v[f"gfor{n}.S_n"] + v[f"sg{n}.S_n"]) for n in (7, 20))
     assert found == pytest.approx(shares)

@@ -27,10 +27,7 @@ class BenchResult(Kept):
     seconds: float = 0.0  # processor time of the run, that of FMUs in processes of their own included [s]
     failure: Failure | None = None
 
-    @property
-    def lasting(self) -> bool:
-        """Failed rows are not kept: the cause, such as a missing licence, may be gone next time."""
-        return self.failure is None
+    keeps_failures = False
 
 
 @dataclass(frozen=True)

@@ -37,9 +37,7 @@ class ChangeResult(Kept):
     mark: str = ""  # hash of the response: two responses with one mark agree to the last bit
     failure: Failure | None = None
 
-    @property
-    def lasting(self) -> bool:
-        return self.failure is None
+    keeps_failures = False
 
 
 @dataclass(frozen=True)
