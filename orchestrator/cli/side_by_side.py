@@ -15,7 +15,6 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection, Pipe, wait
-from types import TracebackType
 from typing import cast
 
 from fmus.toolchain import temporary
@@ -23,6 +22,7 @@ from orchestrator.cli.interrupted import is_interrupt
 from orchestrator.cores import number_of_cores
 from orchestrator.errors import CosimError, ErrorKind, RunInterruptedError
 from orchestrator.fmi.interrupts import calls
+from orchestrator.fmi.linux import die_with_parent
 from orchestrator.study.run import RunResult
 
 Outcome = RunResult | BaseException
@@ -127,9 +127,7 @@ class SideBySide:
                 kind=ErrorKind.WORKER_LOST,
             )
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         with calls:
             for pipe, process in self._copies.items():
                 if kind is not None:
@@ -156,8 +154,6 @@ def _serve(
 
     Ctrl-C of a terminal, which reaches every process, is the original's to pass on, as SIGUSR1.
     """
-    from orchestrator.fmi.linux import die_with_parent  # noqa: PLC0415 - Linux only
-
     code = 1
     try:
         die_with_parent(signal.SIGKILL)
