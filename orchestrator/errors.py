@@ -1,5 +1,6 @@
 """The errors a user can meet. Each message says what failed, where, the value seen, the rule and the remedy."""
 
+import copyreg
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -62,13 +63,7 @@ class CosimError(Exception):
             self.kind = kind
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made_again, (type(self), self.args, self.__dict__)  # it may have been made from other arguments
-
-
-def _made_again(kind: type[CosimError], arguments: tuple[Any, ...], values: dict[str, Any]) -> CosimError:
-    error = kind.__new__(kind, *arguments)
-    error.__dict__.update(values)
-    return error
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # it may have been made from other arguments
 
 
 class InputError(CosimError):

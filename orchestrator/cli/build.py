@@ -11,7 +11,7 @@ from orchestrator.api.models import build, catalogue_model
 from orchestrator.cases.build_choices import PARTS
 from orchestrator.cli import linear_model
 from orchestrator.cli.arguments import option, repeatable, switch
-from orchestrator.cli.build_hosts import HOSTS, port_of, with_port
+from orchestrator.cli.build_hosts import HOSTS, with_port
 from orchestrator.cli.terminal import make_errors, said_stages
 from orchestrator.errors import InputError
 
@@ -90,9 +90,8 @@ def _take_from_table(options: argparse.Namespace) -> None:
     options.native, options.fmi, options.platform = host.native, host.fmi, list(host.platforms)
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     options.names = list(dict.fromkeys(with_port(name, host.port, model_names()) for name in names))
-    ports = dict.fromkeys(port_of(name) for name in options.names)
     make_errors().print(
-        f"for {options.host}: {host.kind}, FMI {host.fmi}, {', '.join(host.platforms)}; port: {'; '.join(ports)}. Why: "
+        f"for {options.host}: {host.kind}, FMI {host.fmi}, {', '.join(host.platforms)}; port: {host.port}. Why: "
         f"{host.why} ({host.source})", soft_wrap=True, markup=False,
     )  # fmt: skip
 

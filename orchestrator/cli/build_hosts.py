@@ -7,12 +7,7 @@ from fmus.toolchain.model import FmiVersion
 
 Port = Literal["dq", "abc", "phasor"]
 
-PORTS: dict[Port, tuple[str, str]] = {
-    "dq": ("", "voltage and current in the network frame"),
-    "abc": ("_abc", "three instantaneous phases"),
-    "phasor": ("_phasor", "an emf behind an admittance"),
-}
-"""Ending of the names of models with that port, and what it is."""
+ENDINGS: dict[Port, str] = {"dq": "", "abc": "_abc", "phasor": "_phasor"}  # of the names of models with a port
 
 
 @dataclass(frozen=True)
@@ -62,12 +57,5 @@ HOSTS: dict[str, Host] = {
 
 def with_port(name: str, port: Port, known: tuple[str, ...]) -> str:
     """The model with a port; the one that was asked for where it has another port by its name, or there is none."""
-    if any(ending and name.endswith(ending) for ending, _ in PORTS.values()):
-        return name
-    found = name + PORTS[port][0]
-    return found if found in known else name
-
-
-def port_of(name: str) -> str:
-    """What the port of a model is."""
-    return next((words for ending, words in PORTS.values() if ending and name.endswith(ending)), PORTS["dq"][1])
+    found = name + ENDINGS[port]
+    return found if found in known and not name.endswith(("_abc", "_phasor")) else name

@@ -4,6 +4,7 @@ import argparse
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     stopped: dict[str, BaseException] = {}
 
     def work(index: int, report: Report) -> Outcome:
+        report(0, 0)
         place = ScenarioFolder(folder, scenarios[index].name, run_id)
         try:
             result = _run_into(place, scenarios[index], Progress(report), kept, options, engine)
@@ -115,13 +117,13 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
                 place.discard()
             else:
                 save_run(result, place, csv=options.csv)
+                result.dataset = result.dataset if workers == 1 else xr.Dataset()  # it is read again from the disk
         except (CosimError, KeyboardInterrupt) as error:
             place.discard()
             return error
         return result
 
-    done = _one_after_the_other if workers == 1 else _side_by_side
-    for index, outcome in done(scenarios, work, console, workers):
+    for index, outcome in _outcomes(scenarios, work, console, workers):
         if isinstance(outcome, BaseException):
             stopped[scenarios[index].name] = outcome
             continue
@@ -159,41 +161,28 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     return int(unsound) or exit_code(options, [r.modes.stability for r in results])
 
 
-def _one_after_the_other(
-    scenarios: Sequence[Scenario], work: Callable[[int, Report], Outcome], console: Console, _: int
+def _outcomes(
+    scenarios: Sequence[Scenario], work: Callable[[int, Report], Outcome], console: Console, workers: int
 ) -> Iterator[tuple[int, Outcome]]:
-    """What comes of each scenario, until one fails."""
-    with progress_bar(console) as bar:
-        for index, scenario in enumerate(scenarios):
-            task = bar.add_task(scenario.title, total=None)
-            outcome = work(index, lambda done, total, task=task: bar.update(task, completed=done, total=total))  # type: ignore[misc]
+    """What came of all scenarios that were begun, in order, each with a bar meanwhile."""
+    bar, tasks = progress_bar(console), dict[int, Any]()
+
+    def report(index: int, done: int, total: int) -> None:
+        if index not in tasks:
+            tasks[index] = bar.add_task(scenarios[index].title, total=None)
+        bar.update(tasks[index], completed=done, total=total or None)
+
+    if workers > 1:
+        with SideBySide(workers, work) as copies, bar:
+            outcomes = copies.outcomes(len(scenarios), report)
+        yield from outcomes
+        return
+    with bar:
+        for index in range(len(scenarios)):
+            outcome = work(index, partial(report, index))
             yield index, outcome
             if isinstance(outcome, BaseException) or outcome.failure:
                 return
-
-
-def _side_by_side(
-    scenarios: Sequence[Scenario], work: Callable[[int, Report], Outcome], console: Console, workers: int
-) -> Iterator[tuple[int, Outcome]]:
-    """What came of all scenarios that were begun, each in another process; their recordings stay on the disk."""
-
-    def without_recording(index: int, report: Report) -> Outcome:
-        report(0, 0)
-        outcome = work(index, report)
-        if isinstance(outcome, RunResult) and not isinstance(outcome.failure, ResultsError):
-            outcome.dataset = xr.Dataset()
-        return outcome
-
-    with SideBySide(workers, without_recording) as copies, progress_bar(console) as bar:
-        tasks: dict[int, Any] = {}
-
-        def report(index: int, done: int, total: int) -> None:
-            if index not in tasks:
-                tasks[index] = bar.add_task(scenarios[index].title, total=None)
-            bar.update(tasks[index], completed=done, total=total or None)
-
-        outcomes = copies.outcomes(len(scenarios), report)
-    yield from outcomes
 
 
 def _say_unfinished(folder: Path) -> None:

@@ -12,9 +12,9 @@ import threading
 import time
 import traceback
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection, Pipe, wait
-from types import TracebackType
 from typing import cast
 
 from fmus.toolchain import temporary
@@ -22,6 +22,7 @@ from orchestrator.cli.interrupted import is_interrupt
 from orchestrator.cores import number_of_cores
 from orchestrator.errors import CosimError, ErrorKind, RunInterruptedError
 from orchestrator.fmi.interrupts import calls
+from orchestrator.fmi.linux import die_with_parent
 from orchestrator.study.run import RunResult
 
 Outcome = RunResult | BaseException
@@ -84,7 +85,8 @@ class SideBySide:
                     while waiting and idle:
                         pipe = idle.pop(0)
                         under_way[pipe] = waiting.pop(0)
-                        pipe.send(under_way[pipe])
+                        with suppress(BrokenPipeError):  # a copy that died while it was idle is found below
+                            pipe.send(under_way[pipe])
                 if not under_way:
                     break
                 for pipe in cast("list[Connection]", wait(list(under_way))):
@@ -103,7 +105,8 @@ class SideBySide:
                     raise
                 told = True
                 waiting.clear()
-                self._tell(signal.SIGTERM if calls.terminated else signal.SIGUSR1, list(under_way))
+                for pipe in under_way:
+                    os.kill(self._copies[pipe], signal.SIGTERM if calls.terminated else signal.SIGUSR1)
         if told and not any(_was_interrupted(outcome) for outcome in done.values()):
             if len(done) == count:
                 raise KeyboardInterrupt  # it came when all was done but what concerns all scenarios
@@ -112,7 +115,7 @@ class SideBySide:
 
     def _received(self, pipe: Connection) -> tuple[int, int] | Outcome:
         try:
-            said: tuple[int, int] | Outcome = pipe.recv()
+            return cast("tuple[int, int] | Outcome", pipe.recv())
         except (EOFError, ConnectionResetError):
             _, status = os.waitpid(self._copies.pop(pipe), 0)
             if calls.taken:
@@ -123,20 +126,12 @@ class SideBySide:
                 f"its process ended {how}; is there too little memory? --workers 1 runs one scenario after the other",
                 kind=ErrorKind.WORKER_LOST,
             )
-        return said
 
-    def _tell(self, number: signal.Signals, pipes: Sequence[Connection]) -> None:
-        for pipe in pipes:
-            if pipe in self._copies:
-                os.kill(self._copies[pipe], number)
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         with calls:
-            if kind is not None:
-                self._tell(signal.SIGTERM, list(self._copies))
-            for pipe in self._copies:
+            for pipe, process in self._copies.items():
+                if kind is not None:
+                    os.kill(process, signal.SIGTERM)
                 pipe.close()  # who waits for work finds that there is none
             end = time.monotonic() + _PATIENCE
             for process in self._copies.values():
@@ -159,8 +154,6 @@ def _serve(
 
     Ctrl-C of a terminal, which reaches every process, is the original's to pass on, as SIGUSR1.
     """
-    from orchestrator.fmi.linux import die_with_parent  # noqa: PLC0415 - Linux only
-
     code = 1
     try:
         die_with_parent(signal.SIGKILL)
@@ -174,7 +167,7 @@ def _serve(
                 outcome = _outcome(index, pipe, work)
                 with calls:
                     pipe.send(outcome)
-    except (EOFError, OSError, KeyboardInterrupt):
+    except (EOFError, BrokenPipeError, ConnectionResetError, KeyboardInterrupt):
         code = 0  # nobody wants more
     except BaseException:
         traceback.print_exc()

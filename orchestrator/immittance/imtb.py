@@ -13,8 +13,7 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import InputError
-from orchestrator.immittance.scan import SIEMENS, Scan, checked, in_own_form
-from orchestrator.safe_files import write_text
+from orchestrator.immittance.scan import Scan, checked, in_own_form
 
 _ELEMENTS = ("11", "12", "21", "22")
 _SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
@@ -52,18 +51,3 @@ def _numbers(path: Path, rows: list[dict[str, str]], name: str) -> tuple[Numbers
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"{path.name}, line {number}: {name} is no row of numbers ({error})") from error
     return np.array([f for f, _ in found]), np.array([v for _, v in found]).reshape(-1, 2, 2)
-
-
-def write_imtb(scan: Scan, path: Path, name: str = "Zdut") -> None:
-    """Write the impedances of a scan of one port in siemens, in dq."""
-    if scan.unit != SIEMENS or len(scan.ports) != 1:
-        raise InputError(f"{scan.source}: IMTB's form has one port in ohms; give the base of a scan in per unit")
-    columns = [f"{name}_dq_{e}_{part}" for e in _ELEMENTS for part in ("re", "im", "abs", "dB", "pha_rad", "pha_deg")]
-    lines = [",".join(["f", *columns])]
-    for f, matrix in zip(scan.frequencies.tolist(), scan.impedance.reshape(-1, 4).tolist(), strict=True):
-        cells = [f]
-        for z in matrix:
-            phase = math.atan2(z.imag, z.real)
-            cells += [z.real, z.imag, abs(z), 20 * math.log10(abs(z) or 1e-300), phase, math.degrees(phase)]
-        lines.append(",".join(map(repr, cells)))
-    write_text(path, "\n".join(lines) + "\n")

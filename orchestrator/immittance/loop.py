@@ -51,12 +51,6 @@ class LoopPath:
         """Turn of det(1 + L) from point to point [rad]."""
         return np.asarray(np.angle(self.det[1:] / self.det[:-1]))
 
-    @property
-    def locus_turns(self) -> Numbers:
-        """The same of each 1 + λ, summed over the loci."""
-        around = 1 + self.loci
-        return np.asarray(np.angle(around[1:] / around[:-1]).sum(axis=1))
-
     @cached_property
     def distance(self) -> Numbers:
         """Smallest singular value of 1 + L: how far L is from a matrix with the eigenvalue −1."""

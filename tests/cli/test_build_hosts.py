@@ -9,7 +9,7 @@ import pytest
 from fmus.toolchain.catalogue import model_names
 from fmus.toolchain.compiler import TARGETS
 from orchestrator.cli import build as command
-from orchestrator.cli.build_hosts import HOSTS, PORTS, with_port
+from orchestrator.cli.build_hosts import ENDINGS, HOSTS, with_port
 from orchestrator.fmi.description import read_description
 
 PAGE = Path(__file__).parents[2] / ".docs" / "how-to" / "use-in-another-tool.md"
@@ -33,7 +33,7 @@ def test_a_host_gets_what_its_row_says(name, built):
     host = HOSTS[name]
     code, ((model, how),), error = built("gfor", "--for", name)
     assert code == 0
-    assert model == "gfor" + PORTS[host.port][0]
+    assert model == "gfor" + ENDINGS[host.port]
     assert (how["native"], how["fmi"], how["platforms"]) == (host.native, host.fmi, list(host.platforms))
     assert f"for {name}: {host.kind}, FMI {host.fmi}, " in error
     assert host.source in error
@@ -45,7 +45,7 @@ def test_a_model_without_the_port_and_one_that_names_its_own_stay(built):
     assert with_port("gfor_phasor", "abc", model_names()) == "gfor_phasor"
     _, made, error = built("gfor", "static_generation", "gfor_abc", "--for", "powerfactory")
     assert [model for model, _ in made] == ["gfor_phasor", "static_generation_phasor", "gfor_abc"]
-    assert "port: an emf behind an admittance; three instantaneous phases" in error
+    assert "port: phasor" in error
 
 
 @pytest.mark.parametrize("words", [("--native",), ("--fmi", "2.0"), ("--platform", "win64")])

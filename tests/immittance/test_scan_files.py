@@ -1,16 +1,31 @@
 """Scans in the forms of Z-tool and IMTB: read, written, and refused with what is wrong."""
 
+import math
+
 import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
-from orchestrator.immittance.imtb import write_imtb
 from orchestrator.immittance.scan import PortPoint, Scan, check_sign, other_q_axis
 from orchestrator.immittance.scan_files import read_scan
 from orchestrator.immittance.ztool import write_ztool
 from tests.immittance.plants import Line, constant_power
 
 F = np.geomspace(1, 500, 120)
+
+
+def write_imtb(scan, path, name="Zdut"):
+    """The impedances of a scan of one port in siemens, in dq, as IMTB writes them."""
+    elements = ("11", "12", "21", "22")
+    columns = [f"{name}_dq_{e}_{part}" for e in elements for part in ("re", "im", "abs", "dB", "pha_rad", "pha_deg")]
+    lines = [",".join(["f", *columns])]
+    for f, matrix in zip(scan.frequencies.tolist(), scan.impedance.reshape(-1, 4).tolist(), strict=True):
+        cells = [f]
+        for z in matrix:
+            phase = math.atan2(z.imag, z.real)
+            cells += [z.real, z.imag, abs(z), 20 * math.log10(abs(z) or 1e-300), phase, math.degrees(phase)]
+        lines.append(",".join(map(repr, cells)))
+    path.write_text("\n".join(lines) + "\n")
 
 
 def a_scan(ports=("PCC-1",), **more):
