@@ -226,12 +226,12 @@ def test_responses_are_drawn_and_a_run_is_streamed(browser, tmp_path, monkeypatc
 
 @needs_chromium
 def test_a_worker_that_dies_ends_its_computation_and_not_the_page(view, two_area):
-    os.kill(two_area.computing["modes"].process, signal.SIGKILL)
+    os.kill(two_area.computing["modes"]._process.pid, signal.SIGKILL)
     two_area.computing["modes"]._process.wait()
     view.locator("#scenario").select_option("gfor")
     computed(view, 2)  # it was seen to be gone, and begun anew
     control = add(view, "grid.X_L")
-    os.kill(two_area.computing["modes"].process, signal.SIGSTOP)
+    os.kill(two_area.computing["modes"]._process.pid, signal.SIGSTOP)
     control.locator('input[type="text"]').fill("0.2")
     control.locator('input[type="text"]').press("Enter")
     view.locator("#cancel").click()

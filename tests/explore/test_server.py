@@ -208,14 +208,14 @@ def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
     done = in_background(computing, values={"grid.X_L": 0.2})
     wait_until(lambda: computing._at_work is not None)
-    os.kill(computing.process, signal.SIGKILL)
+    os.kill(computing._process.pid, signal.SIGKILL)
     assert "signal 9" in done()["error"]
     assert "answer" in answer(computing)
 
 
 def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
-    os.kill(computing.process, signal.SIGSTOP)
+    os.kill(computing._process.pid, signal.SIGSTOP)
     done = in_background(computing)
     wait_until(lambda: computing._at_work is not None)
     computing.cancel("p")
@@ -228,7 +228,7 @@ def test_a_hanging_process_is_ended_after_a_while():
     computing.ask("p", {"ask": "open"}, lambda part: None)
     computing._longest = 60.0
     assert "answer" in answer(computing)
-    os.kill(computing.process, signal.SIGSTOP)
+    os.kill(computing._process.pid, signal.SIGSTOP)
     computing._longest = 1.0
     assert "more than 1 s" in answer(computing)["error"]
     computing.close()
@@ -296,7 +296,7 @@ def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch
     computing, parts = Computing("short.toml"), []
     found = computing.ask("p", {"ask": "run", "scenario": "dip", "signals": ["grid.v"]}, parts.append)["answer"]
     computing.close()
-    assert found["folder"].startswith("results")
+    assert found["folder"].startswith(os.path.join("results", "explore"))
     assert tomllib.loads((tmp_path / found["folder"] / "case.toml").read_text(encoding="utf-8"))
     assert main(["run", "short.toml", "--scenario", "dip", "--out", "run"]) == 0
     capsys.readouterr()
@@ -340,4 +340,4 @@ def test_what_cannot_be_shown_is_said_at_once(words, says, capsys):
 def test_a_port_is_a_number(port, capsys):
     with pytest.raises(SystemExit):
         main(["explore", "two_area", "--port", port])
-    assert "is no port" in capsys.readouterr().err or port == "-1"
+    assert "is not a port" in capsys.readouterr().err or port == "-1"
