@@ -44,12 +44,8 @@ def chosen(scenario: Scenario, wanted: Sequence[str]) -> list[str]:
 def curves(dataset: xr.Dataset, names: Sequence[str]) -> dict[str, list[list[float]]]:
     """By signal its times and values, thinned so that peaks stay."""
     times: Numbers = dataset["time"].values
-    found = {}
-    for name in names:
-        values = signal(dataset, name)
-        if values is not None:
-            found[name] = [part.tolist() for part in thinned(times, np.asarray(values.values, dtype=float))]
-    return found
+    found = {name: seen for name in names if (seen := signal(dataset, name)) is not None}
+    return {name: [part.tolist() for part in thinned(times, seen.values)] for name, seen in found.items()}
 
 
 class Streamed:

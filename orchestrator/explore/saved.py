@@ -37,10 +37,9 @@ def save_page(
     asked = {"scenario": name, "range": beginning["range"]}
     answers = []
     for done, point in enumerate(points):
-        report(done, len(points))
+        report(done + 1, len(points))
         found = desk.answer({**asked, "ask": "modes", "values": {**values, **point}}, lambda part: None)
         answers.append({"scenario": name, "values": point, "answer": found})
-    report(len(points), len(points))
     opened = desk.answer({"ask": "open"}, lambda part: None)
     parameters = desk.answer({**asked, "ask": "parameters"}, lambda part: None)
     content = {
