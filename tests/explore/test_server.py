@@ -164,6 +164,7 @@ def test_figures_are_those_of_the_command_that_is_copied(computing, capsys, valu
     assert found["verdict"] == found["modes"]["scenarios"][0]["stability"]["sentence"]
 
 
+@pytest.mark.slow
 def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(computing, tmp_path, capsys):
     values = {"gfor.pod_p.K": 137.25, "grid.X_L": 0.31}
     found = answer(computing, values=values)["answer"]
@@ -178,6 +179,7 @@ def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(compu
     assert names["modes"].as_json()["scenarios"][0]["modes"] == before["modes"]
 
 
+@pytest.mark.slow
 def test_slopes_are_those_of_the_sensitivities(computing):
     found = answer(computing, ask="slopes", parameter="gfor.pod_p.K")["answer"]
     row = gfor.load("two_area").scenario("pod_p").sensitivities(parameters="gfor.pod_p.K").table().iloc[0]
@@ -204,6 +206,7 @@ def test_parameters_have_units_bounds_and_words(computing):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
     done = in_background(computing, values={"grid.X_L": 0.2})
@@ -213,6 +216,7 @@ def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
 
 
+@pytest.mark.slow
 def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
     os.kill(computing._process.pid, signal.SIGSTOP)
@@ -223,6 +227,7 @@ def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
 
 
+@pytest.mark.slow
 def test_a_hanging_process_is_ended_after_a_while():
     computing = Computing("two_area", longest=1.0)
     computing.ask("p", {"ask": "open"}, lambda part: None)
@@ -234,6 +239,7 @@ def test_a_hanging_process_is_ended_after_a_while():
     computing.close()
 
 
+@pytest.mark.slow
 def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     first = in_background(computing, values={"grid.X_L": 0.21})
     wait_until(lambda: computing._at_work is not None)
@@ -244,6 +250,7 @@ def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     assert "grid.X_L=0.23" in third()["answer"]["copied"]["command"]
 
 
+@pytest.mark.slow
 def test_two_pages_do_not_disturb_each_other(computing):
     first = in_background(computing, page="one", values={"grid.X_L": 0.21})
     second = in_background(computing, page="two", values={"grid.X_L": 0.22})
@@ -276,6 +283,7 @@ def wait_until(holds, seconds=30):
         time.sleep(0.005)
 
 
+@pytest.mark.slow
 def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(gfor.load("infinite_bus").file.text, encoding="utf-8")
@@ -288,6 +296,7 @@ def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     computing.close()
 
 
+@pytest.mark.slow
 def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = gfor.load("infinite_bus").file.text
@@ -311,6 +320,7 @@ def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch
 # -- the command -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_command_prints_its_address_and_ends_by_ctrl_c():
     words = [sys.executable, "-m", "orchestrator.cli", "explore", "infinite_bus", "--no-browser"]
     with subprocess.Popen(
