@@ -165,6 +165,7 @@ def test_figures_are_those_of_the_command_that_is_copied(computing, capsys, valu
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(computing, tmp_path, capsys):
     values = {"gfor.pod_p.K": 137.25, "grid.X_L": 0.31}
     found = answer(computing, values=values)["answer"]
@@ -179,6 +180,7 @@ def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(compu
     assert names["modes"].as_json()["scenarios"][0]["modes"] == before["modes"]
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_slopes_are_those_of_the_sensitivities(computing):
     found = answer(computing, ask="slopes", parameter="gfor.pod_p.K")["answer"]
@@ -207,6 +209,7 @@ def test_parameters_have_units_bounds_and_words(computing):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
     done = in_background(computing, values={"grid.X_L": 0.2})
@@ -216,6 +219,7 @@ def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
@@ -227,6 +231,7 @@ def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_a_hanging_process_is_ended_after_a_while():
     computing = Computing("two_area", longest=1.0)
@@ -240,6 +245,7 @@ def test_a_hanging_process_is_ended_after_a_while():
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     first = in_background(computing, values={"grid.X_L": 0.21})
     wait_until(lambda: computing._at_work is not None)
@@ -250,6 +256,7 @@ def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     assert "grid.X_L=0.23" in third()["answer"]["copied"]["command"]
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_two_pages_do_not_disturb_each_other(computing):
     first = in_background(computing, page="one", values={"grid.X_L": 0.21})
@@ -284,6 +291,7 @@ def wait_until(holds, seconds=30):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(gfor.load("infinite_bus").file.text, encoding="utf-8")
@@ -296,6 +304,7 @@ def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     computing.close()
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -320,6 +329,7 @@ def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch
 # -- the command -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_the_command_prints_its_address_and_ends_by_ctrl_c():
     words = [sys.executable, "-m", "orchestrator.cli", "explore", "infinite_bus", "--no-browser"]
