@@ -9,7 +9,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.case import load
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import UnusualDataWarning
-from orchestrator.asked import read_range
+from orchestrator.asked import read_range, read_whole
 from orchestrator.cli.arguments import assignment, option, repeatable, switch
 from orchestrator.cli.case_arguments import add_trust_argument, values_set
 from orchestrator.errors import InputError
@@ -28,7 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--range", "LO:HI", "frequencies shown first [Hz] (default: 0.1:2)", read=read_range,
            default=ELECTROMECHANICAL_HZ)  # fmt: skip
     option(
-        parser, "--port", "N", "of the server, on this machine alone (default: any that is free)", read=_port, default=0
+        parser,
+        "--port",
+        "N",
+        "of the server, on this machine alone (default: any that is free)",
+        read=read_whole(1, 65535, "a port"),
+        default=0,
     )
     switch(parser, "--no-browser", "print the address, and open no browser")
     option(parser, "--save", "FILE.html", "write a page that needs neither server nor Python, and open none", read=Path)
@@ -59,9 +64,3 @@ def run(options: argparse.Namespace) -> int:
         webbrowser.open(explorer.address)
     explorer.serve()
     return 0
-
-
-def _port(text: str) -> int:
-    if not text.isdecimal() or not 0 < int(text) < 2**16:
-        raise ValueError(f"{text!r} is no port; give a whole number from 1 to 65535")
-    return int(text)

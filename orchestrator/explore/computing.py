@@ -15,22 +15,16 @@ from orchestrator.errors import ErrorKind
 
 Answer = dict[str, Any]
 
-Asker = tuple[str, str]
-"""A page, and the kind of its question."""
+Asker = tuple[str, str]  # a page, and the kind of its question
 
-LONGEST = 3600.0
-"""A computation that takes longer is ended [s]."""
-
+LONGEST = 3600.0  # a computation that takes longer is ended [s]
 _RESTART = 3.0  # to start the process anew takes about so long [s]
 _TO_LEAVE = 3.0  # until a process that was asked to end is killed [s]
 _ROOT = str(Path(__file__).parents[2])
 
 
 class Computing:
-    """A worker process, begun when it is first needed, and again after it died or was ended.
-
-    ``longest``: after which a computation is ended [s].
-    """
+    """A worker process, begun when it is first needed, and again after it died or was ended."""
 
     def __init__(self, case: str, *, trust_fmus: bool = False, longest: float = LONGEST) -> None:
         self._given = {"case": case, "trust_fmus": trust_fmus}
@@ -94,11 +88,6 @@ class Computing:
             self._end("closed")
             self._state.notify_all()
 
-    @property
-    def process(self) -> int | None:
-        """Its number, while there is one."""
-        return None if self._process is None else self._process.pid
-
     def _answered(self, question: Mapping[str, Any], say: Callable[[Answer], None]) -> Answer:
         try:
             process = self._running()
@@ -117,7 +106,7 @@ class Computing:
             finally:
                 watch.cancel()
         except (OSError, ValueError) as error:
-            return {"error": self._lost(str(error)), "kind": ErrorKind.WORKER_LOST}
+            return {"error": self._lost(f" ({error})"), "kind": ErrorKind.WORKER_LOST}
         if self._why in ("cancelled", "superseded", "closed"):
             return {self._why: True}
         return {"error": self._lost(""), "kind": ErrorKind.WORKER_LOST}
@@ -125,18 +114,14 @@ class Computing:
     def _lost(self, detail: str) -> str:
         """The process is gone; the next question begins another."""
         process, self._process = self._process, None
-        code = None
         if process is not None:
             process.kill()
-            code = process.wait()
-        how = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+        code = process.wait() if process is not None else 0
+        how = f"signal {-code}" if code < 0 else f"exit code {code}"
         if self._why == "too long":
             return f"the computation took more than {self._longest:g} s and was ended; ask again with fewer values"
-        why = f" ({detail})" if detail else ""
-        return (
-            f"the process that computes ended by itself ({how}){why}: an FMU may have died in it; nothing else is lost,"
-            " and the next question starts it anew"
-        )
+        text = "an FMU may have died in it; nothing else is lost, and the next question starts it anew"
+        return f"the process that computes ended by itself ({how}){detail}: {text}"
 
     def _running(self) -> "subprocess.Popen[str]":
         with self._state:

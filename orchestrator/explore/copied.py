@@ -20,7 +20,11 @@ def copied(
 ) -> dict[str, str]:
     """``command``, ``toml`` and ``python``; ``word`` is the case as it was given."""
     low, high = frequencies
-    sets = [text for name, value in values.items() for text in ("--set", f"{name}={_word(value)}")]
+    sets = [
+        text
+        for name, value in values.items()
+        for text in ("--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}")
+    ]
     words = ["gfor", "modes", word, "--scenario", scenario, *sets, "--range", f"{low!r}:{high!r}"]
     lines = [
         "import orchestrator as gfor",
@@ -43,7 +47,3 @@ def as_scenario(file: CaseFile, scenario: str, values: Mapping[str, Value]) -> s
     table["set"] = {**kept, **values}
     table["title"] = f"{table.get('title') or scenario}, explored"
     return tomli_w.dumps({"scenarios": {EXPLORED: table}})
-
-
-def _word(value: Value) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -27,13 +27,12 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
         {
             "name": line.name, "from": line.from_bus, "to": line.to_bus, "kind": "branch" if line.has_ratio else "line",
             "open": of_grid(line.variable("connected")), "length": of_grid(line.variable("X")),
-            "reactance": line.X, "resistance": of_grid(line.variable("R")), "charging": of_grid(line.variable("B")),
+            "resistance": of_grid(line.variable("R")), "charging": of_grid(line.variable("B")),
         }
         for line in network.lines
     ]  # fmt: skip
     lines += [
-        {"name": x.name, "from": x.buses[0], "to": bus, "kind": "branch", "open": of_grid(f"{x.name}.connected"),
-         "length": None, "reactance": None, "resistance": None, "charging": None}
+        {"name": x.name, "from": x.buses[0], "to": bus, "kind": "branch", "open": of_grid(f"{x.name}.connected")}
         for x in network.transformers
         for bus in x.buses[1:]
     ]  # fmt: skip

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from orchestrator.cases.names import variables_of
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.report.html.charts import thinned
 from orchestrator.results.signals import signal
-from orchestrator.safe_files import made_folder
+from orchestrator.results.staging import new_run_id
 
 _POINTS = 1000  # of a streamed curve
 _PAUSE = 0.25  # between two parts of a streamed curve [s]
@@ -45,12 +44,8 @@ def chosen(scenario: Scenario, wanted: Sequence[str]) -> list[str]:
 def curves(dataset: xr.Dataset, names: Sequence[str]) -> dict[str, list[list[float]]]:
     """By signal its times and values, thinned so that peaks stay."""
     times: Numbers = dataset["time"].values
-    found = {}
-    for name in names:
-        values = signal(dataset, name)
-        if values is not None:
-            found[name] = [part.tolist() for part in thinned(times, np.asarray(values.values, dtype=float))]
-    return found
+    found = {name: seen for name in names if (seen := signal(dataset, name)) is not None}
+    return {name: [part.tolist() for part in thinned(times, seen.values)] for name, seen in found.items()}
 
 
 class Streamed:
@@ -69,50 +64,36 @@ class Streamed:
         """See `Observer.begin`."""
 
     def observe(self, run: ObservedRun) -> None:
-        """See `Observer.observe`."""
-        values = []
-        for name in self._needed:
-            component, _, variable = name.partition(".")
-            values.append(float(run.components[component].get([variable])[variable]))
-        self._rows.append([run.time, *values])
+        ends = (name.partition(".") for name in self._needed)
+        self._rows.append([run.time, *(run.components[c].get([variable])[variable] for c, _, variable in ends)])
         if time.monotonic() - self._said > _PAUSE:
             self._flush()
 
     def end(self, run: ObservedRun) -> None:
-        """See `Observer.end`."""
         self._flush()
 
     def _flush(self) -> None:
         if self._rows:
             columns = dict(zip(["time", *self._needed], np.array(self._rows).T, strict=True))
-            seen = {one: _value(columns, one).tolist() for one in self._names}
+            seen = {one: _value(columns, variables_of(one)).tolist() for one in self._names}
             self._say({"time": columns["time"].tolist(), "signals": seen, "until": self._stop})
             self._rows = []
         self._said = time.monotonic()
 
 
-def _value(columns: dict[str, Numbers], expression: str) -> Numbers:
-    first, *rest = (columns[name] for name in variables_of(expression))
-    return first - rest[0] if rest else first
+def _value(columns: dict[str, Numbers], names: Sequence[str]) -> Numbers:
+    return columns[names[0]] - columns[names[1]] if len(names) > 1 else columns[names[0]]
 
 
-def kept_folder(case: str) -> Path:
-    """A new folder below ``results/explore``."""
-    for number in range(1, 10_000):
-        place = Path("results") / "explore" / f"{case}_{number}"
-        with suppress(FileExistsError):
-            made_folder(place.parent, "results")
-            place.mkdir()
-            return place
-    return Path("results") / "explore"
+def linear(scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
+    return {"curves": curves(scenario.response(), chosen(scenario, wanted))}
 
 
 def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, Any]:
     """Run the co-simulation and keep it as ``gfor run`` does: ``folder``, ``curves``, ``findings``, ``ended_early``."""
     names = chosen(scenario, wanted)
     run: Run = scenario.run(observers=[Streamed(scenario, names, say)])
-    folder = kept_folder(scenario.prepared.case.name)
-    run.save(folder)
+    folder = run.save(Path("results") / "explore" / f"{scenario.prepared.case.name}_{new_run_id()}")
     return {
         "folder": str(folder),
         "curves": curves(run.dataset, names),

@@ -1,15 +1,15 @@
 """A page that needs neither server nor Python: its sliders move on a grid that was computed before."""
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from orchestrator.api.case import Case
-from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
 from orchestrator.explore.files import whole_page
 from orchestrator.explore.worker import Desk
+from orchestrator.points.points import CountReport
 from orchestrator.safe_files import write_text
 from orchestrator.sweep.axes import Vary, resolve
 
@@ -17,12 +17,7 @@ _MOST = 400  # of the grid's points: the page holds all their modes
 
 
 def save_page(
-    path: Path,
-    case: Case,
-    desk: Desk,
-    beginning: Mapping[str, Any],
-    varied: Sequence[Vary],
-    report: Callable[[int, int], None],
+    path: Path, case: Case, desk: Desk, beginning: Mapping[str, Any], varied: Sequence[Vary], report: CountReport
 ) -> None:
     """Compute the modes over the grid, and write the page; a scenario's other values are those it begins with."""
     name, values = str(beginning["scenario"]), dict(beginning["values"])
@@ -34,9 +29,7 @@ def save_page(
                 f"--vary {vary.key}: a saved page has sliders on single parameters; name one, with a COUNT"
             )
     grid = {axis.key: list(axis.values) for axis in axes}
-    points: list[dict[str, Value]] = [
-        dict(zip(grid, chosen, strict=True)) for chosen in itertools.product(*grid.values())
-    ]
+    points = [dict(zip(grid, chosen, strict=True)) for chosen in itertools.product(*grid.values())]
     if len(points) > _MOST:
         raise InputError(
             f"--vary: the grid has {len(points)} points, and a saved page at most {_MOST}; give fewer values"
@@ -44,10 +37,9 @@ def save_page(
     asked = {"scenario": name, "range": beginning["range"]}
     answers = []
     for done, point in enumerate(points):
-        report(done, len(points))
+        report(done + 1, len(points))
         found = desk.answer({**asked, "ask": "modes", "values": {**values, **point}}, lambda part: None)
         answers.append({"scenario": name, "values": point, "answer": found})
-    report(len(points), len(points))
     opened = desk.answer({"ask": "open"}, lambda part: None)
     parameters = desk.answer({**asked, "ask": "parameters"}, lambda part: None)
     content = {

@@ -14,9 +14,7 @@ from orchestrator.explore.computing import Answer, Computing
 from orchestrator.explore.files import FILES, PAGE, content_of
 
 LOOPBACK = "127.0.0.1"
-LINGER = 60.0
-"""How long the server goes on after the last page was closed [s]."""
-
+LINGER = 60.0  # how long the server goes on after the last page was closed [s]
 _MOST_BYTES = 1_000_000  # of a question
 _BEAT = 2.0  # between two signs of life to a page [s]
 _POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:"
@@ -26,7 +24,6 @@ class Explorer:
     """The server, its pages, and the processes that compute: for what is asked, and beside it for slopes and for runs.
 
     ``beginning``: what the page begins with, as JSON's types.
-    ``linger``: as `LINGER`.
     """
 
     def __init__(
@@ -36,33 +33,23 @@ class Explorer:
         self.computing = {kind: Computing(case, trust_fmus=trust_fmus) for kind in ("modes", "slopes", "run")}
         self._linger = linger
         self._pages: dict[str, queue.SimpleQueue[Answer]] = {}
-        self._last_seen: float | None = None
+        self._last_seen = float("inf")  # nobody was there yet
         try:
             self._server = ThreadingHTTPServer((LOOPBACK, port), _handler(self))
         except OSError as error:
-            raise InputError(
-                f"--port {port}: nothing can listen there: {error.strerror}; give another port, or none"
-            ) from error
+            text = f"--port {port}: nothing can listen there: {error.strerror}; give another port, or none"
+            raise InputError(text) from error
         self._server.daemon_threads = True
-
-    @property
-    def port(self) -> int:
-        return int(self._server.server_address[1])
-
-    @property
-    def address(self) -> str:
-        return f"http://{LOOPBACK}:{self.port}/{self.token}/"
-
-    @property
-    def hosts(self) -> tuple[str, ...]:
-        """What a browser that was led here by the address sends as host; a page that was led elsewhere does not."""
-        return (f"{LOOPBACK}:{self.port}", f"localhost:{self.port}")
+        self.port = int(self._server.server_address[1])
+        self.address = f"http://{LOOPBACK}:{self.port}/{self.token}/"
+        # what a browser that was led here by the address sends as host; one that was led here by another name does not
+        self.hosts = (f"{LOOPBACK}:{self.port}", f"localhost:{self.port}")
 
     def serve(self) -> None:
         """Answer until the last page was closed for a while, or an interrupt comes."""
         threading.Thread(target=self._server.serve_forever, kwargs={"poll_interval": 0.1}, daemon=True).start()
         try:
-            while not self._forsaken():
+            while self._pages or time.monotonic() < self._last_seen + self._linger:
                 time.sleep(0.2)
         finally:
             self.close()
@@ -72,11 +59,6 @@ class Explorer:
         self._server.server_close()
         for computing in self.computing.values():
             computing.close()
-
-    def _forsaken(self) -> bool:
-        """Whether a page was there, and none is any more."""
-        gone = self._last_seen is not None and not self._pages
-        return gone and time.monotonic() - (self._last_seen or 0.0) > self._linger
 
     def opened(self, page: str) -> "queue.SimpleQueue[Answer]":
         self._last_seen = time.monotonic()
@@ -96,7 +78,6 @@ class Explorer:
             told.put(what)
 
     def answer(self, page: str, question: Answer) -> Answer:
-        """The answer to a question of a page."""
         if question.get("ask") == "cancel":
             for computing in self.computing.values():
                 computing.cancel(page)
@@ -141,9 +122,7 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
             self._send(HTTPStatus.OK, json.dumps(found).encode(), "application/json")
 
         def _asked(self) -> str | None:
-            """What is asked for behind the token; None where it is refused: the token, the host or the origin is not
-            ours.
-            """
+            """What is asked for behind the token; None where it is refused."""
             _, token, *rest = (*self.path.split("/", 2), "")[:3]
             known = secrets.compare_digest(token.encode(), explorer.token.encode())
             origin = self.headers.get("Origin")

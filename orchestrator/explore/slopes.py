@@ -46,10 +46,8 @@ def slopes(
     say("modes at the value itself")
     base = eigenvalues(here.modes(frequencies))
     wider = (frequencies[0] / _WIDER, frequencies[1] * _WIDER)
-    moved = []
-    for end in ends:
-        say(f"modes at {parameter} = {end:.5g}")
-        moved.append(matched(base, eigenvalues(scenario_with({**values, parameter: end}).modes(wider))))
+    say(f"modes at both sides of {parameter} = {value:.5g}")
+    moved = [matched(base, eigenvalues(scenario_with({**values, parameter: end}).modes(wider))) for end in ends]
     width = ends[1] - ends[0]
     found = (moved[1] - moved[0]) / width if width > 0 else np.full(base.shape, np.nan + 0j)
     return {

@@ -7,7 +7,7 @@ import json
 import os
 import sys
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from orchestrator.cases.schema import Value
 from orchestrator.errors import CosimError
 from orchestrator.explore.copied import copied
 from orchestrator.explore.diagram import diagram
-from orchestrator.explore.responses import chosen, curves, plotted, simulated
+from orchestrator.explore.responses import linear, plotted, simulated
 from orchestrator.explore.slopes import slopes
 from orchestrator.fmi.interrupts import calls
 
@@ -41,20 +41,19 @@ class Desk:
             titles = {name: table.title or name for name, table in case.file.scenarios.items()}
             named = case.file.table.title or case.name
             return {"case": case.name, "title": named, "scenarios": titles, "stamp": self._stamp}
-        scenario = partial(self._scenario, case, question["scenario"])
+        scenario = partial(case.scenario, question["scenario"])
         values: dict[str, Value] = dict(question.get("values") or {})
         low, high = question.get("range") or (0.1, 2.0)
+        signals = question.get("signals") or ()
         answers: dict[str, Callable[[], dict[str, Any]]] = {
             "parameters": lambda: _parameters(scenario(values)),
             "modes": lambda: self._modes(case, scenario(values), values, (low, high)),
             "slopes": lambda: slopes(
                 scenario, values, str(question["parameter"]), (low, high), lambda text: say({"progress": text})
             ),
-            "response": lambda: _response(scenario(values), question.get("signals") or ()),
-            "run": lambda: simulated(scenario(values), question.get("signals") or (), lambda part: say({"part": part})),
+            "response": lambda: linear(scenario(values), signals),
+            "run": lambda: simulated(scenario(values), signals, lambda part: say({"part": part})),
         }
-        if ask not in answers:
-            raise CosimError(f"ask = {ask!r}; ask for one of open, {', '.join(answers)}")
         return {**answers[ask](), "stamp": self._stamp}
 
     def _read(self) -> Case:
@@ -63,9 +62,6 @@ class Desk:
             self._case = load(self._word, trust_fmus=self._trust)
             self._stamp = _stamp(self._case.file.path)
         return self._case
-
-    def _scenario(self, case: Case, name: str, values: Mapping[str, Value]) -> Scenario:
-        return case.scenario(name, values)
 
     def _modes(
         self, case: Case, scenario: Scenario, values: Mapping[str, Value], frequencies: tuple[float, float]
@@ -95,16 +91,8 @@ def _parameters(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-def _response(scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
-    return {"curves": curves(scenario.response(), chosen(scenario, wanted))}
-
-
 def _stamp(path: Path) -> list[float]:
-    try:
-        found = path.stat()
-    except OSError:
-        return []
-    return [found.st_mtime, found.st_size]
+    return [path.stat().st_mtime, path.stat().st_size] if path.is_file() else []
 
 
 def main() -> None:

@@ -45,7 +45,7 @@ def main(case, scenario, parameter, times=11):
                 exact.append(float(view.locator("body").get_attribute("data-exact")))
             for name, found in (("exact", exact), ("estimate", estimate)):
                 print(f"{name}: median {statistics.median(found):.0f} ms, {min(found):.0f} to {max(found):.0f}")
-            worker = explorer.computing["modes"].process
+            worker = explorer.computing["modes"]._process.pid
             before = view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }"), resident(worker)
             begin = time.monotonic()
             view.evaluate(

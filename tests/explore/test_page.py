@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
            "--disable-component-update", "--disable-sync", "--disable-quic"]  # fmt: skip
-PATIENCE = 120_000  # [ms]
+PATIENCE = 60_000  # [ms]
 needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="needs chromium (Debian: apt-get install chromium)")
 
 
@@ -133,7 +133,7 @@ def test_a_drag_estimates_and_its_release_gives_the_figures_of_the_copied_comman
     view.mouse.move(*middle)
     view.mouse.down()
     for step in range(1, 6):
-        view.mouse.move(middle[0] - 8 * step, middle[1])
+        view.mouse.move(middle[0] - 2 * step, middle[1])
         view.wait_for_timeout(60)
     view.wait_for_selector("#map .estimate", state="attached")
     assert "estimate at gfor.pod_p.K" in view.locator("#verdict").inner_text()
@@ -145,7 +145,7 @@ def test_a_drag_estimates_and_its_release_gives_the_figures_of_the_copied_comman
     assert view.locator("#map .trail").count() >= 1
     content = of_command(view, capsys)
     assert [row[:2] for row in rows(view)] == shown(content["modes"])
-    assert abs(guess - content["modes"][0]["damping_percent"]) < 2
+    assert guess == pytest.approx(content["modes"][0]["damping_percent"], abs=0.5)
     assert view.evaluate("seen.modes") == content["modes"]  # to the last digit
 
 
@@ -196,7 +196,7 @@ def test_a_pinned_state_stays_beside_the_next_ones_and_the_address_holds_all(vie
 def test_a_click_on_the_diagram_takes_a_unit_out_and_makes_a_line_longer(view, capsys):
     view.locator("#tab-network").click()
     assert view.locator(".bus").count() == 2
-    assert "100 MW" in view.locator("#network").inner_text()
+    assert "100 MW" in view.locator("#network").text_content()
     view.locator('.thing[data-thing="line L"] .hit').click(force=True)
     slider = view.locator('#element input[type="range"]')
     slider.focus()
@@ -226,11 +226,12 @@ def test_responses_are_drawn_and_a_run_is_streamed(browser, tmp_path, monkeypatc
 
 @needs_chromium
 def test_a_worker_that_dies_ends_its_computation_and_not_the_page(view, two_area):
-    os.kill(two_area.computing["modes"].process, signal.SIGKILL)
+    os.kill(two_area.computing["modes"]._process.pid, signal.SIGKILL)
+    two_area.computing["modes"]._process.wait()
     view.locator("#scenario").select_option("gfor")
     computed(view, 2)  # it was seen to be gone, and begun anew
     control = add(view, "grid.X_L")
-    os.kill(two_area.computing["modes"].process, signal.SIGSTOP)
+    os.kill(two_area.computing["modes"]._process.pid, signal.SIGSTOP)
     control.locator('input[type="text"]').fill("0.2")
     control.locator('input[type="text"]').press("Enter")
     view.locator("#cancel").click()

@@ -164,6 +164,8 @@ def test_figures_are_those_of_the_command_that_is_copied(computing, capsys, valu
     assert found["verdict"] == found["modes"]["scenarios"][0]["stability"]["sentence"]
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(computing, tmp_path, capsys):
     values = {"gfor.pod_p.K": 137.25, "grid.X_L": 0.31}
     found = answer(computing, values=values)["answer"]
@@ -178,6 +180,8 @@ def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(compu
     assert names["modes"].as_json()["scenarios"][0]["modes"] == before["modes"]
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_slopes_are_those_of_the_sensitivities(computing):
     found = answer(computing, ask="slopes", parameter="gfor.pod_p.K")["answer"]
     row = gfor.load("two_area").scenario("pod_p").sensitivities(parameters="gfor.pod_p.K").table().iloc[0]
@@ -204,18 +208,22 @@ def test_parameters_have_units_bounds_and_words(computing):
     }  # fmt: skip
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
     done = in_background(computing, values={"grid.X_L": 0.2})
     wait_until(lambda: computing._at_work is not None)
-    os.kill(computing.process, signal.SIGKILL)
+    os.kill(computing._process.pid, signal.SIGKILL)
     assert "signal 9" in done()["error"]
     assert "answer" in answer(computing)
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
-    os.kill(computing.process, signal.SIGSTOP)
+    os.kill(computing._process.pid, signal.SIGSTOP)
     done = in_background(computing)
     wait_until(lambda: computing._at_work is not None)
     computing.cancel("p")
@@ -223,17 +231,21 @@ def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_a_hanging_process_is_ended_after_a_while():
     computing = Computing("two_area", longest=1.0)
     computing.ask("p", {"ask": "open"}, lambda part: None)
     computing._longest = 60.0
     assert "answer" in answer(computing)
-    os.kill(computing.process, signal.SIGSTOP)
+    os.kill(computing._process.pid, signal.SIGSTOP)
     computing._longest = 1.0
     assert "more than 1 s" in answer(computing)["error"]
     computing.close()
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     first = in_background(computing, values={"grid.X_L": 0.21})
     wait_until(lambda: computing._at_work is not None)
@@ -244,6 +256,8 @@ def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     assert "grid.X_L=0.23" in third()["answer"]["copied"]["command"]
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_two_pages_do_not_disturb_each_other(computing):
     first = in_background(computing, page="one", values={"grid.X_L": 0.21})
     second = in_background(computing, page="two", values={"grid.X_L": 0.22})
@@ -276,6 +290,8 @@ def wait_until(holds, seconds=30):
         time.sleep(0.005)
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(gfor.load("infinite_bus").file.text, encoding="utf-8")
@@ -288,6 +304,8 @@ def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     computing.close()
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = gfor.load("infinite_bus").file.text
@@ -296,7 +314,7 @@ def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch
     computing, parts = Computing("short.toml"), []
     found = computing.ask("p", {"ask": "run", "scenario": "dip", "signals": ["grid.v"]}, parts.append)["answer"]
     computing.close()
-    assert found["folder"].startswith("results")
+    assert found["folder"].startswith(os.path.join("results", "explore"))
     assert tomllib.loads((tmp_path / found["folder"] / "case.toml").read_text(encoding="utf-8"))
     assert main(["run", "short.toml", "--scenario", "dip", "--out", "run"]) == 0
     capsys.readouterr()
@@ -311,6 +329,8 @@ def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch
 # -- the command -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_the_command_prints_its_address_and_ends_by_ctrl_c():
     words = [sys.executable, "-m", "orchestrator.cli", "explore", "infinite_bus", "--no-browser"]
     with subprocess.Popen(
@@ -340,4 +360,4 @@ def test_what_cannot_be_shown_is_said_at_once(words, says, capsys):
 def test_a_port_is_a_number(port, capsys):
     with pytest.raises(SystemExit):
         main(["explore", "two_area", "--port", port])
-    assert "is no port" in capsys.readouterr().err or port == "-1"
+    assert "is not a port" in capsys.readouterr().err or port == "-1"
