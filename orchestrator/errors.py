@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from orchestrator.spelling import spelled
+
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
 
@@ -59,6 +61,9 @@ class CosimError(Exception):
         super().__init__(message)
         if kind is not None:
             self.kind = kind
+
+    def __str__(self) -> str:
+        return spelled(super().__str__())
 
 
 class InputError(CosimError):
