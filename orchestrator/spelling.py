@@ -17,18 +17,17 @@ _CALLS = ("run", "modes", "linearize", "steps", "sweep", "sensitivities", "inter
 
 _COMMAND_ONLY = {"json", "with-linear-model"}
 _QUOTED = re.compile(r"`[^`]*`|(?<![\w-])--(engine helics|[a-z][a-z-]*)")
-_commanded = False
+_commanded = list[None]()  # one for each that asks for options
 
 
 @contextmanager
 def as_options() -> Iterator[None]:
     """Inside, errors are for somebody who types commands."""
-    global _commanded
-    before, _commanded = _commanded, True
+    _commanded.append(None)
     try:
         yield
     finally:
-        _commanded = before
+        _commanded.pop()
 
 
 def keyword(option: str) -> str:

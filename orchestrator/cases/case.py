@@ -146,8 +146,11 @@ class Case(CaseDefinition):
         if not lost:
             return (), None
         drawn, loads = 0.0, [x.name for x in before.network.loads] if before.network else []
-        heads = [f"{head}{x}" for x in loads for head in ("", f"{table.grid}.")]
-        kept = {key: v for key, v in on.items() if not any(fnmatchcase(h, key.rpartition(".")[0]) for h in heads)}
+        kept = {
+            key: value
+            for key, value in on.items()
+            if not any(fnmatchcase(f"{table.grid}.{x}", key.rpartition(".")[0]) for x in loads)
+        }
         if kept != on and (intact := self._preparer(name, kept, parameters).prepare(None, None)):
             drawn = load_of(loads, intact.system.components[table.grid]) - load_of(loads, plans[table.grid])
             powers = intact.power_flow.powers if intact.power_flow else powers

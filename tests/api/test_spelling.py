@@ -68,7 +68,7 @@ def faces():
                     yield thing
                 elif inspect.isclass(thing):
                     yield from (f for _, f in inspect.getmembers(thing, inspect.isfunction))
-                    yield from thing.__dict__.get("__annotations__", {})
+                    yield from inspect.get_annotations(thing)
 
 
 def test_an_option_of_an_error_is_a_keyword_of_some_function():
@@ -83,7 +83,7 @@ def test_an_option_of_an_error_is_a_keyword_of_some_function():
         texts = [c.value for r in raised for c in ast.walk(r.exc) if isinstance(c, ast.Constant)]
         for text in texts:
             if isinstance(text, str):
-                named |= {option: path.name for option in OPTION.findall(text)}
+                named |= dict.fromkeys(OPTION.findall(text), path.name)
     assert len(named) > 20
     unknown = {o: p for o, p in named.items() if keyword(o) not in keywords | COMMANDS_ALONE | FOREIGN}
     assert not unknown
