@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from orchestrator.spelling import spelled
+
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
 
@@ -64,6 +66,9 @@ class CosimError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # it may have been made from other arguments
+
+    def __str__(self) -> str:
+        return spelled(super().__str__())
 
 
 class InputError(CosimError):

@@ -2,7 +2,7 @@
 
 from cmath import rect
 from collections.abc import Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from itertools import count
 
@@ -67,10 +67,11 @@ def _of(master: Master, name: str) -> Iterator[Misfit]:
     described = component.description
     if not isinstance(described, BoundDescription):
         return
-    if "omega" in described.outputs and of_frequency(component.get(["omega"])["omega"], None):
-        omega, settled = _omega_alone(master, name)
-        if settled and (misfit := of_frequency(omega, described.port.f_n)):
-            yield misfit
+    if "omega" in described.outputs:  # it may begin at 1 whatever it shows at rest
+        with suppress(CosimError):  # there may be no second instance
+            omega, settled = _omega_alone(master, name)
+            if settled and (misfit := of_frequency(omega, described.port.f_n)):
+                yield misfit
     inputs = master.exchanges[name].inputs
     given = dict(zip(inputs.names, inputs.values.tolist(), strict=True))
     start, outputs = component.values(["S_n", "P_0", "Q_0", "v_0", "theta_0"]), component.get(["i_re", "i_im"])

@@ -165,7 +165,7 @@ class Modes:
 class NoSuchModeError(InputError, KeyError):
     """No mode of a scenario bears a name."""
 
-    __str__ = Exception.__str__  # KeyError shows the text in quotes
+    __str__ = InputError.__str__  # KeyError shows the text in quotes
 
 
 class NamedModes(dict[str, Mode]):

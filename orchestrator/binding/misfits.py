@@ -19,7 +19,7 @@ BALANCE = 0.02
 FREQUENCY_APART = 0.02  # deviation of omega at rest from 1 above which a device is made for another frequency
 SLIGHT = 1e-3  # the same below which nothing is said
 _HELD = 5
-"""How often a device is held again whose omega still comes nearer to 1, as a meter's does that begins elsewhere."""
+"""How often a device is held again whose omega still moves, as a meter's does that begins elsewhere, or at 1."""
 
 REMEDIES = {
     "wrong rated frequency": "set f_n of the binding's [rating] to the frequency that it is made for; a network of "
@@ -55,7 +55,7 @@ def at_rest(hold: Callable[[], Numbers]) -> tuple[float, bool]:
         omega = hold()
         tenth, half = max(1, len(omega) // 10), max(1, len(omega) // 2)
         middle, late = float(np.median(omega[:half][-tenth:])), float(np.median(omega[-tenth:]))
-        if abs(late - 1) <= SLIGHT or abs(late - 1) >= 0.9 * abs(middle - 1):
+        if abs(late - 1) <= SLIGHT or abs(late - middle) <= 0.1 * abs(late - 1):
             return late, True
     return late, False
 

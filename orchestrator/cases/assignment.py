@@ -5,10 +5,13 @@ from typing import Any
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.imperfection_tables import sets_imperfection
-from orchestrator.cases.names import close_names
+from orchestrator.cases.names import close_names, whose
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import TWICE, check_system_base, convert, flatten, given_twice
+from orchestrator.errors import Problem
 from orchestrator.fmi.description import VariableInfo
+
+_THOUSANDS = (1e-6, 1e-3, 1e3, 1e6)  # between a value and another one of the same digits, in another unit
 
 
 def assign_values(draft: Draft) -> None:
@@ -83,7 +86,8 @@ def _check_component(draft: Draft, pattern: str, where: str) -> None:
         return  # the units may be what is missing
     if not fnmatch.filter(draft.known, pattern):
         some = ", ".join([*draft.given.case.components, *draft.origins][:12])
-        draft.note(where, f"there is no component {pattern!r}; the case has: {some}")
+        own = {name: plan.description.variables for name, plan in draft.system.components.items()}
+        draft.note(where, f"there is no component {pattern!r}; the case has: {some}{whose(pattern, own)}")
 
 
 def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) -> None:
@@ -109,5 +113,9 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
         draft.note(where, f"component {name!r}: {error}")
     else:
         target: dict[str, Any] = plan.inputs if info.causality == "input" else plan.parameters
+        before = plan.number(variable) if isinstance(value, str) and isinstance(converted, float) else 0.0
+        if before and round(converted / before, 9) in _THOUSANDS:
+            text = f"{value} is {converted / before:g} times what it is in the files; is the unit meant?"
+            draft.questions.append(Problem(where, text))
         target[variable] = converted
         draft.places[f"{name}.{variable}"] = where

@@ -25,7 +25,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
-from orchestrator.cases.sharing import Dispatch, SharingRule, in_words
+from orchestrator.cases.sharing import Dispatch, SharingRule, in_words, load_of, lost_load
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
@@ -143,9 +143,20 @@ class Case(CaseDefinition):
             if power
             and any(fnmatchcase(f"{head}{unit}.connected", key) for key in off for head in ("", f"{table.grid}."))
         ]
+        if not lost:
+            return (), None
+        drawn, loads = 0.0, [x.name for x in before.network.loads] if before.network else []
+        kept = {
+            key: value
+            for key, value in on.items()
+            if not any(fnmatchcase(f"{table.grid}.{x}", key.rpartition(".")[0]) for x in loads)
+        }
+        if kept != on and (intact := self._preparer(name, kept, parameters).prepare(None, None)):
+            drawn = load_of(loads, intact.system.components[table.grid]) - load_of(loads, plans[table.grid])
+            powers = intact.power_flow.powers if intact.power_flow else powers
         fed = sum(powers[unit].real * plans[unit].number("S_n") for unit in lost)
         rule = self.sharing or SharingRule(table.sharing)
-        return lost, Dispatch(rule, powers, fed) if lost else None
+        return lost, Dispatch(rule, powers, fed - drawn)
 
     @cached_property
     def _mentions(self) -> list[Problem]:
@@ -200,7 +211,9 @@ def _told(
     """The scenario, which says of units that values took out of service who feeds their power."""
     if prepared is None or prepared.power_flow is None or dispatch is None or not lost:
         return prepared
-    shared = in_words(dispatch, prepared.power_flow.powers, prepared.system.components, lost)
+    plans = prepared.system.components
+    drawn = sum(dispatch.powers[unit].real * plans[unit].number("S_n") for unit in lost) - dispatch.change
+    shared = in_words(dispatch, prepared.power_flow.powers, plans, lost, lost_load(drawn))
     text = f"{shared}, by {dispatch.rule}; the rules are {', '.join(SharingRule)}"
     return replace(prepared, questions=(*prepared.questions, Problem("[power_flow] sharing", text)))
 

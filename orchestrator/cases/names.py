@@ -3,7 +3,7 @@
 import difflib
 import fnmatch
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from orchestrator.errors import InputError
 
@@ -56,10 +56,19 @@ def _parts(name: str) -> list[str]:
     return sorted(re.split(r"[_.]", name))
 
 
+def whose(part: str, variables: Mapping[str, Iterable[str]]) -> str:
+    """A hint at the component whose variables have this part, as a grid's have a line's name; "" where none has it."""
+    homes = [name for name, own in variables.items() if any(one.startswith(f"{part}.") for one in own)]
+    return f"; it is of {homes[0]!r}: write {homes[0]}.{part}.…" if homes else ""
+
+
 def variables_of(expression: str) -> list[str]:
+    if of := re.fullmatch(r"\s*\|(.+)\|\s*", expression):  # the magnitude of a phasor
+        return [f"{of[1].strip()}_re", f"{of[1].strip()}_im"]
     names = [part.strip() for part in expression.split(" - ")]
     if not 1 <= len(names) <= 2 or not all(names):
         raise InputError(
-            f"signal {expression!r}: write 'component.variable' or 'component.variable - component.variable'"
+            f"signal {expression!r}: write 'component.variable', 'component.variable - component.variable' "
+            "or '|component.i|' for the magnitude of i_re and i_im"
         )
     return names

@@ -63,6 +63,16 @@ def in_words(
     return "; ".join([*fed, *also, *([f"shared: {shared}"] if shared else [])])
 
 
+def load_of(loads: Collection[str], plan: ComponentPlan) -> float:
+    """Active power of loads of a grid [MW]."""
+    return sum(plan.number(f"{name}.scale") * plan.number(f"{name}.P") for name in loads)
+
+
+def lost_load(drawn: float) -> list[str]:
+    """What is told of load that values or an outage take away [MW]."""
+    return [f"{abs(drawn):.4g} MW of load {'lost' if drawn > 0 else 'more'}"] if abs(drawn) >= _LEAST_SHARE else []
+
+
 def _number(plan: ComponentPlan, name: str) -> float | None:
     return plan.number(name) if name in plan.description.variables else None
 

@@ -14,6 +14,7 @@ from orchestrator.cli.interrupted import ending, is_interrupt
 from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
 from orchestrator.results import origin
+from orchestrator.spelling import as_options
 
 _ESCAPE = "gfor_escape"
 
@@ -112,7 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns 0, 1 for a failure during a run, 2 for input that cannot be used."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     _print_anything()
-    with calls.terminable(ending=arguments is None):
+    with calls.terminable(ending=arguments is None), as_options():
         code = _run(words)
     return TERMINATED if calls.terminated and code == INTERRUPTED else code
 

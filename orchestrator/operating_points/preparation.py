@@ -11,7 +11,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.cases.sharing import Dispatch, SharingRule, in_words
+from orchestrator.cases.sharing import Dispatch, SharingRule, in_words, load_of, lost_load
 from orchestrator.coupling.system import System
 from orchestrator.errors import CosimError, ErrorKind, InputError, StartError
 from orchestrator.operating_points.columns import Elements
@@ -83,7 +83,7 @@ class ItemPreparation:
         if units or loads:
             before = self._before_outage(item, own, without)
             assert before.power_flow is not None
-            fed, drawn = _power_of(units, before), _load_of(loads, valued, self.elements.grid)
+            fed, drawn = _power_of(units, before), load_of(loads, valued.system.components[self.elements.grid])
             dispatch = Dispatch(self._sharing, before.power_flow.powers, fed - drawn)
         elif new := [bus for bus in remains.dead if bus not in without.dead]:
             text = f"{', '.join(new[:_SHOWN])} cut off, with neither load nor unit"
@@ -128,12 +128,6 @@ def _power_of(units: Collection[str], before: PreparedScenario) -> float:
     return sum(flow.powers[name].real * plans[name].number("S_n") for name in units) if flow is not None else 0.0
 
 
-def _load_of(loads: Collection[str], at: PreparedScenario, grid: str) -> float:
-    """Active power of loads [MW]."""
-    plan = at.system.components[grid]
-    return sum(plan.number(f"{name}.scale") * plan.number(f"{name}.P") for name in loads)
-
-
 def lost_and_shared(
     units: Collection[str],
     loads: Collection[str],
@@ -143,8 +137,8 @@ def lost_and_shared(
     after: PreparedScenario,
 ) -> str:
     assert after.power_flow is not None
-    also = [f"{_load_of(loads, before, grid):.4g} MW of load lost"] if loads else []
-    return in_words(dispatch, after.power_flow.powers, before.system.components, units, also)
+    plans = before.system.components
+    return in_words(dispatch, after.power_flow.powers, plans, units, lost_load(load_of(loads, plans[grid])))
 
 
 def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:

@@ -116,7 +116,8 @@ def mode_name(case: Case, wanted: str | None) -> str:
     names = [table.name for table in case.table.analysis.modes]
     if not names:
         raise InputError(
-            f"{case.name}: the case names no mode to design for; add one to its file, such as\n"
+            f"{case.name}: the case names no mode to design for; design over points (--points), where "
+            "every swing counts, or add one to its file, such as\n"
             '[analysis]\nmodes = [{ name = "local", states = ["sg1.machine.omega"] }]'
         )
     name = wanted if wanted is not None else names[0]

@@ -8,6 +8,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from orchestrator.errors import CaseError, CosimError, ErrorKind
+from orchestrator.spelling import as_options
 
 
 @dataclass(frozen=True)
@@ -19,6 +20,7 @@ class Failure:
     lasting: bool
 
     @classmethod
+    @as_options()  # the same for everybody, wherever it was computed
     def of(cls, error: BaseException) -> Self:
         if isinstance(error, CosimError):
             text = "; ".join(map(str, error.problems)) if isinstance(error, CaseError) else str(error)
@@ -48,6 +50,7 @@ def failure_kept(result: Failing) -> Iterator[None]:
     An interrupt goes through: it is to end them all.
     """
     try:
-        yield
+        with as_options():
+            yield
     except Exception as error:  # an unexpected error of a foreign FMU or library must not end the other points
         result.failure = Failure.of(error)

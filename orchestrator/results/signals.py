@@ -12,7 +12,7 @@ _AT_ONCE = 1_000_000  # rows of a long signal that are read at once
 
 
 def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
-    """``"a.b"`` or ``"a.b - c.d"`` from a recorded dataset; None if a variable was not recorded.
+    """``"a.b"``, ``"a.b - c.d"`` or ``"|a.i|"`` from a recorded dataset; None if a variable was not recorded.
 
     The name of a measured channel may hold `` - `` itself.
     """
@@ -23,7 +23,10 @@ def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
         first, second = " - ".join(parts[:k]), " - ".join(parts[k:])
         if first.strip() in dataset and second.strip() in dataset:
             return dataset[first.strip()] - dataset[second.strip()]
-    variables_of(expression)
+    names = variables_of(expression)
+    if expression.strip().startswith("|") and all(name in dataset for name in names):
+        re, im = (dataset[name] for name in names)
+        return ((re**2 + im**2) ** 0.5).assign_attrs(re.attrs)
     return None
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestrator.cases.build_choices import ALPHA
 from orchestrator.cases.imperfection_tables import number_info, sets_imperfection
-from orchestrator.cases.names import close_names
+from orchestrator.cases.names import close_names, whose
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.short_circuit import ShortCircuit
@@ -112,6 +112,7 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
         raise InputError(
             f"--vary {vary.key}: no component of the chosen scenarios is called {pattern!r}; "
             f"they have: {', '.join([*names][:12])}"
+            + whose(pattern, {n: p.description.variables for s in scenarios for n, p in s.system.components.items()})
         )
     infos = [p.description.variables[variable] for p in plans.values() if variable in p.description.variables]
     if len({info.unit for info in infos}) > 1:

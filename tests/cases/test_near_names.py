@@ -60,3 +60,19 @@ def test_another_programs_file_is_no_case(tmp_path, name, key):
     (tmp_path / name).write_text("0, 100.0, 33 /")
     with pytest.raises(InputError, match=rf'{name}: this is .*, not a case; .* has {key} = "{name}"'):
         load_case(tmp_path / name)
+
+
+def test_a_line_is_looked_for_in_the_grid(gfor):
+    for words in (("modes", "two_area", "--set", "AB.X=0.1"), ("sweep", "two_area", "--vary", "AB.X=1:2:3")):
+        _, _, error = gfor(*words)
+        assert "it is of 'grid'" not in error
+    for words in (("modes", "wscc9", "--set", "line_4_5.X=0.1"), ("sweep", "wscc9", "--vary", "line_4_5.X=1:2:3")):
+        code, _, error = gfor(*words)
+        assert code == 2
+        assert "it is of 'grid': write grid.line_4_5.…" in error
+
+
+def test_a_value_of_the_same_digits_in_another_unit_is_asked_about(gfor):
+    asked = "is 0.001 times what it is in the files; is the unit meant?"
+    found = [gfor("modes", "wscc9", "--set", f"grid.load_5.P={value}")[2] for value in ("125 kW", "125 MW", "130")]
+    assert [asked in error for error in found] == [True, False, False]

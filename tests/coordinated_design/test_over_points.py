@@ -32,6 +32,7 @@ from orchestrator.pod_design.lead_lag import lead_lag_turning
 from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
+from tests.screening.five_machines import five_machines
 
 LINES = "name,grid.X_L,load\nshort,0.05,1\nusual,0.1,1\nlight,0.1,0.97\nlong,0.5,1\n"
 P, Q = PodPlace("gfor", "pod_p"), PodPlace("gfor", "pod_q")
@@ -444,6 +445,39 @@ def test_every_setting_that_is_named_gives_its_figure_when_it_is_typed_in(gfor, 
         modes = json.loads(printed)["scenarios"][0]["modes"]
         expected = min(mode["damping_percent"] for mode in modes)  # of the step map
         assert 100 * figure == pytest.approx(expected, abs=0.2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("models", ["phasor", "emt"])
+def test_settings_named_of_a_network_file_give_their_figures_when_they_are_typed_in(
+    gfor, tmp_path, monkeypatch, models
+):
+    """Five machines of RAW and DYR with a converter of 150 MVA; three of their swings lie close together. The file of
+    parameters is typed back as well as the settings of the ranking."""
+    monkeypatch.chdir(tmp_path)
+    five_machines(tmp_path)
+    assert gfor("new", "five.raw", "five.dyr", "--converter", "bus 12, 150 MVA, 60 MW, less sg1", "--out", "case.toml")[
+        0
+    ] in (0, None)
+    (tmp_path / "one.csv").write_text("name,grid.load_11.scale\nusual,1\n")
+    kind = ("--set", f"models={models}")
+    code, out, error = gfor("design", "case.toml", "--controller", "pod_p", "--points", "one.csv", "--scenario",
+                            "converter", *kind, "--rank", "1", "--damping", "60", "--json", "--workers", "1", "--out",
+                            "best.toml")  # fmt: skip
+    assert code == 3, error
+    found = json.loads(out)
+    (alone,) = found["ranking"]
+
+    def least(*options):
+        _, printed, _ = gfor("modes", "case.toml", "--scenario", "converter", *kind, *options, "--json")
+        return min(mode["damping_percent"] for mode in json.loads(printed)["scenarios"][0]["modes"])
+
+    values = {"enabled": "true", **{name: alone[name] for name in ("K", "T_S1", "T_S2")}}
+    typed = [word for key, v in values.items() for word in ("--set", f"gfor.pod_p.{key}={v}")]
+    assert least(*typed) == pytest.approx(100 * alone["worst_damping_ratio"], abs=0.2)
+    told = 100 * found["worst_damping_ratio"]["after"]
+    assert least("--parameters", "best.toml") == pytest.approx(told, abs=0.2)
+    assert told > least() + 0.05, "the setting is worth something"
 
 
 def test_that_a_damping_cannot_be_had_needs_a_grid(planned, store, monkeypatch):

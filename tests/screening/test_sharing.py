@@ -155,6 +155,22 @@ def test_switching_a_unit_off_shares_as_its_outage_does_and_as_by_hand(five, tmp
     assert critical(item) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("key", ["grid.load_12.scale", "gr*.load_12.scale"])
+def test_load_that_values_take_at_once_is_shared_with_the_unit(five, tmp_path, key):
+    """As the outage of both is: the load that goes is no business of the slack alone."""
+    scenario = gfor_face.Case(five).scenario("base", {"sg1.connected": False, key: 0.0})
+    (told,) = (text for text in scenario.questions if "sharing" in text)
+    assert "sg1 is lost, which fed 190 MW; 150 MW of load lost; shared: " in told
+    expected = at(five, ("sg1", "load_12"))
+    powers = scenario.prepared.power_flow.powers
+    assert {n: powers[n].real * RATINGS[int(n[2:])] for n in expected} == pytest.approx(expected, abs=1e-4)
+    before = at(five, ())
+    more = gfor_face.Case(five).scenario("base", {"sg1.connected": False, "grid.load_12.scale": 1.1})
+    assert "15 MW of load more" in " ".join(more.questions)
+    added = {n: more.prepared.power_flow.powers[n].real * RATINGS[int(n[2:])] - before[n] for n in ("sg2", "sg3")}
+    assert added["sg2"] / added["sg3"] == pytest.approx((200 / 0.04) / (220 / 0.05), rel=1e-5)
+
+
 def test_what_is_switched_off_is_shared_as_the_case_says_unless_powers_are_given(five, tmp_path):
     def powers(case, values, **how):
         scenario = gfor_face.Case(case).scenario("base", values, **how)

@@ -182,11 +182,16 @@ def test_a_right_binding_is_not_accused(typed, fmu, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("begins", "f_n"), [(0.0, 50.0), (0.0, 60.0), *(pytest.param(b, 50.0, marks=pytest.mark.slow) for b in (0.9, 50.0))]
+    ("begins", "f_n", "lag"),
+    [
+        *((0.0, 50.0, 0.03), (0.0, 60.0, 0.03), (1.0, 60.0, 0.03), (1.0, 60.0, 0.5)),
+        *(pytest.param(b, 50.0, 0.03, marks=pytest.mark.slow) for b in (0.9, 50.0)),
+    ],
 )
-def test_a_meter_that_settles_is_judged_where_it_has(typed, begins, f_n, tmp_path):
-    """It is honest however it begins, 0 or its frequency in place of 1; one for another frequency is found anyway."""
-    shown = vendor.device(tmp_path, METER_BEGINS=begins, FAULT_OMEGA_LAGS=0.03)
+def test_a_meter_that_settles_is_judged_where_it_has(typed, begins, f_n, lag, tmp_path):
+    """It is honest however it begins, 0 or its frequency in place of 1; one for another frequency is found anyway, be
+    it that it begins at 1."""
+    shown = vendor.device(tmp_path, METER_BEGINS=begins, FAULT_OMEGA_LAGS=lag)
     (tmp_path / "vendor.fmu").write_bytes(shown.read_bytes())
     found = checked(typed, "rated_frequency", f_n=f_n)["rated_frequency"]
     _, out, _ = typed("run", "case.toml", "--stop", "0.3", "--out", "r", "--json", f_n=f_n)

@@ -1,8 +1,12 @@
 """Plots of a case file whose signals the recording leaves out, and what a recording says of its rows."""
 
+import numpy as np
 import pytest
 
 from orchestrator.cases.case import BUILT_IN, load_case
+from orchestrator.cases.schema import PlotTable
+from orchestrator.errors import InputError
+from orchestrator.results.signals import signal
 from orchestrator.study import signal_plots
 from orchestrator.study.run import run_scenario
 
@@ -44,3 +48,23 @@ def test_a_recording_says_what_its_rows_are(tmp_path, chosen, word):
     assert dataset.attrs["record_filter"].startswith(word)
     assert dataset.attrs["record_interval_s"] == pytest.approx(0.02)
     assert dataset.attrs["record_every_steps"] == 4
+
+
+def test_a_panel_shows_the_magnitude_of_a_current_beside_its_parts(tmp_path, monkeypatch):
+    result = run(tmp_path, 'record = ["gfor.i_re", "gfor.i_im"]')
+    recorded = result.dataset
+    found = signal(recorded, "|gfor.i|")
+    expected = np.hypot(recorded["gfor.i_re"].values, recorded["gfor.i_im"].values)
+    assert found.values == pytest.approx(expected, rel=1e-12)
+    assert found.attrs["units"] == recorded["gfor.i_re"].attrs["units"]
+    kept = {}
+    monkeypatch.setattr(signal_plots, "save_figure", lambda figure, path: kept.setdefault("figure", figure))
+    panel = {"signal": "|gfor.i|", "also": ["gfor.i_re", "gfor.i_im"], "label": "i [pu]"}
+    table = PlotTable.model_validate({"name": "i", "title": "I", "panels": [panel]})
+    assert signal_plots.plot_signals(table, [result], tmp_path / "i.png")
+    (axis,) = kept["figure"].axes
+    assert [line.get_label() for line in axis.lines] == ["|gfor.i|", "gfor.i_re", "gfor.i_im"]
+    assert axis.lines[0].get_ydata() == pytest.approx(expected)
+    assert signal(recorded, "|sg1.i|") is None
+    with pytest.raises(InputError, match=r"or '\|component.i\|' for the magnitude"):
+        signal(recorded, "a - b - c")

@@ -19,6 +19,7 @@ _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
 _REFERENCE = 3
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
 _MOST_VOLTAGE = 2.0
+_SBASE = 100.0  # usual base [MVA]
 _FAR = 20.0
 """Times the middle one of all reactances of lines from which one is questioned, where its ohms would be usual."""
 
@@ -207,6 +208,9 @@ class _Reading:
             if closed:
                 self._changes.note(record.line, "switching device: a branch of its reactance")
             self._branch(start, end, complex(0.0, record.number(3, "X", 1e-4)), closed)
+        if self._raw.base_mva != _SBASE:
+            text = f"SBASE is {self._raw.base_mva:g} MVA, on which all impedances count; nearly all files have"
+            self._changes.note(1, f"{text} {_SBASE:g} MVA: is it meant?")
         usual = sorted(abs(x) for _, x, _ in self._ohms)
         for line, x, kilovolts in self._ohms:
             middle, ohms = usual[len(usual) // 2], x * self._raw.base_mva / kilovolts**2 if kilovolts else 0.0

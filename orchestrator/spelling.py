@@ -1,0 +1,55 @@
+"""Options that an error names: spelt for the command line while it runs, and as keywords for Python."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_KEYWORDS = {
+    "set": "values", "range": "frequencies", "min-damping": "least_damping", "rank": "ranked", "place": "places",
+    "out": "folder", "checkpoint": "checkpoints", "resume": "checkpoints", "parameter": "parameters", "text": "texts",
+    "try": "steps", "federate": "federates", "engine helics": "federates",
+}  # fmt: skip
+"""Of options that are not spelt as their keywords."""
+
+_CALLS = ("run", "modes", "linearize", "steps", "sweep", "sensitivities", "interactions", "site", "screen", "compare",
+          "source", "identify", "design", "nyquist", "build", "check", "info")  # fmt: skip
+"""Commands that Python has as functions of the same name."""
+
+_COMMAND_ONLY = {"json", "with-linear-model"}
+_QUOTED = re.compile(r"`[^`]*`|(?<![\w-])--(engine helics|[a-z][a-z-]*)")
+_commanded = list[None]()  # one for each that asks for options
+
+
+@contextmanager
+def as_options() -> Iterator[None]:
+    """Inside, errors are for somebody who types commands."""
+    _commanded.append(None)
+    try:
+        yield
+    finally:
+        _commanded.pop()
+
+
+def keyword(option: str) -> str:
+    return _KEYWORDS.get(option, option.replace("-", "_"))
+
+
+def spelled(text: str) -> str:
+    """A text that names options as ``--out``, for who reads it; commands of other programs stay."""
+    return text if _commanded or "--" not in text else _QUOTED.sub(_in_python, text)
+
+
+def _in_python(found: re.Match[str]) -> str:
+    if found[1]:
+        return keyword(found[1])
+    if found[0].startswith("`--"):
+        return f"`{spelled(found[0][1:-1])}`"
+    command, *options = found[0][1:-1].split(" --")
+    words = command.split()
+    if not options or words[0] != "gfor":
+        return found[0]
+    given = [option.partition(" ") for option in options]
+    if words[1] in _CALLS and not any(name in _COMMAND_ONLY for name, _, _ in given):
+        values = [f"{keyword(name)}={value!r}" if value else f"{keyword(name)}=True" for name, _, value in given]
+        return f"`{words[1]}({', '.join(values)})`"
+    return f"`{command}` with {', '.join(f'{keyword(name)} {value}'.strip() for name, _, value in given)}"
