@@ -13,6 +13,7 @@ from fmus.toolchain.extras import SetupError
 from orchestrator.cli.interrupted import ending, is_interrupt
 from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
+from orchestrator.late import import_xarray_alone
 from orchestrator.results import origin
 
 _ESCAPE = "gfor_escape"
@@ -50,6 +51,9 @@ COMMANDS = {
     "info": "show what an FMU declares",
 }
 """Subcommands, each with a module of its name."""
+
+_READERS = ("compare", "identify", "source", "verify")
+"""Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
 
 EXAMPLES = """\
 examples:
@@ -277,6 +281,8 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
         if name == chosen:
             for kind in (None, "store"):
                 command.register("action", kind, _Once)
+            if name in _READERS:
+                import_xarray_alone()
             module = import_module(f"orchestrator.cli.{name.replace('-', '_')}")
             module.add_arguments(command)
             command.set_defaults(command=module.run)
