@@ -38,12 +38,13 @@ def test_damping_and_frequency_of_named_modes(drawn):
     assert [list(line.get_ydata()) for line in damping.lines if len(line.get_ydata()) == 2] == [[40, 60], [0, 0]]
 
 
-def test_participation_begins_at_0(drawn):
-    assert plots.plot_swing(SimpleNamespace(axes=["X_L"], states=["sg1.omega", "sg2.omega"]), None)
-    labelled(drawn[0])
-    assert drawn[0].axes[0].get_ylim()[0] == 0
-    assert drawn[0].axes[0].get_shared_y_axes().joined(*drawn[0].axes)
-    assert [axis.get_ylabel() for axis in drawn[0].axes] == ["sg1.omega [%]", "sg2.omega [%]"]
+@pytest.mark.parametrize("states", [["sg1.omega"], ["sg1.omega", "sg2.omega"]])
+def test_participation_begins_at_0(drawn, states):
+    assert plots.plot_swing(SimpleNamespace(axes=["X_L"], states=states), None)
+    axes = drawn[0].axes
+    assert [axis.get_ylabel() for axis in axes] == [f"{state} [%]" for state in states]
+    assert {axis.get_ylim()[0] for axis in axes} == {0}
+    assert [text.get_text() for text in drawn[0].legends[0].get_texts()] == ["SG + GFOR"]
 
 
 @pytest.mark.parametrize("beyond", [0, 1])
