@@ -5,6 +5,7 @@ A module that may do without them imports them from here, and defers its annotat
 annotations``), which would use the library at once.
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -28,4 +29,22 @@ if TYPE_CHECKING:
 else:
     pd, xr = Late("pandas"), Late("xarray")
 
-__all__ = ["pd", "xr"]
+
+def import_xarray_alone() -> None:
+    """Import xarray as if dask and pint were not installed: its first array would import both, which takes a second.
+
+    xarray remembers what it found: this is for a process that reads files of numbers and ends with its answer. One that
+    has xarray already keeps it as it is.
+    """
+    if "xarray" in sys.modules:
+        return
+    hidden = [name for name in ("dask", "pint") if name not in sys.modules]
+    sys.modules.update(dict.fromkeys(hidden))  # type: ignore[arg-type] # None: is not to be found
+    try:
+        xr.Dataset({"numbers": ("time", [0.0])}, coords={"time": [0.0]}).isel(time=0).load()
+    finally:
+        for name in hidden:
+            del sys.modules[name]
+
+
+__all__ = ["import_xarray_alone", "pd", "xr"]

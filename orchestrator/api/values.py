@@ -4,17 +4,18 @@ A caller gives a list where one name would do, a text where a number is meant, `
 Each reader here raises an `InputError` that says which argument it was, the value seen, and how to write it.
 """
 
+from __future__ import annotations
+
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from orchestrator.asked import number_in, path, plain_value
-from orchestrator.cases.build_choices import ALPHA, MODELS
-from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
-from orchestrator.cases.schema import Value
-from orchestrator.cases.values import flatten, given_twice
+from orchestrator.asked import Value, number_in, path, plain_value
 from orchestrator.errors import InputError
+
+if TYPE_CHECKING:
+    from orchestrator.cases.parameter_files import ParameterFile
 
 Time = float | str
 """A time: a number of seconds, or text with a unit such as ``"200 us"``."""
@@ -37,6 +38,8 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
     """
     if values is None:
         return {}
+    from orchestrator.cases.values import flatten, given_twice  # noqa: PLC0415 - a record needs no case
+
     if not isinstance(values, Mapping):
         raise InputError(f"{argument} = {values!r}; give values by name, such as {{'grid.X_L': 0.3}}")
     wrong = [key for key in _keys(values) if not isinstance(key, str)]
@@ -58,6 +61,8 @@ def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> d
 
 def check_case_name(name: str, argument: str) -> None:
     """Refuse a name that is not of the form ``component.variable``."""
+    from orchestrator.cases.build_choices import ALPHA, MODELS  # noqa: PLC0415 - a record needs no case
+
     if not _CASE_VALUE.fullmatch(name) and name not in (ALPHA, MODELS):
         raise InputError(f"{argument}: {name!r} is not of the form component.variable, such as 'grid.X_L'")
 
@@ -117,5 +122,7 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
 
 def parameter_files(paths: Paths) -> list[ParameterFile]:
     """The parameter files of one path or several."""
+    from orchestrator.cases.parameter_files import read_parameter_file  # noqa: PLC0415 - a record needs no case
+
     listed = [paths] if isinstance(paths, str | Path) or not isinstance(paths, Iterable) else list(paths)
     return [read_parameter_file(path(one, "parameters")) for one in listed]

@@ -84,11 +84,14 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
             continue
         variable = branches[0].variable("X")
         X = value_of(grid, variable)
-        if X is not None and low <= X <= high < X * rating / 100:
+        own = 0.0 if X is None else X * rating / 100  # on the machines' rating [pu]
+        if X is not None and own > high and (low <= X <= high or low <= own / 100 <= high):
+            meant = f"if {X:g} pu is on the machine's base, it is {100 * X / rating:.4g} pu on 100 MVA"
+            if own >= 100 * low:
+                meant = f"is it in percent? {own / 100:.3g} pu would be usual, {X / 100:.4g} pu on 100 MVA"
             text = (
-                f"{variable} = {X:g} pu on 100 MVA is {X * rating / 100:.3g} pu on the {rating:g} MVA behind it, and "
-                f"step-up transformers have {low:g} to {high:g} pu there; if {X:g} pu is on the machine's base, it is "
-                f"{100 * X / rating:.4g} pu on 100 MVA"
+                f"{variable} = {X:g} pu on 100 MVA is {own:.3g} pu on the {rating:g} MVA behind it, and "
+                f"step-up transformers have {low:g} to {high:g} pu there; {meant}"
             )
             place = draft.places.get(f"{name}.{variable}", f"{where}, {branches[0].name}")
             yield UnusualValue(f"{name}.{variable}", place, text)

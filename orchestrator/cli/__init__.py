@@ -13,6 +13,7 @@ from fmus.toolchain.extras import SetupError
 from orchestrator.cli.interrupted import ending, is_interrupt
 from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
+from orchestrator.late import import_xarray_alone
 from orchestrator.results import origin
 from orchestrator.spelling import as_options
 
@@ -70,6 +71,9 @@ OLD = {
 """Spellings before 0.3, which work until 1.0, with today's."""
 
 _MODULES = {new: old for old, new in OLD.items()}  # a command in a group has the module of its old name
+
+_READERS = ("signal compare", "signal identify", "signal source", "verify")
+"""Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
 
 QUESTIONS = """\
 gfor: co-simulation of grid-forming converters, from FMUs and a case file
@@ -284,7 +288,12 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
         if name == chosen:
             for kind in (None, "store"):
                 command.register("action", kind, _Once)
+            if name in _READERS:
+                import_xarray_alone()
             module = module_of(name)
+
+_READERS = ("signal compare", "signal identify", "signal source", "verify")
+"""Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
             module.add_arguments(command)
             command.set_defaults(command=module.run)
     return parser

@@ -58,3 +58,11 @@ def test_an_experiment_that_is_not_reached_is_not_passed(monkeypatch):
     result, _ = result_of(monkeypatch, 1e-2, 1.0, nan_at=0.9)
     assert result.verdict == Verdict.REMARK
     assert "not judged from t = 0.2 s on" in result.evidence
+
+
+@pytest.mark.parametrize(("ends", "left"), [(1.0, False), (500.0, True)])
+def test_an_experiment_longer_than_is_run_is_told(monkeypatch, ends, left):
+    seconds = 2 * running.RUN_FOR * 1e-4 / running.LONGEST
+    result, _ = result_of(monkeypatch, seconds, 1.0, stop=ends)
+    assert result.verdict == Verdict.PASS
+    assert (f"rest, to t = {ends:g} s, was not run" in result.evidence) is left

@@ -33,6 +33,16 @@ def model(*swinging, size=SIZE):
     return LinearModel.from_matrix(turn @ A @ np.linalg.inv(turn), tuple(f"x{k}" for k in range(size)), None)
 
 
+def test_vectors_stay_orthogonal_where_little_of_them_is_new():
+    """An operator near the identity leaves a ten-millionth of a vector as new, and the rounding of the rest."""
+    rng = np.random.default_rng(1)
+    near = np.eye(SIZE) + 1e-7 * rng.standard_normal((SIZE, SIZE)) / np.sqrt(SIZE)
+    search = BlockArnoldi(lambda vectors: near @ vectors, SIZE, most=96)
+    assert search.grow()
+    known = search._basis[:, : search._done + WIDTH]
+    assert abs(known.conj().T @ known - np.eye(known.shape[1])).max() < 1e-13
+
+
 def one_by_one(found, wanted):
     assert len(found) == len(wanted)
     for one, other in zip(found, wanted, strict=True):

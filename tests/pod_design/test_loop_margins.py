@@ -35,6 +35,13 @@ def test_a_motors_position_loop():
     assert found.peak == pytest.approx((1 / abs(1 + 1 / (curve * (curve + 1)))).max(), rel=1e-4)
 
 
+def test_a_crossing_at_the_end_of_the_range_counts():
+    """L = K/s crosses over at ω = K, with 90°; here between the last two frequencies that are looked at."""
+    found = margins(lambda k: [[-k]], 2 * math.pi * 498)
+    assert found.phase_deg == pytest.approx(90, abs=1e-6)
+    assert found.phase_hz == pytest.approx(498, rel=1e-8)
+
+
 def test_of_two_loops_the_worse_one_counts():
     both = margins(lambda k: scipy.linalg.block_diag(motor(k), motor(5 * k)), 1.0)
     worse = margins(motor, 5.0)

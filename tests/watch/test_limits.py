@@ -30,7 +30,8 @@ def limited():
 
 
 @pytest.mark.parametrize(
-    ("kind", "current", "acts"), [(0, 1.1, True), (0, 1.0, False), (1, 1.1, False), (3, 1.1, False)]
+    ("kind", "current", "acts"),
+    [(0, 1.1, True), (0, 1.1 * (1 - 1e-12), True), (0, 1.0, False), (1, 1.1, False), (3, 1.1, False)],
 )
 def test_the_box_is_watched_for_kind_0_alone(kind, current, acts):
     system = System()

@@ -142,3 +142,9 @@ def test_the_system_with_it_has_a_steady_state_and_damped_modes(step, prepared, 
     assert code == 0, error
     scenario = json.loads(out)["scenarios"][0]
     assert scenario["stable"]
+
+
+@pytest.mark.parametrize(("name", "flags", "numbers"), [("REGCA1", 1, 14), ("REECA1", 6, 45), ("REECB1", 5, 25)])
+def test_a_record_has_the_fields_of_the_program(name, flags, numbers):
+    """ICONs and CONs of PSS/E's model library; no field stands twice."""
+    assert len(FIELDS[name]) == len(set(FIELDS[name])) == flags + numbers

@@ -110,6 +110,10 @@ RAWS = {
         changed(RAW, ("5,  1, 0, '1 ', 1, 2, 1", "5,  1, 0, '1 ', 1, 1, 1")),
         "X_line_5_1 = 0.15 pu on 100 MVA is 1.35 pu on the 900 MVA behind it",
     ),
+    "transformer in percent": (
+        changed(RAW, ("'T3', 1\n0.0, 0.15, 900.0", "'T3', 1\n0.0, 15, 900.0")),
+        "is 15 pu on the 900 MVA behind it, and step-up transformers have 0.03 to 0.35 pu there; is it in percent?",
+    ),
     "load of the wrong sign": (changed(RAW, ("967.000, 100.000", "-96.7, 10.000")), "load at bus_7 is -96.7 MW"),
     "small shunt": (changed(RAW, ("7, '1 ', 1, 0.0, 200.0", "7, '1 ', 1, 0.0, 3.5")), "shunt at bus_7 has 3.5 Mvar"),
 }

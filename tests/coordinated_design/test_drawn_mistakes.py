@@ -1,0 +1,32 @@
+"""Bands of frequencies, and settings as a parameter file has them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, band_of, floors_of
+from orchestrator.coordinated_design.settings import PodGroup
+from orchestrator.coordinated_design.study import values_of
+
+
+@pytest.mark.parametrize("place", range(len(BANDS_HZ)))
+def test_a_band_begins_at_its_frequency(place):
+    below, above = (complex(-0.1, 2 * np.pi * BANDS_HZ[place] * factor) for factor in (0.999, 1.001))
+    assert (band_of(below), band_of(above)) == (place, place + 1)
+
+
+def test_a_band_keeps_the_damping_that_it_has_where_that_is_below_the_bound():
+    weak = 2 * np.pi * complex(-0.01, np.sqrt(1 - 0.01**2))  # 1 Hz, 1 %
+    floors = floors_of([weak], 0.05)
+    assert floors.pop(band_of(weak)) == pytest.approx(0.01 - ALLOWED)
+    assert set(floors.values()) == {0.05}
+
+
+@pytest.mark.parametrize(("gain", "enabled"), [(0.0, False), (123.456789012, True)])
+def test_a_controller_without_gain_is_switched_off(gain, enabled):
+    setting = SimpleNamespace(gain=gain, filters=SimpleNamespace(T_S1=0.2, T_S2=0.05))
+    values = values_of([PodGroup("pod_p", ("gfor1", "gfor2"), ("gfor*",), 2)], [setting])
+    assert values["gfor*.pod_p.enabled"] is enabled
+    assert values["gfor*.pod_p.K"] == pytest.approx(gain, rel=1e-7)
+    assert (values["gfor*.pod_p.T_S1"], values["gfor*.pod_p.T_S2"], values["gfor*.pod_p.N_S"]) == (0.2, 0.05, 2)

@@ -1,0 +1,59 @@
+"""What tables and records of a screening take from which place."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from orchestrator.screening.tables import _at_worst
+
+from orchestrator.report.html.elements import Figures
+from orchestrator.screening import report
+from orchestrator.screening.point import _Worker
+from orchestrator.screening.record import Status
+from orchestrator.screening.stress import OutageRow
+from orchestrator.screening.summary import ModeAt
+
+
+def item(**record):
+    return SimpleNamespace(record=SimpleNamespace(**record), point=SimpleNamespace(name="p07"),
+                           outage=SimpleNamespace(name="sg2", elements=("sg2",)))  # fmt: skip
+
+
+def test_an_outage_without_any_verdict_is_told_by_its_first_point():
+    lost = item(status=Status.POWER_FLOW)
+    name, point, who, _, count = _at_worst(OutageRow("sg2", None, None, (lost,), 1))
+    assert (name, point, who, count) == ("sg2", "p07", "", "1 of 1")
+
+
+@pytest.mark.parametrize(
+    ("residues", "first"),
+    [
+        ({"a": (5.0, 0.1), "b": (1.0, 2.0)}, "a"),
+        ({"a": (0.1, 5.0), "b": (2.0, 1.0)}, "a"),
+        ({"a": (1j, 0), "b": (0, 2)}, "b"),
+    ],
+)
+def test_converters_are_ranked_by_the_larger_of_both_residues(residues, first):
+    at = ModeAt(item(residues={name: np.array([[p], [q]]) for name, (p, q) in residues.items()}), 0)
+    assert at.ranking()[0] == (first, *map(complex, residues[first]))
+
+
+def test_components_are_named_by_their_shares():
+    at = ModeAt(item(shares={"a": np.array([0.2]), "b": np.array([0.7]), "c": np.array([0.1])}), 0)
+    assert at.participation(2) == [("b", 0.7), ("a", 0.2)]
+
+
+def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_item():
+    results = [SimpleNamespace(found=SimpleNamespace(modes=name), record=name) for name in ("anchor", "one", "out")]
+    items = [SimpleNamespace(intact=intact) for intact in (True, True, False)]
+    own = SimpleNamespace(_task=SimpleNamespace(anchor=items[0], items=items[1:]),
+                          _bench=SimpleNamespace(perturbed=3, reused=5))  # fmt: skip
+    made = _Worker._record(own, results)
+    assert (made.first, made.last, made.last_place) == ("anchor", "one", 1)
+    assert (made.items, made.perturbed, made.reused) == (("anchor", "one", "out"), 3, 5)
+
+
+def test_the_page_shows_the_figure_not_its_name():
+    mode = ModeAt(item(eigenvalues=[-0.2 + 5j]), 0)
+    drawn = report._plane(SimpleNamespace(modes=[SimpleNamespace(at=[mode])]), Figures())
+    assert drawn.startswith('<figure id="figure-1">')

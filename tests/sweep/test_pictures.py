@@ -1,0 +1,65 @@
+"""Pictures and remarks of a sweep: which axis has the legend, and what stays at 0."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from orchestrator.sweep import plots, tables
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """Figures, in place of their files; one named curve from 40 to 60."""
+    figures = []
+    trajectory = SimpleNamespace(name="tie", carries="tie")
+    sweep = SimpleNamespace(prepared=SimpleNamespace(title="SG + GFOR"))
+    monkeypatch.setattr(plots, "_named", lambda samples: [(0, sweep, trajectory, None)])
+    monkeypatch.setattr(plots, "_draw", lambda axis, *_, **__: axis.plot([1, 2], [40, 60]))
+    monkeypatch.setattr(plots, "axis_label", lambda axis: "X_L [pu]")
+    monkeypatch.setattr(plots, "save_figure", lambda figure, path: figures.append(figure))
+    return figures
+
+
+def labelled(figure: Figure):
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["SG + GFOR"]
+    first, *_, last = figure.axes
+    assert first.get_title("left").startswith("Named modes")
+    assert (last.get_xlabel(), last.get_title("left")) == ("X_L [pu]", "")
+
+
+def test_damping_and_frequency_of_named_modes(drawn):
+    assert plots.plot_named(SimpleNamespace(axes=["X_L"]), None)
+    labelled(drawn[0])
+    damping, frequency = drawn[0].axes
+    assert (damping.get_ylabel(), frequency.get_ylabel()) == ("Damping [%]", "Frequency [Hz]")
+    assert frequency.get_ylim()[0] == 0
+    assert [list(line.get_ydata()) for line in damping.lines if len(line.get_ydata()) == 2] == [[40, 60], [0, 0]]
+
+
+@pytest.mark.parametrize("states", [["sg1.omega"], ["sg1.omega", "sg2.omega"]])
+def test_participation_begins_at_0(drawn, states):
+    assert plots.plot_swing(SimpleNamespace(axes=["X_L"], states=states), None)
+    axes = drawn[0].axes
+    assert [axis.get_ylabel() for axis in axes] == [f"{state} [%]" for state in states]
+    assert {axis.get_ylim()[0] for axis in axes} == {0}
+    assert [text.get_text() for text in drawn[0].legends[0].get_texts()] == ["SG + GFOR"]
+
+
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch, beyond):
+    monkeypatch.setattr(tables, "place_text", lambda samples, place: str(place))
+    monkeypatch.setattr(tables, "_warnings", lambda samples: [])
+    sweep = SimpleNamespace(prepared=SimpleNamespace(name="base"))
+    failed = [(sweep, place, "no power flow") for place in range(tables._FAILURES_SHOWN + beyond)]
+    result = SimpleNamespace(plan=SimpleNamespace(idle=(), number_of_points=99), limits=(), scenarios=(), refined=0,
+                             failures=lambda: iter(failed))  # fmt: skip
+    texts = tables.remarks(SimpleNamespace(result=result))
+    assert len(texts) == 1 + tables._FAILURES_SHOWN + beyond
+    assert [text for text in texts if "more" in text] == ["  … and 1 more, in sweep.csv"] * beyond
+
+
+def test_shares_are_shown_in_percent():
+    assert plots._percent_of("a")({"states": {"a": 0.25}}) == 25
+    assert np.isnan(plots._percent_of("a")({"states": {}}))
