@@ -291,9 +291,6 @@ def _parser(chosen: str | None) -> argparse.ArgumentParser:
             if name in _READERS:
                 import_xarray_alone()
             module = module_of(name)
-
-_READERS = ("signal compare", "signal identify", "signal source", "verify")
-"""Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
             module.add_arguments(command)
             command.set_defaults(command=module.run)
     return parser
