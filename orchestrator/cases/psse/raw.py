@@ -272,10 +272,13 @@ class _Reading:
             elif self._rows[bus][1] == 1:
                 held = self._magnitudes[bus]
                 self._changes.note(record.line, "generator at a bus of type 1: it holds the file's voltage")
-            elif (VM := self._magnitudes[bus]) != 1 and abs(held - VM) > _APART:  # 1: not solved
-                if least < record.number(3, "QG", 0.0) < most:
-                    text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits"
-                    self._changes.note(record.line, f"{text}: VS is held")
+            elif (
+                (VM := self._magnitudes[bus]) != 1  # 1: not solved
+                and abs(held - VM) > _APART
+                and least < record.number(3, "QG", 0.0) < most
+            ):
+                text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits"
+                self._changes.note(record.line, f"{text}: VS is held")
             if record.number(mbase + 4, "XT", 0.0):
                 self._changes.note(record.line, "step-up transformer within a generator's record: left out")
             source = complex(record.number(mbase + 1, "ZR", 0.0), record.number(mbase + 2, "ZX", 1.0))
