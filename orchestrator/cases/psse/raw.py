@@ -18,6 +18,7 @@ from orchestrator.errors import Problem
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
 _REFERENCE = 3
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
+_APART = 0.05  # voltage of a solved file beside what a generator within its limits is to hold [pu]
 _MOST_VOLTAGE = 2.0
 _SBASE = 100.0  # usual base [MVA]
 _FAR = 20.0
@@ -264,6 +265,7 @@ class _Reading:
             rating = record.number(mbase, "MBASE [MVA]", self._raw.base_mva)
             if not rating > 0:
                 raise record.error(f"MBASE is {rating:g} MVA; it must exceed 0")
+            least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
             remote = record.whole(7, "IREG", 0)
             held = record.number(6, "VS", 1.0)
             if remote not in (0, bus):
@@ -272,10 +274,16 @@ class _Reading:
             elif self._rows[bus][1] == 1:
                 held = self._magnitudes[bus]
                 self._changes.note(record.line, "generator at a bus of type 1: it holds the file's voltage")
+            elif (
+                (VM := self._magnitudes[bus]) != 1  # 1: not solved
+                and abs(held - VM) > _APART
+                and least < record.number(3, "QG", 0.0) < most
+            ):
+                text = f"VS is {held:g} pu, where the solved file has VM = {VM:g} pu, with Q within its limits"
+                self._changes.note(record.line, f"{text}: VS is held")
             if record.number(mbase + 4, "XT", 0.0):
                 self._changes.note(record.line, "step-up transformer within a generator's record: left out")
             source = complex(record.number(mbase + 1, "ZR", 0.0), record.number(mbase + 2, "ZX", 1.0))
-            least, most = _limits(record, "QB", 5, "QT", 4, "Mvar")
             p_least, p_most = _limits(record, "PB", status + 3, "PT", status + 2, "MW")
             feeds = record.number(2, "PG", 0.0)
             if not p_least <= feeds <= p_most and feeds <= rating:  # else the rating is asked about

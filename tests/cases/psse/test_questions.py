@@ -114,6 +114,10 @@ RAWS = {
         changed(RAW, ("'T3', 1\n0.0, 0.15, 900.0", "'T3', 1\n0.0, 15, 900.0")),
         "is 15 pu on the 900 MVA behind it, and step-up transformers have 0.03 to 0.35 pu there; is it in percent?",
     ),
+    "setpoint that the solution does not hold": (
+        changed(RAW, ("719.000, 0.0, 500.0, -300.0, 1.03", "719.000, 0.0, 500.0, -300.0, 0.83")),
+        "line 24: VS is 0.83 pu, where the solved file has VM = 1.03 pu",
+    ),
     "load of the wrong sign": (changed(RAW, ("967.000, 100.000", "-96.7, 10.000")), "load at bus_7 is -96.7 MW"),
     "small shunt": (changed(RAW, ("7, '1 ', 1, 0.0, 200.0", "7, '1 ', 1, 0.0, 3.5")), "shunt at bus_7 has 3.5 Mvar"),
 }
