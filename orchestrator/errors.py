@@ -65,7 +65,8 @@ class CosimError(Exception):
             self.kind = kind
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # it may have been made from other arguments
+        make = copyreg.__newobj__  # type: ignore[attr-defined]  # it may have been made from other arguments
+        return make, (type(self), *self.args), self.__dict__
 
     def __str__(self) -> str:
         return spelled(super().__str__())

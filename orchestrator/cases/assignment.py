@@ -116,6 +116,6 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
         before = plan.number(variable) if isinstance(value, str) and isinstance(converted, float) else 0.0
         if before and round(converted / before, 9) in _THOUSANDS:
             text = f"{value} is {converted / before:g} times what it is in the files; is the unit meant?"
-            draft.questions.append(Problem(where, text))
+            draft.found.questions.append(Problem(where, text))
         target[variable] = converted
         draft.places[f"{name}.{variable}"] = where
