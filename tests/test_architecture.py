@@ -14,7 +14,14 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
-    ("orchestrator.arrays", "orchestrator.cores", "orchestrator.errors", "orchestrator.late", "orchestrator.units"),
+    (
+        "orchestrator.arrays",
+        "orchestrator.cores",
+        "orchestrator.errors",
+        "orchestrator.spelling",
+        "orchestrator.late",
+        "orchestrator.units",
+    ),
     ("orchestrator.asked", "orchestrator.safe_files", "orchestrator.toml_files"),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),
