@@ -3,8 +3,7 @@
 The equations are those of `grid_forming_converter`, cut where a real converter is cut. The control measures three
 phase quantities: the voltage u across the capacitor branch, the current i_s in the converter-side inductor and the
 current i_g behind the capacitor. It gives the voltage of the bridge. Filter, transformer and bridge are left to the
-host: `control_part` says what it must build.
-"""
+host: `control_part` says what it must build."""
 
 from dataclasses import fields
 

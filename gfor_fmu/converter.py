@@ -32,8 +32,7 @@ class OuterControl:
 @dataclass(frozen=True)
 class Converter:
     """Outputs of every variant: current into the grid (network frame), control signals, internal magnitudes [pu,
-    S_n]; the demanded current in parts of its limit where the model has the limit.
-    """
+    S_n]; the demanded current in parts of its limit where the model has the limit."""
 
     current: Phasor
     control: OuterControl

@@ -2,8 +2,7 @@
 
 Each of the three acts like an impedance Z between the voltage reference and the capacitor, which grows with the demand.
 The voltage control turns a voltage into a demand by its gain k_p: a demand i* gives the reference i = i*/(1 + k_p·Z).
-What the limit takes from the voltage is Z·i = (i* − i)/k_p. It is exactly 0 while the limit does not act.
-"""
+What the limit takes from the voltage is Z·i = (i* − i)/k_p. It is exactly 0 while the limit does not act."""
 
 from dataclasses import dataclass
 
@@ -185,8 +184,7 @@ def _circular_drop(limit: CurrentLimit, size: ca.SX) -> Phasor:
 def _threshold_drop(limit: CurrentLimit, size: ca.SX, k_p: ca.SX) -> Phasor:
     """k_p·Z of Z = slope·(|i| − threshold)·(1 + j·X_R), at the current that solves |i|·|1 + k_p·Z| = |i*|.
 
-    The square of the left-hand side is convex in |i|: Newton's method converges from any value above the solution.
-    """
+    The square of the left-hand side is convex in |i|: Newton's method converges from any value above the solution."""
     a, I_th = k_p * limit.slope, limit.threshold
     demand = ca.fmax(size, I_th)
     over = (demand - I_th) / (1 + a * I_th)

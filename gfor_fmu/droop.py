@@ -13,8 +13,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 class Droop:
     """Measured powers and set-points.
 
-    ``p_f`` and ``q_f`` are states, so the frequency that they give has no direct feed-through.
-    """
+    ``p_f`` and ``q_f`` are states, so the frequency that they give has no direct feed-through."""
 
     R_f: ca.SX
     R_V: ca.SX

@@ -61,8 +61,7 @@ def _integrate_what_is_left(
     m: ModelBuilder, x: QdState, limit: CurrentLimit, found: LimitedCurrent, k_i: ca.SX, error: Phasor
 ) -> None:
     """Anti-windup. In the paper's box each component stands still while it is clamped; behind the other limits the
-    voltage that they take away is no error.
-    """
+    voltage that they take away is no error."""
     box, left = limit.is_kind(BOX), error - found.missing
     q_stops = ca.logic_and(box, ca.fabs(found.demanded.re) >= limit.box.i_q_max)
     d_stops = ca.logic_and(box, ca.fabs(found.demanded.im) >= limit.box.i_d_max)

@@ -2,8 +2,7 @@
 
 Filter, inner loops, feed-forwards and transformer settle within a few milliseconds, and are algebraic here: the
 voltage control holds u = u_ref, so that the emf is u_ref·e^{jθ}, a function of the droops' and the POD controllers'
-states alone. The current limit is not represented; ``current_limit`` shows when it would act.
-"""
+states alone. The current limit is not represented; ``current_limit`` shows when it would act."""
 
 import casadi as ca
 

@@ -7,8 +7,7 @@
        └─────────┘   └───────┘   └──────────────┘
 
 The input is the deviation of the frequency that the converter itself imposes, so nothing needs to
-be measured. Because of T_f the output never depends directly on the input: no algebraic loop.
-"""
+be measured. Because of T_f the output never depends directly on the input: no algebraic loop."""
 
 import casadi as ca
 

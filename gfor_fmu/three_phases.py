@@ -3,8 +3,7 @@
 The network frame stands at the angle φ = φ_0 + ω_b·t. A master holds inputs during a communication step H. If only the
 phase voltages were held, the voltage would stand still while the frame turns on, and would lag by ω_b·H/2 on average.
 Therefore φ is held as well. This holds the voltage's phasor in the network frame at its value of the communication
-point, exactly as in the variant with v_re and v_im.
-"""
+point, exactly as in the variant with v_re and v_im."""
 
 from dataclasses import replace
 

@@ -1,7 +1,6 @@
 """What a study can be asked: the fields of its request, from which options and keywords come.
 
-A `FieldKind` says twice what a field may be: ``read`` takes the text of an option, ``check`` what Python gives.
-"""
+A `FieldKind` says twice what a field may be: ``read`` takes the text of an option, ``check`` what Python gives."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -53,8 +52,7 @@ def asked(
     """A field of a request.
 
     ``text``: help of the option, and what the field means.
-    ``option`` and ``keyword``: where they are not spelt as the field is; None for a field that only Python has.
-    """
+    ``option`` and ``keyword``: where they are not spelt as the field is; None for a field that only Python has."""
     return field(default=default, metadata={_ASKED: (kind, text, metavar or kind.metavar, option, keyword)})
 
 
@@ -72,8 +70,7 @@ def asked_of(request: type) -> dict[str, Asked]:
 def checked(request: type, wanted: Mapping[str, Any]) -> dict[str, Any]:
     """Fields of a request from keywords, of those that it has; None stays where it is the default.
 
-    Raises an `InputError` if one of them is not of its kind or outside of its range; it is named.
-    """
+    Raises an `InputError` if one of them is not of its kind or outside of its range; it is named."""
     found = {}
     for name, one in asked_of(request).items():
         if one.keyword in wanted:

@@ -184,8 +184,7 @@ class EndedError(CosimError):
     """A running FMU ended its simulation by itself, as FMI allows; ``ended_at`` is when [s].
 
     ``status``, ``log``: what the call returned, and the FMU's own words; ``time``: of the step that it did not make
-    [s].
-    """
+    [s]."""
 
     def __init__(self, component: str, status: str, log: str, time: float, ended_at: float) -> None:
         self.component, self.status, self.log, self.time, self.ended_at = component, status, log, time, ended_at

@@ -2,8 +2,7 @@
 case need neither.
 
 A module that may do without them imports them from here, and defers its annotations (``from __future__ import
-annotations``), which would use the library at once.
-"""
+annotations``), which would use the library at once."""
 
 import sys
 from importlib import import_module
@@ -13,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 class Late:
     """A stand-in for a module, which is imported when one of its names is first asked for.
 
-    ``module``: its name, such as ``"xarray"``.
-    """
+    ``module``: its name, such as ``"xarray"``."""
 
     def __init__(self, module: str) -> None:
         self._module = module
@@ -34,8 +32,7 @@ def import_xarray_alone() -> None:
     """Import xarray as if dask and pint were not installed: its first array would import both, which takes a second.
 
     xarray remembers what it found: this is for a process that reads files of numbers and ends with its answer. One that
-    has xarray already keeps it as it is.
-    """
+    has xarray already keeps it as it is."""
     if "xarray" in sys.modules:
         return
     hidden = [name for name in ("dask", "pint") if name not in sys.modules]

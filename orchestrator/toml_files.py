@@ -22,8 +22,7 @@ def read_toml(path: Path, subject: str, remedy: str, option: str = "") -> tuple[
     """Read a TOML file; its text, and what the text says.
 
     Raises an `InputError` if there is no such file, it cannot be read, it is larger than `MOST_BYTES`, or it is not
-    TOML.
-    """
+    TOML."""
     source = f"{option} {path}".lstrip()
     try:
         if (size := path.stat().st_size) > MOST_BYTES:

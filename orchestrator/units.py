@@ -66,8 +66,7 @@ def to_unit(value: float | int | str, unit: str) -> float:
     """Convert a value to the unit that is declared for it.
 
     ``value``: A number, which is taken to be in ``unit`` already, or a text such as ``"1350 MW"``.
-    ``unit``: the declared unit; ``"1"`` or ``""`` for a plain number.
-    """
+    ``unit``: the declared unit; ``"1"`` or ``""`` for a plain number."""
     if isinstance(value, int | float):
         return float(value)
     parts = _QUANTITY.fullmatch(value)
@@ -106,8 +105,7 @@ def _kind(unit: str) -> str:
 
 def _counts_alike(given: str, needed: str) -> bool:
     """Whether two units of one dimension both count cycles, both count angles, or neither; pint takes a cycle and a
-    radian for 1 both, and would lose the 2π between them.
-    """
+    radian for 1 both, and would lose the 2π between them."""
     one, other = (_registry().Quantity(1, unit) for unit in (given, needed))
     (cycles, angles, turns), (cycles_needed, angles_needed, turns_needed) = map(_counted, (one, other))
     turned = (turns and not angles_needed) or (turns_needed and not angles)

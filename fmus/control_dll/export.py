@@ -99,8 +99,7 @@ def write_dll(
     ``platforms``: Of `DLL_TARGETS`.
     ``sample_time``: Between two calls of the control [s].
     ``values``: Other defaults of the DLL's parameters, by name.
-    ``report``: Called with a sentence before each part of the work.
-    """
+    ``report``: Called with a sentence before each part of the work."""
     if unknown := [name for name in platforms if name not in DLL_TARGETS]:
         raise ControlDllError(f"there is no platform {unknown[0]!r}; choose from: {', '.join(DLL_TARGETS)}")
     if not _SHORTEST <= sample_time <= _LONGEST:

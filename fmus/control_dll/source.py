@@ -16,8 +16,7 @@ def dll_source(model: Model, sample_time: float) -> str:
     """Source of the DLL, which needs nothing but the C library.
 
     ``model``: Integrated by explicit steps, as the kernel does in an FMU.
-    ``sample_time``: ``FixedStepBaseSampleTime`` [s].
-    """
+    ``sample_time``: ``FixedStepBaseSampleTime`` [s]."""
     if model.integrator != "runge_kutta":
         raise ValueError(f"model {model.name}: only models with explicit steps become DLLs")
     parts = [

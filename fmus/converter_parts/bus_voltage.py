@@ -1,8 +1,7 @@
 """The bus voltage of a converter without network transients, from states alone.
 
 A current source has no emf. Two lags of the bus voltage extrapolate it: 2·v_1 − v_2 errs by (s·τ)², and is a function
-of states alone.
-"""
+of states alone."""
 
 from dataclasses import dataclass
 
@@ -21,8 +20,7 @@ SHORT = 1e-3
 class ExtrapolatedVoltage:
     """Bus voltage through one lag and through two, in the network frame, in which a master holds it.
 
-    ``delay``, ``more``: of the first lag at the end of a communication step, and how much later the second is [s].
-    """
+    ``delay``, ``more``: of the first lag at the end of a communication step, and how much later the second is [s]."""
 
     once: Phasor
     twice: Phasor
@@ -50,8 +48,7 @@ def extrapolated_voltage(m: ModelBuilder, port: DevicePort, master: MasterStep) 
     """Declare both lags.
 
     A step H holds the voltage of its middle. At its end the first lag is late by D = (H/2)·coth(H/2τ) and the second by
-    (H²/4τ)/sinh²(H/2τ) more; both are τ where H is short.
-    """
+    (H²/4τ)/sinh²(H/2τ) more; both are τ where H is short."""
     with m.scope("bus_voltage"):
         shortest = m.parameter(
             "tau", 0.002, "s", "Time constant of both lags of the bus voltage; at least communication_step",

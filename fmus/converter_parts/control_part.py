@@ -17,8 +17,7 @@ class CircuitElement:
 
     ``symbol``, ``place``: its name, and where it lies; ``parameter``: of the control, per unit: the control's gains
     follow from it, so circuit and control must agree; ``kind``: what the parameter becomes: ``damping`` is the
-    resistance 1/(30·B_c) in series with the capacitor.
-    """
+    resistance 1/(30·B_c) in series with the capacitor."""
 
     symbol: str
     place: str
@@ -46,8 +45,7 @@ class ControlPart:
     """A converter cut in two: its control as a model, and the rest as a circuit of the host.
 
     ``model``: measurements in, bridge voltage out; ``lead``: parameter with which the bridge voltage makes up for the
-    host's hold [s]; ``circuit``: from the bridge to the bus.
-    """
+    host's hold [s]; ``circuit``: from the bridge to the bus."""
 
     model: Model
     lead: str

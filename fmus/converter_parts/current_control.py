@@ -16,8 +16,7 @@ def current_control(
 
     ``f``: the declared filter; ``omega_b``: base angular frequency [rad/s]; ``w``: frequency of the converter's frame
     [pu, f_n]; ``i_ref``: reference of the current in the inductor, converter's frame [pu, S_n]; ``u_lagged``: measured
-    voltage across the capacitor branch [pu, S_n].
-    """
+    voltage across the capacitor branch [pu, S_n]."""
     start = f.initial
     with m.scope("current_control"):
         tau = m.parameter("tau", 0.001, "s", "Time constant of the current loop", minimum=2e-4, source=APPENDIX)

@@ -1,7 +1,6 @@
 """Electrical side of a converter: LC filter and step-up transformer, in the converter's frame.
 
-Everything is complex, f = f_q − j·f_d, per unit on the rating S_n; w is the converter's frequency [pu].
-"""
+Everything is complex, f = f_q − j·f_d, per unit on the rating S_n; w is the converter's frequency [pu]."""
 
 from dataclasses import dataclass
 
@@ -44,8 +43,7 @@ class FilterData:
 class MeasuredFilter(FilterData):
     """The filter as its control sees it: all that the control needs to know of the circuit.
 
-    ``u`` is the voltage across the capacitor branch, the one that is controlled and measured.
-    """
+    ``u`` is the voltage across the capacitor branch, the one that is controlled and measured."""
 
     i_s: QdState
     i_g: QdState
@@ -95,8 +93,7 @@ def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, 
 
     ``port``: the port, which gives the bus voltage and the breaker's position; ``v_c``: the converter's own voltage, in
     its own frame [pu, S_n]; ``theta``: angle of that frame in the network frame [rad]; ``w``: frequency of the
-    converter [pu, f_n].
-    """
+    converter [pu, f_n]."""
     v_bus = port.v.rotated(-theta)
     i_s, u_c, i_g = f.i_s.value, f.u_c.value, f.i_g.value
     f.i_s.set_derivative(m, (v_c - f.u - Phasor(f.R_c, w * f.X_c) * i_s) * (port.omega_b / f.X_c))

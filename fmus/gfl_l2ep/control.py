@@ -1,7 +1,6 @@
 """PLL, outer control and current control of the benchmark's converter.
 
-Gains are those of the benchmark itself, so that its data can be entered as they are published.
-"""
+Gains are those of the benchmark itself, so that its data can be entered as they are published."""
 
 from dataclasses import dataclass
 
@@ -34,8 +33,7 @@ class Following:
 def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Following:
     """Declare the whole converter.
 
-    ``v``: voltage at the bus, network frame [pu].
-    """
+    ``v``: voltage at the bus, network frame [pu]."""
     t = declare_transformer(m, port)
     theta = m.algebraic("theta")
     bus = v.rotated(-theta)

@@ -1,8 +1,7 @@
 """Electrical side of the converter: its own voltage behind the reactance of its transformer, in the PLL's frame.
 
 A modular multilevel converter needs no filter capacitor. The transformer is one reactance with an ideal ratio r at the
-grid's side: u = v/r and i = r·i_bus, per unit on S_n. Names of the benchmark: its d is our q, its q our −d.
-"""
+grid's side: u = v/r and i = r·i_bus, per unit on S_n. Names of the benchmark: its d is our q, its q our −d."""
 
 from dataclasses import dataclass
 
@@ -54,8 +53,7 @@ def transformer_equation(m: ModelBuilder, t: Transformer, port: DevicePort, v_c:
     """(X/ω_b)·di/dt = v_c − u − (R + j·w·X)·i; behind an open breaker the current fades.
 
     ``port``: the port, which gives the breaker's position; ``v_c``, ``u``: voltage of the converter, and of the bus
-    behind the ratio, converter's frame [pu, S_n]; ``w``: frequency of that frame [pu, f_n].
-    """
+    behind the ratio, converter's frame [pu, S_n]; ``w``: frequency of that frame [pu, f_n]."""
     i = t.i.value
     closed = (v_c - u - Phasor(t.R, w * t.X) * i) * (port.omega_b / t.X)
     t.i.set_derivative(m, port.through_breaker(closed, i * (-1 / BREAKER_TIME)))

@@ -12,8 +12,7 @@ MEMORY = 1e-3
 def running(m: ModelBuilder, v: ca.SX) -> ca.SX:
     """1 while the PLL runs, 0 while it stands: below ``V_low``, and from there until ``V_high``.
 
-    ``v``: magnitude of the bus voltage [pu].
-    """
+    ``v``: magnitude of the bus voltage [pu]."""
     with m.scope("pll"), m.scope("freezing"):
         low = m.parameter(
             "V_low", 0.4, "pu", "Voltage below which the PLL stands; 0: never", base="bus", minimum=0.0, source=COLIB

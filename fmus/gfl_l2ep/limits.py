@@ -26,8 +26,7 @@ def declare_limits(m: ModelBuilder, start: Start, reactive: ca.SX) -> Limits:
     """Declare the limit and the state that carries the active current's share.
 
     ``start``: the operating point. It leaves sqrt(I_max² − i_q0²) for the reactive current of the voltage control;
-    ``reactive``: reactive current in the converter [pu, S_n].
-    """
+    ``reactive``: reactive current in the converter [pu, S_n]."""
     with m.scope("current_limit"):
         I_max = m.parameter("I_max", 1.0, "pu", "Largest current", base="S_n", minimum=0.1, source=COLIB)
         T = m.parameter("tau", 0.002, "s", "Lag of the active current's limit", minimum=1e-3, source=COLIB)

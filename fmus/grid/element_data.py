@@ -69,8 +69,7 @@ class Load:
     ``active``, ``reactive``: how P and Q follow the voltage; ``k_pf``, ``k_qf``: change of P and Q [pu of it] by the
     frequency [pu]; ``v_min``: voltage [pu] below which the load is an impedance. None is `LOW_VOLTAGE` where there is a
     share of constant power, else 0: never; ``tau``: lag [s] with which the load follows these laws; None for the
-    default of the network's model.
-    """
+    default of the network's model."""
 
     name: str
     bus: str
@@ -119,8 +118,7 @@ class Load:
 @dataclass(frozen=True, slots=True)
 class Shunt:
     """An admittance to earth, by the power that it draws [MW] and generates [Mvar] at 1 pu; b_mvar < 0 is an
-    inductor. A ``switched`` one has a breaker.
-    """
+    inductor. A ``switched`` one has a breaker."""
 
     name: str
     bus: str
@@ -143,8 +141,7 @@ class ThreeWinding:
 
     ``buses``: of windings 1, 2 and 3; ``X``, ``R``: of each winding in the star [pu, 100 MVA]. One X may be negative,
     as long as any two windings together, and all three, have a positive inductance; ``tap``, ``shift``: ideal ratio
-    tap·e^{j·shift} [1, rad] between each bus and its winding.
-    """
+    tap·e^{j·shift} [1, rad] between each bus and its winding."""
 
     name: str
     buses: tuple[str, str, str]

@@ -31,8 +31,7 @@ class Branch:
     ``current``: the state with the current; behind the ratio, if there is one; ``drawn``: current that the branch takes
     from its from bus; ``ratio``: complex ratio at the from side; ``connected``: 1 for a connected branch, 0 for an open
     one; None for a branch that cannot be opened; ``capacitor``: voltage of a capacitor in series, a state, and its
-    reactance.
-    """
+    reactance."""
 
     current: Phasor
     drawn: Phasor
@@ -63,8 +62,7 @@ Inductor = Callable[[ModelBuilder, Bus, str, ca.SX, Scalar], list[Branch]]
 @dataclass(frozen=True)
 class LineValues:
     """Parameters of a line: series impedance, ratio at the from side (None without one), 1 or 0 where it is open,
-    series capacitor (None without one).
-    """
+    series capacitor (None without one)."""
 
     R: ca.SX
     X: ca.SX
@@ -161,8 +159,7 @@ def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar
     direct component.
 
     ``bus``: the bus whose injected current is reduced by the inductor's; ``name``: name of the bus; ``X``: reactance
-    [pu, 100 MVA]; ``scale``: factor from the state to the current drawn.
-    """
+    [pu, 100 MVA]; ``scale``: factor from the state to the current drawn."""
     current = _current_state(m, bus.v_0 / Phasor(0, X), "Inductor current at scale 1")
     drawn = current * scale
     bus.injected -= drawn
@@ -176,8 +173,7 @@ def declare_load(
 
     ``load``: its power and name; the power is the default of parameters; ``buses``: by name; that of the load is
     changed; ``alone``: whether this load alone determines the voltage of its bus, and therefore cannot be switched off;
-    ``inductor``: declares the inductor of a load that draws reactive power.
-    """
+    ``inductor``: declares the inductor of a load that draws reactive power."""
     bus = buses[load.bus]
     v_squared = bus.v_0.re**2 + bus.v_0.im**2
     text = "Load step: factor on G and 1/X; 0 is switched off"
@@ -214,8 +210,7 @@ def declare_shunt(
     """Declare an admittance to earth: conductance, and a capacitor or an inductor.
 
     ``shunt``: its powers at 1 pu and its name; the powers are the defaults of parameters; ``buses``: by name; that of
-    the shunt is changed; ``inductor``: declares the inductor of a shunt that draws reactive power.
-    """
+    the shunt is changed; ``inductor``: declares the inductor of a shunt that draws reactive power."""
     bus = buses[shunt.bus]
     with m.scope(shunt.name):
         text = "The shunt is connected"
@@ -239,8 +234,7 @@ def declare_shunt(
 
 def add_stray(m: ModelBuilder, network: Network, buses: dict[str, Bus]) -> None:
     """Declare the stray capacitance of every bus without capacitance of its own, if the network has stray
-    capacitance.
-    """
+    capacitance."""
     floating = [bus for name, bus in buses.items() if network.needs_stray(name)]
     if floating:
         text = "Capacitance to earth of every bus that has none of its own"
@@ -256,8 +250,7 @@ def declare_network_outputs(
 
     ``network``: its lines and ports; ``buses``: by name, with their voltages; ``drawn``: current of every line at its
     from bus, in the order of the lines: network frame [pu, 100 MVA]; ``fed``: current of every device, in the order of
-    the ports: network frame [pu, 100 MVA].
-    """
+    the ports: network frame [pu, 100 MVA]."""
     for name, bus in buses.items():
         with m.scope(name):
             m.output("v_re", bus.v.re, "pu", "Bus voltage, real part, network frame", base="bus")
@@ -275,8 +268,7 @@ def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omeg
     """(X/ω_b)·di/dt = v_from/t − v_to − (R + jX)·i; where the line is open, di/dt = −i/τ.
 
     ``branch``: with its current as a state; ``buses``: by name, with their voltages; ``omega_b``: base angular
-    frequency [rad/s].
-    """
+    frequency [rad/s]."""
     over = buses[branch.from_bus].v
     if branch.ratio is not None:
         over = over / branch.ratio
@@ -308,8 +300,7 @@ def declare_power(m: ModelBuilder, name: str, v: Phasor, current: Phasor, active
     """Declare ``<name>.p`` and ``<name>.q`` of a current at a voltage.
 
     ``name``: scope of both outputs; ``v``: voltage [pu]; ``current``: in the same frame [pu, 100 MVA]; ``active``,
-    ``reactive``: descriptions of the two outputs.
-    """
+    ``reactive``: descriptions of the two outputs."""
     s = power(v, current)
     with m.scope(name):
         m.output("p", s.re, "pu", active, base=SYSTEM_BASE)

@@ -1,8 +1,7 @@
 """Three-phase faults at buses: an impedance R + jX to earth behind a switch.
 
 In an EMT network its current is a state; once the fault is over the current fades within a millisecond, as that of a
-line which opens. In a network of phasors it is an admittance.
-"""
+line which opens. In a network of phasors it is an admittance."""
 
 import casadi as ca
 

@@ -1,8 +1,7 @@
 """An EMT network in the frame that turns at ω_b: dynamic lines, loads, bus capacitances.
 
 A bus with capacitance has its voltage as a state. A bus without capacitance has v = Σ i / G, directly from the currents
-that the devices inject: the FMU has direct feed-through there, and declares it.
-"""
+that the devices inject: the FMU has direct feed-through there, and declares it."""
 
 import casadi as ca
 

@@ -12,8 +12,7 @@ real ones are. With the inductances L that feed the bus, a constant current G ob
 τ > 0. Static generation (P < 0) has Y = 0: within τ it is a source of constant current, not a negative conductance.
 
 Only Y'(|v|, f)·v is no linear function of the states. An implicit step takes it at the stages of the step, and all else
-implicitly.
-"""
+implicitly."""
 
 from dataclasses import dataclass
 
@@ -51,8 +50,7 @@ class FollowingLoad:
 
     ``data``: the load's laws; ``load``: its admittance at scale 1; ``correction``: the state c; ``tau``: its lag [s];
     ``v_min``: voltage below which it is an impedance [pu]; None for never; ``delayed``: the bus voltage behind a lag,
-    and that lag [s], for the frequency; None for a load that does not depend on it.
-    """
+    and that lag [s], for the frequency; None for a load that does not depend on it."""
 
     data: Load
     bus: Bus
@@ -78,8 +76,7 @@ def declare_following_load(
     ``load``: the load's bus, name and laws; ``declared``: the same load as a constant impedance, as `declare_load`
     returns it; ``buses``: by name; the correction is added to what is injected at the load's bus; ``omega_b``: base
     angular frequency [rad/s]; None where no load depends on the frequency; ``phasors``: whether the network is one of
-    phasors, with longer steps.
-    """
+    phasors, with longer steps."""
     bus = buses[load.bus]
     only_current = load.active.i == 1 and not (load.reactive_follows or load.k_pf)
     law = "a constant current" if only_current else "what its law says"

@@ -7,8 +7,7 @@ _DATA = ("X", "R", "B", "tap", "shift")
 
 def line_variable(line: str, quantity: str) -> str:
     """Name of a line's variable: its data have names such as ``X_tie``, all other variables names such as
-    ``tie.connected``.
-    """
+    ``tie.connected``."""
     return f"{quantity}_{line}" if quantity in _DATA else f"{line}.{quantity}"
 
 

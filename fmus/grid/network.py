@@ -70,8 +70,7 @@ class Network:
 
     def has_capacitance(self, bus: str) -> bool:
         """Whether the bus voltage is a state, because of line charging, a capacitive load or shunt, or stray
-        capacitance.
-        """
+        capacitance."""
         return self._has_fixed_capacitance(bus) or bool(self._capacitive_loads(bus)) or self.needs_stray(bus)
 
     def floats(self, bus: str) -> bool:

@@ -1,6 +1,5 @@
 """Solution of complex nodal equations Y·v = i with symbols, by elimination in an order that keeps them sparse; or as
-data, by the kernel of the model.
-"""
+data, by the kernel of the model."""
 
 from collections.abc import Callable
 from heapq import heapify, heappop, heappush
@@ -28,8 +27,7 @@ def solve(Y: Admittances, currents: dict[str, Phasor], *, checked: bool = False)
     a bus has no admittance at all, and then its voltage is not finite.
 
     ``Y``, ``currents``: the equations; ``checked``: whether no voltage is finite where the solution leaves more than
-    `LARGEST_REST` over: for networks that are not passive, in which an element that is divided by may vanish.
-    """
+    `LARGEST_REST` over: for networks that are not passive, in which an element that is divided by may vanish."""
     voltages = _solve(Y, currents)
     if not checked:
         return voltages
@@ -82,8 +80,7 @@ def solved_as_data(
 ) -> dict[str, Phasor]:
     """Voltages of all buses, which the model's kernel solves for.
 
-    ``written_out``: makes the same model by `solve`.
-    """
+    ``written_out``: makes the same model by `solve`."""
     place = {bus: k for k, bus in enumerate(Y)}
     elements = {
         (place[bus], place[other]): (y.re, y.im) for bus, row in Y.items() for other, y in row.items()

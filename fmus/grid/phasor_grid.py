@@ -6,8 +6,7 @@ Networks of up to `WRITTEN_OUT` buses are solved operation by operation, in code
 which is factorised anew where a parameter or an admittance changes.
 
 Elements, parameters and outputs are those of `grid`. Constant-impedance loads, ratios and open lines behave as
-described there.
-"""
+described there."""
 
 from functools import partial
 from typing import Literal
@@ -54,8 +53,7 @@ def phasor_grid(network: Network) -> Model:
 
 def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) -> Model:
     """The model, solved by code or from data; or its variables with the voltages that a power flow gives, at which
-    nothing is solved.
-    """
+    nothing is solved."""
     m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency", kind="network")
     following: list[FollowingLoad] = []
     omega_b: ca.SX | None = None

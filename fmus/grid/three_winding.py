@@ -4,8 +4,7 @@ With v_k behind the ratios, leg 3 subtracted from legs 1 and 2, and the star poi
 
     1/ω_b·[[X_1 + X_3, X_3], [X_3, X_2 + X_3]]·d(i_1, i_2)/dt = (e_1, e_2),  e_k = v_k − v_3 − Z_k·i_k + Z_3·i_3
 
-It has a solution wherever that matrix is positive definite, also where one X_k is negative.
-"""
+It has a solution wherever that matrix is positive definite, also where one X_k is negative."""
 
 from dataclasses import dataclass
 
@@ -77,8 +76,7 @@ def transformer_equations(m: ModelBuilder, windings: Windings, buses: dict[str, 
     """Give both currents their rates; where the transformer is open they fade, as a line's current does.
 
     ``windings``: the declared transformer, with its currents; ``buses``: by name; they give the voltages; ``omega_b``:
-    rated angular frequency [rad/s].
-    """
+    rated angular frequency [rad/s]."""
     assert windings.currents is not None
     behind = [buses[bus].v / t for bus, t in zip(windings.data.buses, windings.ratio, strict=True)]
     drops = [z * i for z, i in zip(windings.Z, windings.currents, strict=True)]

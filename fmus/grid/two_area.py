@@ -2,8 +2,7 @@
 
 Source: Norma técnica de supervisión 631 v2.0 (2020), tables 40-47, with the converter of
 Mateu-Barriendos et al. 2024. The step-up transformers belong to the devices, so buses 1, 4 and 5
-are inside them.
-"""
+are inside them."""
 
 from dataclasses import replace
 

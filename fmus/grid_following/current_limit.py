@@ -31,8 +31,7 @@ def limited_current(m: ModelBuilder, start: SteadyState, demanded: Phasor) -> Li
     """Declare the limit and apply it; a dispatch beyond it is refused.
 
     ``start``: operating point of the filter; ``demanded``: reference of the converter's current, its own frame: real
-    part active, imaginary part reactive [pu, S_n].
-    """
+    part active, imaginary part reactive [pu, S_n]."""
     with m.scope("current_limit"):
         most = m.parameter("I_max", 1.1, "pu", "Largest current", base="S_n", minimum=0.1, source=SOURCE)
         priority = m.parameter(

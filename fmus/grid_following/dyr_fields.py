@@ -5,8 +5,7 @@ integrator. Around an operating point that is what `gfl_phasor` does below about
 on references is not taken over; `approximation` names every field that it leaves.
 
 Sources: the order of fields as ANDES' reader and GridPACK's take it; the block diagrams as WECC's guide for generic
-wind and solar models shows them.
-"""
+wind and solar models shows them."""
 
 from collections.abc import Mapping
 

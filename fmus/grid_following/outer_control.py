@@ -36,8 +36,7 @@ def outer_control(
 
     ``f``: filter data with the operating point; ``port``: the port, which gives the breaker's position; ``measured``:
     without the lags of the measurement, which are declared here; ``standby``: current that the converter injects behind
-    an open breaker, its own frame [pu, S_n].
-    """
+    an open breaker, its own frame [pu, S_n]."""
     start = f.initial
     with m.scope("measurement"):
         tau = m.parameter("tau", 0.01, "s", "Lag of the measurements of P, Q and u", minimum=1e-3, source="chosen here")

@@ -41,8 +41,7 @@ def phase_locked_loop(
 
     ``angle_0``: angle of the frame at the start [rad], a calculated value; ``omega_b``: base angular frequency [rad/s];
     ``measured``: voltage in the converter's own frame [pu], a function of states; ``defaults``: of its parameters;
-    ``running``: factor of u_⊥ and of dθ/dt: 1, or 0 while the loop stands; None for a loop that always runs.
-    """
+    ``running``: factor of u_⊥ and of dθ/dt: 1, or 0 while the loop stands; None for a loop that always runs."""
     seen = measured.im if running is None else measured.im * running
     with m.scope("pll"):
         f_0 = m.parameter(

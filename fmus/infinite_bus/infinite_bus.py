@@ -2,8 +2,7 @@
 
 A voltage dip or a load step can be set by tunable parameters during the run, or beforehand by times, for masters that
 change no parameter while they run. A clock inside the FMU compares these times. The clock runs only if it is enabled,
-because a running clock is a state that never stands still.
-"""
+because a running clock is a state that never stands still."""
 
 import casadi as ca
 

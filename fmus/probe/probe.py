@@ -3,8 +3,7 @@
 Both are slow lags with a gain; b passes part of its input on directly, a passes nothing. Every difference between
 masters changes a.y and b.y: the order of the steps, the values of the inputs in the first step (the start values of u
 differ from 0 and from the partner's output), the extrapolation of inputs, and the recording of outputs with the inputs
-of the step or of the next one.
-"""
+of the step or of the next one."""
 
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder

@@ -16,8 +16,7 @@ def active_droop(m: ModelBuilder, P_0: Scalar, Pf: ca.SX) -> ca.SX:
 
     ω = 1 + mp·(Pref − Pf) + u_max + u_min, where u_max ≤ 0 and u_min ≥ 0 act beyond a limit.
 
-    ``P_0``: active power of the operating point [pu, S_n]; ``Pf``: measured active power [pu, S_n].
-    """
+    ``P_0``: active power of the operating point [pu, S_n]; ``Pf``: measured active power [pu, S_n]."""
     mp = m.parameter("mp", 0.01, "pu", "P-f droop gain", base="S_n", minimum=1e-4, tunable=True, source=SPECIFICATION)
     change = m.parameter("delta_Pref", 0, "pu", "Change of Pref", base="S_n", tunable=True)
     Pref = m.calculated("Pref", P_0, "pu", "Active-power reference of the operating point", base="S_n")
@@ -33,8 +32,7 @@ def internal_voltage(m: ModelBuilder, V_0: Scalar, E_0: Scalar, Q_0: Scalar, Qf:
     """Declare the Q-V droop with Qmax and Qmin and the voltage control; return the internal voltage's magnitude [pu].
 
     ``V_0``, ``E_0``, ``Q_0``: terminal voltage, internal voltage and reactive power of the operating point [pu, S_n];
-    ``Qf``, ``Vf``: measured reactive power and terminal voltage [pu, S_n].
-    """
+    ``Qf``, ``Vf``: measured reactive power and terminal voltage [pu, S_n]."""
     mq = m.parameter("mq", 0.05, "pu", "Q-V droop gain", base="S_n", minimum=0, tunable=True, source=SPECIFICATION)
     kpv = m.parameter("kpv", 0.0, "pu", "Proportional gain of the voltage control", base="S_n", minimum=0,
                       source=SPECIFICATION)  # fmt: skip
@@ -67,8 +65,7 @@ def _limits(
 ) -> ca.SX:
     """Declare the upper and the lower limit of P or Q; return what both controllers add [pu].
 
-    Each is a proportional-integral controller that only leads back: integrator and output stay on one side of 0.
-    """
+    Each is a proportional-integral controller that only leads back: integrator and output stay on one side of 0."""
     source = "chosen here: storage; the specification's resources feed 0 to 0.9" if name == "P" else SPECIFICATION
     high = m.parameter(f"{name}max", most, "pu", f"Largest {name}", base="S_n", source=source)
     low = m.parameter(f"{name}min", least, "pu", f"Smallest {name}", base="S_n", source=source)

@@ -2,8 +2,7 @@
 
 Field names are the specification's. Source of their order: PSS/E 36.4's integers VFlag and QVFlag and its constants 1
 to 18, as public scripts for PSS/E number them and GridPACK's reader takes them. RL and XL are no fields: they are
-ZSORCE of the network data. Per unit values are on MBASE.
-"""
+ZSORCE of the network data. Per unit values are on MBASE."""
 
 from fmus.synchronous_generator.dyr_fields import DyrField, DyrRecord
 

@@ -1,7 +1,6 @@
 """REGFM_A1: a voltage source behind an impedance, with P-f and Q-V droop, power limits and a fault current limit.
 
-Names of parameters and signals are those of the specification (PNNL-32278, September 2023).
-"""
+Names of parameters and signals are those of the specification (PNNL-32278, September 2023)."""
 
 import casadi as ca
 
@@ -86,8 +85,7 @@ def _limited(
     """The internal voltage that keeps the current within ImaxF, and the current without it in parts of ImaxF.
 
     The specification takes the terminal voltage of the same instant. A port whose emf follows from states alone needs a
-    measured one: while the limit acts, the current is limited after that lag.
-    """
+    measured one: while the limit acts, the current is limited after that lag."""
     ImaxF = m.parameter("ImaxF", 2.0, "pu", "Largest current in a fault", base="S_n", minimum=0.1, source=SPECIFICATION)
     T = m.parameter("TIf", 0.002, "s", "Lag of the terminal voltage that the fault current limit sees", minimum=1e-3,
                     source="chosen here; none in the specification")  # fmt: skip

@@ -3,8 +3,7 @@
 It is what a negative load is in the network's own models, as a device with a port. The current follows the voltage's
 angle as a phase-locked loop would, (2ω_0·s + ω_0²)/(s + ω_0)². For swings that is 1 − s²/ω_0²: without a lag, which
 would be a damping torque. Well above ω_0 the current stands still: an admittance of zero, neither damping nor the
-negative conductance of a constant power.
-"""
+negative conductance of a constant power."""
 
 from dataclasses import dataclass
 

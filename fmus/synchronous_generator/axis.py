@@ -1,7 +1,6 @@
 """One axis of a synchronous machine: a magnetising reactance with rotor windings beside it, seen through flux linkages.
 
-Per unit on the stator base; the windings' reactances are leakage reactances on that base.
-"""
+Per unit on the stator base; the windings' reactances are leakage reactances on that base."""
 
 from dataclasses import dataclass
 from functools import reduce
@@ -17,8 +16,7 @@ from fmus.toolchain.port import BREAKER_TIME
 class Winding:
     """A rotor winding: leakage reactance and resistance [pu], and its flux linkage.
 
-    ``saturation_current`` [pu] is what iron draws beside the winding's own current.
-    """
+    ``saturation_current`` [pu] is what iron draws beside the winding's own current."""
 
     X: ca.SX
     R: ca.SX
@@ -31,8 +29,7 @@ class Axis:
     """Magnetising reactance, rotor windings from slow to fast, stator flux, and quantities that follow from them.
 
     ``X_subtransient`` is the reactance of the air gap with every winding a perfect conductor, ``X_between`` that
-    between the emf and the bus. An axis without windings has a ``fixed_emf``.
-    """
+    between the emf and the bus. An axis without windings has a ``fixed_emf``."""
 
     X_m: ca.SX
     windings: tuple[Winding, ...]

@@ -1,7 +1,6 @@
 """The generator whose machine, exciter, governor and stabiliser are chosen by name, EMT-type and phasor type.
 
-A part that is not named is not there: the field voltage and the mechanical torque are then constant.
-"""
+A part that is not named is not there: the field voltage and the mechanical torque are then constant."""
 
 from fmus.synchronous_generator.generator import with_controls
 from fmus.synchronous_generator.machine import flux_state

@@ -4,8 +4,7 @@ Each axis is a magnetising reactance with two rotor branches beside it: branch 1
 q damper), branch 2 fast (damper). Reactances and resistances are per unit on the stator base.
 
 X' = X means that the slow branch is missing, X'' = X' that the fast one is missing. A missing branch has 1/`_NOTHING`
-times the reactance X_m: its state exists but has no effect.
-"""
+times the reactance X_m: its state exists but has no effect."""
 
 from dataclasses import dataclass
 
@@ -52,8 +51,7 @@ def exact(a: AxisData, omega_b: ca.SX) -> RotorBranches:
     """Branches whose operational reactance is exactly X(1+sT')(1+sT'')/((1+sT'_0)(1+sT''_0)).
 
     With T' = T'_0·X'/X and T'' = T''_0·X''/X'. Taking X_l off and inverting leaves the admittance of
-    X_m and of both branches; its partial fractions are the branches: s/(ω_b·R + s·X) each.
-    """
+    X_m and of both branches; its partial fractions are the branches: s/(ω_b·R + s·X) each."""
     X_m = a.X - a.X_l
     # The time constant of a missing fast branch has no meaning, and must not be taken for that of the slow branch.
     T20 = ca.if_else(a.X1 - a.X2 <= _NOTHING * a.X, ca.fmin(a.T20, 0.1 * a.T10 * (a.X1 - a.X_l) / X_m), a.T20)

@@ -11,8 +11,7 @@ STAMP = "STAMP toolbox of the paper's group"
 class MachineData:
     """Standard data on the machine's own rating; times in seconds, everything else per unit but S_n [MVA].
 
-    A digit after the axis counts the primes: ``X_d1`` is X'_d, ``T_d20`` is T''_d0.
-    """
+    A digit after the axis counts the primes: ``X_d1`` is X'_d, ``T_d20`` is T''_d0."""
 
     S_n: float
     P_0: float

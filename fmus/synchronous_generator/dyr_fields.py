@@ -3,8 +3,7 @@
 Plain data without equations: a reader of DYR files takes from here which part a record is, and which parameters its
 fields set. Fields stand in the file's order: ``bus 'NAME' id field field … /``. Field names are PSS/E's.
 
-Sources: PSS/E's model library as it is described in public (PowerWorld's and NEPLAN's model guides, ANDES' reader).
-"""
+Sources: PSS/E's model library as it is described in public (PowerWorld's and NEPLAN's model guides, ANDES' reader)."""
 
 from dataclasses import dataclass
 
@@ -18,8 +17,7 @@ class DyrField:
     of the record; the parameters take the product of both. PSS/E gives some leads as T_A/T_B; ``only``: the only values
     that our part can stand for; empty where it takes every one; ``same_as``: name of another field that must have the
     same value, because our part has one parameter for both; ``not_zero``: whether 0, by which PSS/E means that it
-    chooses a value itself, must be refused; ``switch``: whether the parameters are truth values; 0 is false.
-    """
+    chooses a value itself, must be refused; ``switch``: whether the parameters are truth values; 0 is false."""
 
     name: str
     parameters: tuple[str, ...] = ()
@@ -37,8 +35,7 @@ class DyrRecord:
 
     ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``converter`` for
     a record that is a whole component; ``part``: its value, the name of our part; for a whole component, its model;
-    ``fields``: in the file's order.
-    """
+    ``fields``: in the file's order."""
 
     kind: str
     part: str

@@ -6,8 +6,7 @@ bus and no snubber is needed:
 
     ψ̃̇_q/ω_b = v_q + (R_s + R_t)·i_q − w·ψ̃_d        ψ̇_f/ω_b  = (R_f/X_md)·E_fd − R_f·i_f
     ψ̃̇_d/ω_b = v_d + (R_s + R_t)·i_d + w·ψ̃_q        ψ̇_kd/ω_b = −R_k·i_k for every damper
-    2H·ẇ = P_m/w − (ψ_d·i_q − ψ_q·i_d) − D·(w − 1)     δ̇ = ω_b·(w − 1)
-"""
+    2H·ẇ = P_m/w − (ψ_d·i_q − ψ_q·i_d) − D·(w − 1)     δ̇ = ω_b·(w − 1)"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,8 +27,7 @@ FluxDeclaration = Callable[[ModelBuilder, str, ca.SX, str], ca.SX]
 @dataclass(frozen=True)
 class Start:
     """Start values for exciter and governor: |v_t|, field voltage and current, torque; bus voltage and current in the
-    rotor's frame.
-    """
+    rotor's frame."""
 
     v_t: ca.SX
     E_fd: ca.SX
@@ -43,8 +41,7 @@ class Machine:
     """Parameters, states and operating point of the machine.
 
     ``salient`` where its last reactances may differ; ``at_rated_speed`` where the emf is e'' instead of w·e'', which
-    only a phasor model can have.
-    """
+    only a phasor model can have."""
 
     R: ca.SX
     R_t: ca.SX
@@ -80,8 +77,7 @@ class Machine:
 def flux_state(m: ModelBuilder, name: str, start: ca.SX, text: str) -> ca.SX:
     """Declare a flux linkage as a state [pu, S_n].
 
-    ``start``: its initial value [pu, S_n].
-    """
+    ``start``: its initial value [pu, S_n]."""
     return m.state(name, start, "pu", text, base="S_n")
 
 
@@ -111,8 +107,7 @@ def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX
     """Give the derivatives of fluxes, speed and angle.
 
     ``port``: gives the bus voltage; ``E_fd``: field voltage; 1 pu gives 1 pu of voltage on open circuit; ``P_m``:
-    mechanical power [pu, S_n].
-    """
+    mechanical power [pu, S_n]."""
     psi_q, psi_d = _flux_rates(g, port, E_fd)[:2]
     m.derivative(g.q.psi, psi_q)
     m.derivative(g.d.psi, psi_d)
@@ -139,8 +134,7 @@ def terminal_voltage(g: Machine, port: DevicePort, E_fd: ca.SX) -> ca.SX:
 
 def terminal_power(g: Machine, port: DevicePort) -> tuple[ca.SX, ca.SX]:
     """Electrical power at the machine's terminal [pu, S_n], that at the bus and the transformer's losses; and the same
-    at the operating point.
-    """
+    at the operating point."""
     losses = g.R_t * g.current.magnitude() ** 2
     P_e = power(port.v.rotated(-g.delta), g.current).re + losses
     P_e_0 = power(port.v_0, port.i_0).re + g.R_t * port.i_0.magnitude() ** 2
@@ -155,8 +149,7 @@ def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ca.SX
     """Rates of ψ_q, ψ_d and of the rotor's fluxes, d and q axis.
 
     Behind an open breaker the stator's flux follows the rotor's such that the current fades like that of every open
-    breaker. The voltage at the breaker then follows from the stator's equation.
-    """
+    breaker. The voltage at the breaker then follows from the stator's equation."""
     d_rotor, q_rotor = _rotor_flux_rates(g, port, E_fd)
     v = port.v.rotated(-g.delta)
     closed = Phasor(v.re + g.R * g.q.i - g.w * g.d.psi, -v.im + g.R * g.d.i + g.w * g.q.psi) * port.omega_b

@@ -9,8 +9,7 @@ The emf keeps the rotor's speed w: it stands for the first-order part of the tra
 it electromechanical modes are up to 0.4 points of damping off.
 
 Where X''_q ≠ X''_d a constant admittance needs an emf of its own for the difference, −j·(X''_q − X''_d)·i_q. It is
-taken from i_q through a short lag, so that the emf follows from states alone; in steady state it is exact.
-"""
+taken from i_q through a short lag, so that the emf follows from states alone; in steady state it is exact."""
 
 from functools import partial
 
@@ -77,8 +76,7 @@ def with_controls(
 def declare_phasor_port(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> None:
     """Declare emf and admittance, and the lag for what saliency the admittance cannot show.
 
-    ``emf``: behind the subtransient reactance, rotor frame [pu].
-    """
+    ``emf``: behind the subtransient reactance, rotor frame [pu]."""
     impedance = Phasor(g.R, g.d.X_between)
     start = g.start.v + impedance * g.start.i
     source = source_emf(m, emf - _saliency(m, g) if g.salient else emf, start, g.delta, port.omega_b * (g.w - 1))
@@ -89,8 +87,7 @@ def close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> 
     """Stator currents from emf and bus voltage, two real equations; then the fluxes ψ̃ = e'' − X·i.
 
     ``g``: the machine, its stator's fluxes as open signals; ``port``: gives the bus voltage; ``emf``: behind the
-    subtransient reactance, rotor frame [pu].
-    """
+    subtransient reactance, rotor frame [pu]."""
     over = (emf - port.v.rotated(-g.delta)) * port.connected
     R, X_d, X_q = g.R, g.d.X_between, g.q.X_between
     determinant = R**2 + X_d * X_q

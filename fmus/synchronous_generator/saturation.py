@@ -1,7 +1,6 @@
 """Saturation through two points of a curve, S(x)·x = B·(x − A)² above A and 0 below, as stability programs have it.
 
-A machine's data sheet gives S(1.0) and S(1.2), an exciter's S_E(E_1) and S_E(E_2).
-"""
+A machine's data sheet gives S(1.0) and S(1.2), an exciter's S_E(E_1) and S_E(E_2)."""
 
 import casadi as ca
 
@@ -24,8 +23,7 @@ def saturated_part(x: ca.SX, one: tuple[Scalar, Scalar], other: tuple[Scalar, Sc
 def require_rising(m: ModelBuilder, one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar], text: str) -> None:
     """Refuse points between which S(x)·x does not rise.
 
-    ``text``: names the points.
-    """
+    ``text``: names the points."""
     first, last = _ordered(one, other)
     none = ca.logic_and(first[1] <= 0, last[1] <= 0)
     rises = ca.logic_and(last[0] - first[0] > 1e-6, last[0] * last[1] - first[0] * first[1] > 1e-9)

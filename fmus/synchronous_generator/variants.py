@@ -22,8 +22,7 @@ Stabilizer = Callable[[ModelBuilder, ca.SX, ca.SX, ca.SX], ca.SX]
 class Variant:
     """An excitation system, and default values of machine and governor.
 
-    ``name``: of the exciter, as models are called: ``st4b``.
-    """
+    ``name``: of the exciter, as models are called: ``st4b``."""
 
     name: str
     exciter: Exciter
@@ -57,8 +56,7 @@ def declare_generator_outputs(m: ModelBuilder, machine: Machine, v_t: ca.SX, E_f
     """Declare what a generator shows beside its port.
 
     ``machine``: gives speed, angle and torque; ``v_t``: voltage magnitude at the terminal [pu, S_n]; ``E_fd``: field
-    voltage; 1 pu gives 1 pu of voltage on open circuit; ``P_m``: mechanical power [pu, S_n].
-    """
+    voltage; 1 pu gives 1 pu of voltage on open circuit; ``P_m``: mechanical power [pu, S_n]."""
     m.output("omega", machine.w, "pu", "Rotor speed", base="f_n")
     m.output("delta", machine.delta, "rad", "Rotor angle in the network frame")
     m.output("v_t", v_t, "pu", "Voltage magnitude at the machine's terminal", base="S_n")

@@ -1,8 +1,7 @@
 """Test bench: a source whose voltage, angle, frequency and impedance follow a programme, a bus, and two plants.
 
 Everything that a programme moves is a tunable parameter. The second plant is the duplicate that the loss of the last
-machine asks for; without one its inputs stay 0.
-"""
+machine asks for; without one its inputs stay 0."""
 
 import casadi as ca
 

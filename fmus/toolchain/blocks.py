@@ -4,8 +4,7 @@ A block declares its state in the builder's current scope and returns its output
 is the steady-state value of its input (of `proportional_integral`: of its output), an expression of
 parameters. Where a block may be left out by a time constant of zero, as the block diagrams of the
 literature mean it, it passes its input through; its state then follows the input with `BYPASS_TIME`
-and is seen by nobody.
-"""
+and is seen by nobody."""
 
 import casadi as ca
 
@@ -22,8 +21,7 @@ longest internal step of any model, so that no stage of Runge-Kutta's method lan
 def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """s·T_W/(1 + s·T_W); its output is 0 in steady state.
 
-    ``T_W``: time constant [s].
-    """
+    ``T_W``: time constant [s]."""
     x = m.state(name, initial, "pu", "washout, slow part of the signal", base="S_n")
     m.derivative(x, (u - x) / T_W)
     return u - x
@@ -32,8 +30,7 @@ def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar =
 def low_pass(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """1/(1 + s·T), T > 0: the output is a state, so nothing passes directly.
 
-    ``T``: time constant [s].
-    """
+    ``T``: time constant [s]."""
     x = m.state(name, initial, "pu", "first-order lag", base="S_n")
     m.derivative(x, (u - x) / T)
     return x
@@ -42,8 +39,7 @@ def low_pass(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 
 def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """1/(1 + s·T); passed through where T = 0.
 
-    ``T``: time constant [s], 0 or more.
-    """
+    ``T``: time constant [s], 0 or more."""
     x = m.state(name, initial, "pu", "first-order lag", base="S_n")
     left_out = _is_zero(T)
     m.derivative(x, (u - x) / ca.if_else(left_out, BYPASS_TIME, T))
@@ -53,8 +49,7 @@ def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial
 def washout_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T_W: ca.SX, initial: Scalar = 0.0) -> ca.SX:
     """s·T_W/(1 + s·T_W); passed through where T_W = 0, and then ``initial`` must be 0 or be taken off later.
 
-    ``T_W``: time constant [s], 0 or more.
-    """
+    ``T_W``: time constant [s], 0 or more."""
     left_out = _is_zero(T_W)
     return ca.if_else(left_out, u, washout(m, name, u, ca.if_else(left_out, BYPASS_TIME, T_W), initial))
 
@@ -62,8 +57,7 @@ def washout_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T_W: ca.SX, initial
 def lead_lag(m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0) -> ca.SX:
     """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0.
 
-    ``T_lead``, ``T_lag``: time constants [s], 0 or more.
-    """
+    ``T_lead``, ``T_lag``: time constants [s], 0 or more."""
     x = m.state(name, initial, "pu", "lead/lag", base="S_n")
     left_out = _is_zero(T_lag)
     T = ca.if_else(left_out, BYPASS_TIME, T_lag)
@@ -75,8 +69,7 @@ def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar,
     """K_P + K_I/s.
 
     ``error``: what goes in; 0 in steady state; ``K_P``: proportional gain; ``K_I``: integral gain [1/s, times the unit
-    of K_P]; ``initial``: of the output, in steady state; the integrator carries it.
-    """
+    of K_P]; ``initial``: of the output, in steady state; the integrator carries it."""
     x = m.state(name, initial, "pu", "integrator", base="S_n")
     m.derivative(x, K_I * error)
     return K_P * error + x
@@ -96,8 +89,7 @@ def limited_low_pass(
 ) -> ca.SX:
     """1/(1 + s·T) that stops at its limits and leaves them as soon as its input does (non-windup); T = 0: a limiter.
 
-    ``T``: time constant [s], 0 or more; ``low``, ``high``: limits of the output.
-    """
+    ``T``: time constant [s], 0 or more; ``low``, ``high``: limits of the output."""
     x = m.state(name, initial, "pu", "first-order lag with limits", base="S_n")
     return close_limited_low_pass(m, x, u, T, low, high)
 
@@ -115,8 +107,7 @@ def limited_proportional_integral(
 ) -> ca.SX:
     """K_P + K_I/s, the output limited; the integrator stops while the output is at a limit (IEEE 421.5, annex E).
 
-    ``low``, ``high``: limits of the output; ``initial``: of the integrator, in steady state.
-    """
+    ``low``, ``high``: limits of the output; ``initial``: of the integrator, in steady state."""
     x = m.state(name, initial, "pu", "integrator with limits", base="S_n")
     u = K_P * error + x
     outward = ca.logic_or(ca.logic_and(u > high, error > 0), ca.logic_and(u < low, error < 0))
@@ -127,8 +118,7 @@ def limited_proportional_integral(
 def held_at_limits(x: ca.SX, rate: Scalar, low: Scalar, high: Scalar) -> ca.SX:
     """The rate of a state with non-windup limits: what lies beyond a limit after a step returns to it at once.
 
-    ``rate``: its rate without limits; ``low``, ``high``: the limits; use the state through `clamp`.
-    """
+    ``rate``: its rate without limits; ``low``, ``high``: the limits; use the state through `clamp`."""
     above = ca.logic_and(x >= high, ca.SX(rate) > 0)
     below = ca.logic_and(x <= low, ca.SX(rate) < 0)
     return ca.if_else(above, (high - x) / RETURN_TIME, ca.if_else(below, (low - x) / RETURN_TIME, rate))

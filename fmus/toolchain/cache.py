@@ -1,8 +1,7 @@
 """Where built kernels and FMUs are kept between runs, and how a kept file is checked before it is used again.
 
 Beside every kept file lies its SHA-256. A file that differs from it, because a disk, a crash or a person changed it, is
-built again; it is never run.
-"""
+built again; it is never run."""
 
 import hashlib
 import logging
@@ -26,8 +25,7 @@ class CacheError(SetupError):
 def cache_directory(kind: str) -> Path:
     """Folder for one kind of built file; ``GFOR_COSIM_CACHE`` overrides its parent.
 
-    Contents are named by a hash of what they were made from: deleting the folder is always safe.
-    """
+    Contents are named by a hash of what they were made from: deleting the folder is always safe."""
     root = os.environ.get("GFOR_COSIM_CACHE")
     if root:
         return Path(root) / kind
@@ -43,8 +41,7 @@ def cache_directory(kind: str) -> Path:
 def intact(path: Path) -> bool:
     """Whether a kept file is there, byte for byte as it was written.
 
-    A file that is there and differs is named in one line of the log, which goes to standard error.
-    """
+    A file that is there and differs is named in one line of the log, which goes to standard error."""
     try:
         seen = path.stat()
         mark = (seen.st_ino, seen.st_size, seen.st_mtime_ns)
@@ -68,8 +65,7 @@ def intact(path: Path) -> bool:
 def keep(path: Path, content: bytes) -> Path:
     """Write a file and its SHA-256 into the cache; others may be writing the same at the same time.
 
-    ``path``: Below a `cache_directory`; its folder is created where missing.
-    """
+    ``path``: Below a `cache_directory`; its folder is created where missing."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _write_whole(_hash_file(path), (hashlib.sha256(content).hexdigest() + "\n").encode())

@@ -26,8 +26,7 @@ def needs_arguments(name: str) -> bool:
 
 def parts_of(name: str) -> dict[str, str]:
     """The parts that a model lets choose, such as ``machine`` and ``exciter``, each with the one that it has if
-    nothing is chosen; empty for a model without parts.
-    """
+    nothing is chosen; empty for a model without parts."""
     return dict(_signature(name)["parts"])
 
 
@@ -46,8 +45,7 @@ def build_model(name: str, **arguments: Any) -> Model:
 
 def sketch_model(name: str, **arguments: Any) -> Model:
     """A model with the variables of one of the catalogue's, whose equations may be left out: `SKETCH` of its factory
-    makes it where that has one.
-    """
+    makes it where that has one."""
     factory = _factory(name)
     return _made(name, getattr(factory, SKETCH, factory), arguments)
 

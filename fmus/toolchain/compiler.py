@@ -1,8 +1,7 @@
 """A C compiler without a system compiler: ziglang from PyPI, its results kept between runs.
 
 A released wheel brings the orchestrator's own libraries for every platform in the folder ``prebuilt``, so that running
-FMUs needs no compiler.
-"""
+FMUs needs no compiler."""
 
 import hashlib
 import re
@@ -48,8 +47,7 @@ _PREBUILT = Path(__file__).with_name("prebuilt")
 @cache
 def recipe() -> tuple[str, ...]:
     """Everything except the source that determines a library's contents. It is part of every hash that names a
-    library.
-    """
+    library."""
     return (*FLAGS, *_MAC_FLAGS, f"ziglang {version('ziglang')}")
 
 
@@ -64,8 +62,7 @@ def compile_library(source: str, platform: str) -> Path:
     Where a platform stands for several machines, the library holds code for each (a universal binary).
 
     ``source``: One translation unit.
-    ``platform``: A key of `TARGETS`.
-    """
+    ``platform``: A key of `TARGETS`."""
     if platform not in TARGETS:
         raise ValueError(f"the compiler has no target for platform {platform!r}; choose from {', '.join(TARGETS)}")
     targets, ending = TARGETS[platform], ENDINGS[platform]
@@ -124,8 +121,7 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
     ``source``: One translation unit.
     ``target``: One of those of a platform in `TARGETS`.
     ``ending``: Of the library's file, such as ``.so``; ``.exe`` makes a program.
-    ``libraries``: Of the system, that the source needs beside the C library and its mathematics, such as ``dl``.
-    """
+    ``libraries``: Of the system, that the source needs beside the C library and its mathematics, such as ``dl``."""
     require("compiling C", "ziglang")
     flags = [*FLAGS, *_MAC_FLAGS] if target.endswith("macos") else [*FLAGS]
     if ending == ".exe":

@@ -1,7 +1,6 @@
 """The variables that each unknown of a model depends on, from the sparsity of its equations.
 
-Variables are named by their FMI value reference.
-"""
+Variables are named by their FMI value reference."""
 
 from dataclasses import dataclass
 
@@ -39,8 +38,7 @@ def structure(model: Model) -> Structure:
     """Dependence of outputs and derivatives on inputs and states, and of initial unknowns on parameters and inputs.
 
     Where there would be more than `MOST` dependencies, or a network is solved as data, nothing is listed, which means
-    in both versions of FMI that there may be any.
-    """
+    in both versions of FMI that there may be any."""
     np_, nc, nu = len(model.parameters), len(model.calculated), len(model.inputs)
     nx, ny = len(model.states), len(model.outputs)
     parameters, inputs = np.arange(np_), np_ + nc + np.arange(nu)

@@ -1,8 +1,7 @@
 """modelDescription.xml of FMI 2.0 for co-simulation, from a model's declarations.
 
 Beyond what the standard demands it declares every continuous state with its derivative, and what
-each output and derivative depends on, so that a master can order its calls and linearise.
-"""
+each output and derivative depends on, so that a master can order its calls and linearise."""
 
 from xml.etree.ElementTree import Element, SubElement
 
@@ -38,8 +37,7 @@ def model_description(
     ``tool``: Name and version for ``generationTool``.
     ``native``: Whether the FMU runs without Python; a native one gives directional derivatives too.
     ``listed``: Whether dependencies are listed; without them the text is there at once.
-    ``source_file``: Name of the C file in the folder ``sources``; empty without one.
-    """
+    ``source_file``: Name of the C file in the folder ``sources``; empty without one."""
     root = root_element(model, "2.0", {"guid": guid}, tool)
     root.set("numberOfEventIndicators", "0")
     kind = SubElement(

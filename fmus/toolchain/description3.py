@@ -21,8 +21,7 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     """Return the file's text.
 
     ``token``, ``identifier``: As in the standard; the identifier also names the binaries.
-    ``tool``: Name and version for ``generationTool``.
-    """
+    ``tool``: Name and version for ``generationTool``."""
     root = root_element(model, "3.0", {"instantiationToken": token}, tool)
     SubElement(
         root,

@@ -1,7 +1,6 @@
 """The part of modelDescription.xml that FMI 2.0 and FMI 3.0 share, from a model's declarations.
 
-`description` and `description3` write the rest: the names that a version gives its elements, and their order.
-"""
+`description` and `description3` write the rest: the names that a version gives its elements, and their order."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -33,8 +32,7 @@ def root_element(model: Model, version: str, identity: Mapping[str, str], tool: 
     """The file's outermost element.
 
     ``identity``: The attribute that tells one FMU from another.
-    ``tool``: Name and version for ``generationTool``. No date is written: equal contents give equal files.
-    """
+    ``tool``: Name and version for ``generationTool``. No date is written: equal contents give equal files."""
     attributes = {
         "fmiVersion": version,
         "modelName": model.name,

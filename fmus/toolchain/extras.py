@@ -30,8 +30,7 @@ def require(purpose: str, *libraries: str) -> None:
     """Refuse a task whose libraries are not installed, before it imports them.
 
     ``purpose``: The task, as the subject of the error's sentence, such as "building an FMU".
-    ``libraries``: Keys of `EXTRAS`.
-    """
+    ``libraries``: Keys of `EXTRAS`."""
     missing = [library for library in libraries if find_spec(library) is None]
     if missing:
         extras = ",".join(sorted({EXTRAS[library] for library in missing}))

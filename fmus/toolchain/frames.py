@@ -1,8 +1,7 @@
 """Complex quantities in rotating frames, written as pairs of CasADi scalars.
 
 The network frame turns at ω_b; a device's own frame leads it by an angle θ. A quantity is
-f = f_re + j·f_im in the network frame and f = f_q − j·f_d in a device's frame.
-"""
+f = f_re + j·f_im in the network frame and f = f_q − j·f_d in a device's frame."""
 
 from __future__ import annotations
 
@@ -77,8 +76,7 @@ def of_phases(values: Phases, angle: Scalar) -> Phasor:
     """Instantaneous values of three phases as one complex quantity in a frame at ``angle`` [rad].
 
     (2/3)·(a + b·e^{j2π/3} + c·e^{−j2π/3})·e^{−j·angle}: a balanced cosine keeps its amplitude. The common part of the
-    phases, the zero sequence, is removed.
-    """
+    phases, the zero sequence, is removed."""
     a, b, c = values
     return Phasor((2 * a - b - c) / 3, (b - c) / ca.sqrt(3)).rotated(-angle)
 
@@ -121,8 +119,7 @@ def qd_state(m: ModelBuilder, name: str, initial: Phasor, description: str) -> Q
 
     ``name``: Of both states, before ``_q`` and ``_d``.
     ``initial``: An expression of parameters [pu, S_n].
-    ``description``: Of both states; each adds which component it is.
-    """
+    ``description``: Of both states; each adds which component it is."""
     q = m.state(f"{name}_q", initial.re, "pu", f"{description}, q component", base="S_n")
     d = m.state(f"{name}_d", -initial.im, "pu", f"{description}, d component", base="S_n")
     return QdState(q, d)

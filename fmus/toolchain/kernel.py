@@ -11,8 +11,7 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
   its own it needs between calls;
 - ``requirements(z, r)``: the model may run where every r > 0.
 
-`python_kernel` writes the same functions in Python.
-"""
+`python_kernel` writes the same functions in Python."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -31,8 +30,7 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
     """The whole C kernel of a model as one translation unit.
 
     ``further``: Functions by name whose code is wanted beside the kernel's own; the enumerator ``NWD`` is the room they
-    need.
-    """
+    need."""
     functions = kernel_functions(model)
     further = dict(further or {})
     sizes = {

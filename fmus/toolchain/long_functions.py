@@ -28,8 +28,7 @@ def cut(source: str, longest: int = LONGEST, part: int = _PART) -> str:
 
     ``source``: As CasADi's code generator writes it. All pointers to arguments and results of a long function must be
     given, and its work array must have room for all its local variables, as its ``sz_w`` says.
-    ``longest``, ``part``: Lines of a function that stays as it is, and of each part of others.
-    """
+    ``longest``, ``part``: Lines of a function that stays as it is, and of each part of others."""
 
     def in_parts(match: re.Match[str]) -> str:
         lines = [line for line in match["body"].split("\n") if line and not _DECLARATION.fullmatch(line)]

@@ -25,8 +25,7 @@ class NodalEquations:
 
     ``plan``: order and fill of the factorisation of Y; ``values``: (u, p, c) → real parts of the elements of Y in the
     plan's order, then their imaginary parts; ``currents``: (x, u, p, c) → real parts of i by bus, then imaginary parts;
-    ``given``: numbers of the inputs that Y depends on; ``written_out``: makes the same model without such equations.
-    """
+    ``given``: numbers of the inputs that Y depends on; ``written_out``: makes the same model without such equations."""
 
     plan: Plan
     values: Function

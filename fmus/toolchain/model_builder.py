@@ -1,7 +1,6 @@
 """How a model is written: each declaration returns a CasADi symbol.
 
-A quantity is declared where it is used, and the equations read like the block diagram.
-"""
+A quantity is declared where it is used, and the equations read like the block diagram."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -33,8 +32,7 @@ class ModelBuilder:
 
     ``name``: identifier of the FMU (letters, digits, underscore); ``title``: one line that says what the model is;
     ``internal_step``, ``longest_step``: default and maximum of the parameter ``internal_step`` [s]. The defaults are
-    for electromagnetic transients. ``usual``: ranges of parameters by their full name.
-    """
+    for electromagnetic transients. ``usual``: ranges of parameters by their full name."""
 
     def __init__(
         self,
@@ -117,8 +115,7 @@ class ModelBuilder:
         ``name``: without the scope; ``base``: what 1 pu is, such as ``"S_n"``; required where the unit is ``pu``;
         ``minimum``, ``maximum``: bounds; None for an unbounded side; ``tunable``: whether it can be set at any
         communication point, not only before initialisation; ``type``: in the equations an Integer or a Boolean is a
-        number as well; ``source``: source of the default value; empty if it is not given.
-        """
+        number as well; ``source``: source of the default value; empty if it is not given."""
         return self._declare(
             Parameter(self._full(name), unit, description, base, float(start), minimum, maximum, tunable, type, source)
         )
@@ -130,8 +127,7 @@ class ModelBuilder:
     def calculated(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
         """Declare a quantity computed at initialisation from fixed parameters.
 
-        ``value``: an expression of fixed parameters.
-        """
+        ``value``: an expression of fixed parameters."""
         full = self._full(name)
         self._expressions[full] = ca.SX(value)
         return self._declare(CalculatedParameter(full, unit, description, base))
@@ -139,8 +135,7 @@ class ModelBuilder:
     def input(self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0) -> ca.SX:
         """Declare an input.
 
-        ``start``: its value until it is set.
-        """
+        ``start``: its value until it is set."""
         return self._declare(Input(self._full(name), unit, description, base, start))
 
     def state(
@@ -150,8 +145,7 @@ class ModelBuilder:
 
         ``initial``: its initial value, an expression of parameters; ``unit``: one of `UNITS`; the same per second must
         be one of them too; ``stepwise``: whether it is held during a communication step, as inputs are, and moves by
-        rate × step size at its end.
-        """
+        rate × step size at its end."""
         full = self._full(name)
         if f"{unit}/s" not in UNITS:
             raise ValueError(f"state {full!r} is in {unit!r}; add its rate {unit + '/s'!r} to UNITS as well")
@@ -163,8 +157,7 @@ class ModelBuilder:
 
         ``rate``: [unit of the state per second]; ``implicit``: the part of the rate that an implicit integrator solves
         for; it is linear in the states. By default all of it. What is left is evaluated at the stages of a step and
-        must be slow against it.
-        """
+        must be slow against it."""
         declared = self._declared.get(state.name())
         if declared is None or not isinstance(declared[0], State):
             raise ValueError(f"model {self.name}: {state.name()!r} is no declared state and can have no derivative")
@@ -177,8 +170,7 @@ class ModelBuilder:
     def output(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> None:
         """Declare an output as a function of states, inputs and parameters.
 
-        ``value``: an expression of states, inputs and parameters.
-        """
+        ``value``: an expression of states, inputs and parameters."""
         full = self._full(name)
         self._expressions[full] = ca.SX(value)
         self._declare(Output(full, unit, description, base))

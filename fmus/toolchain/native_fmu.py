@@ -1,8 +1,7 @@
 """The recipe for a native FMU, for co-simulation by FMI 2.0 or 3.0: compiled code, no Python anywhere.
 
 It is made of the same kernel as the Python-backed FMU and gives the same answers. Beyond that it has exact
-directional derivatives and may be stepped from many threads, one per instance at a time.
-"""
+directional derivatives and may be stepped from many threads, one per instance at a time."""
 
 from importlib.metadata import version as version_of
 

@@ -1,7 +1,6 @@
 """The C source of a native FMU: kernel, exact derivatives, the data of the model, and the functions of FMI.
 
-One translation unit per version of FMI, with nothing in it but the C library.
-"""
+One translation unit per version of FMI, with nothing in it but the C library."""
 
 from pathlib import Path
 
@@ -31,8 +30,7 @@ def derivative_functions(model: Model) -> dict[str, ca.Function]:
     """Products of the exact Jacobians with a direction, and of their transposes with a seed.
 
     ``direction`` and ``adjoint`` are of (ẋ, y) by (x, u, p, c); ``start_direction`` and ``start_adjoint`` of the
-    initialisation (c, x) by p.
-    """
+    initialisation (c, x) by p."""
     x, u, p, c = (
         ca.SX.sym(name, len(group))
         for name, group in (("x", model.states), ("u", model.inputs), ("p", model.parameters), ("c", model.calculated))

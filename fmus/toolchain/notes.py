@@ -2,8 +2,7 @@
 
 The name of a note is a hash of all that the finding follows from: what was asked, this machine, the versions of
 `_LIBRARIES`, and the code of the packages of `_OWN`, which import nothing else of ours. A note whose SHA-256 is not
-right is found anew.
-"""
+right is found anew."""
 
 import hashlib
 import json
@@ -30,8 +29,7 @@ def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:
 
     ``entry``: The catalogue's entry of the model. Of a model from another distribution nothing is noted, since nobody
     knows what its code imports.
-    ``find``: Finds it [JSON's types].
-    """
+    ``find``: Finds it [JSON's types]."""
     path = note_of(entry, asked)
     if path is None:
         return find()

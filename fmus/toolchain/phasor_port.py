@@ -2,8 +2,7 @@
 
 A network solver takes the admittance y into its matrix and the emf e as its source, and so finds the bus voltage in
 one solution: e follows from the device's states alone. The current i = (e − v)·y depends on the bus voltage directly;
-a solver that fed it back would have an algebraic loop.
-"""
+a solver that fed it back would have an algebraic loop."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -76,8 +75,7 @@ def motion(m: ModelBuilder, name: str, value: Phasor, start: Phasor, text: str) 
     """Declare ``name_q`` and ``name_d``, the value through a lag; return its rate of change [pu/s] from states alone.
 
     ``name``: Of both states, before ``_q`` and ``_d``.
-    ``value``, ``start``: In the device's frame [pu], a function of states; and its value at the operating point.
-    """
+    ``value``, ``start``: In the device's frame [pu], a function of states; and its value at the operating point."""
     moving = []
     for part, now, initial in (("q", value.re, start.re), ("d", -value.im, -start.im)):
         slow = m.state(f"{name}_{part}", initial, "pu", f"{text} through a lag, {part} component", base="S_n")
@@ -95,8 +93,7 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
     with a short lag gives the motion of its components in that frame. Both emfs therefore follow from states alone.
 
     ``emf``, ``start``: In the device's frame [pu], a function of states; and its value at the operating point.
-    ``angle``, ``rate``: Of the device's frame in the network frame [rad], and the rate of that [rad/s].
-    """
+    ``angle``, ``rate``: Of the device's frame in the network frame [rad], and the rate of that [rad/s]."""
     master = declare_master_step(m)
     with m.scope("source"):
         change = motion(m, "e", emf, start, "Emf")
@@ -114,8 +111,7 @@ def declare_phasor_outputs(m: ModelBuilder, port: DevicePort, emf: SourceEmf, im
     middle.
 
     ``emf``: In the network frame [pu], as `source_emf` returns it.
-    ``impedance``: Between emf and bus [pu, S_n], an expression of fixed parameters.
-    """
+    ``impedance``: Between emf and bus [pu, S_n], an expression of fixed parameters."""
     with m.scope("source"):
         R = m.calculated("R", impedance.re, "pu", "Resistance between emf and bus", base="S_n")
         X = m.calculated("X", impedance.im, "pu", "Reactance between emf and bus", base="S_n")

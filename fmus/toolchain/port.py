@@ -4,8 +4,7 @@ A device takes the bus voltage and gives the current of its transformer, both in
 The current is a state, so a device has no direct feed-through at its port.
 
 A breaker at the port is open where ``connected`` is false. Its phases interrupt one after the other, each at a zero
-of its current; here the current fades with `BREAKER_TIME`, di/dt = −i/τ, whatever the voltages are.
-"""
+of its current; here the current fades with `BREAKER_TIME`, di/dt = −i/τ, whatever the voltages are."""
 
 from dataclasses import dataclass, replace
 
@@ -64,8 +63,7 @@ def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> Dev
 
     ``v``: Bus voltage, network frame [pu].
     ``P_0``: Default of the active power into the bus [pu, S_n].
-    ``current_scale``: Device current [pu, S_n] times this is the current in the port's unit.
-    """
+    ``current_scale``: Device current [pu, S_n] times this is the current in the port's unit."""
     start = declare_operating_point(m, P_0)
     connected = m.switch("connected", True, "The breaker at the port is closed", tunable=True)
     return DevicePort(start.v_0, start.i_0, start.omega_b, v, current_scale, connected)

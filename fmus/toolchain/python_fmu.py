@@ -2,8 +2,7 @@
 
 The archive is written here and not by pythonfmu's own builder, because equal models must give equal
 files, every bundled module needs a name of its own (all Python-backed FMUs of a process share
-``sys.modules``), and the model description needs units, bounds and dependencies.
-"""
+``sys.modules``), and the model description needs units, bounds and dependencies."""
 
 import json
 from importlib.metadata import version

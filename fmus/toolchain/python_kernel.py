@@ -1,8 +1,7 @@
 """The kernel of a model in pure Python: the fallback where no compiled kernel fits the platform.
 
 It is written from the same CasADi operations in the same order as the C code, so both give the same
-results to rounding.
-"""
+results to rounding."""
 
 import casadi as ca
 

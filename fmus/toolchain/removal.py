@@ -13,8 +13,7 @@ def remove_tree(folder: Path) -> None:
     """Remove a folder and all below it; what the system refuses to remove stays.
 
     No path is longer than one name, and nothing recurses: each folder below is moved to the top before it is emptied.
-    A symbolic link is removed, and never followed.
-    """
+    A symbolic link is removed, and never followed."""
     if not ({os.open, os.rename, os.rmdir, os.unlink} <= os.supports_dir_fd and os.scandir in os.supports_fd):
         with contextlib.suppress(OSError, RecursionError, ValueError):
             rmtree(folder, ignore_errors=True)

@@ -7,8 +7,7 @@ needs a Python and nothing else.
 pythonfmu's wrapper crashes the process on the second exception of an instance, so no callback may
 raise: a problem is logged and remembered, and every later step is discarded with its text. Where the
 master takes no log, the first such step writes it to the standard error stream. The one exception is
-the constructor: there a failure must make fmi2Instantiate return NULL.
-"""
+the constructor: there a failure must make fmi2Instantiate return NULL."""
 
 import ctypes
 import importlib

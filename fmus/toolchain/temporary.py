@@ -2,8 +2,7 @@
 
 A process removes its own at its end, also those that an interrupt let nobody remove; one that is killed does not. The
 lock of a folder ends with the last process that holds it open, also in another container and when a process number is
-used again.
-"""
+used again."""
 
 import atexit
 import contextlib
@@ -105,8 +104,7 @@ def sweep(parent: Path) -> list[Path]:
     """Remove the user's folders whose owners are gone; returns them.
 
     A folder that cannot be removed stays, and the others are removed all the same: no start fails for what an earlier
-    one left behind.
-    """
+    one left behind."""
     names: list[str] = []
     with contextlib.suppress(OSError):
         names = os.listdir(parent)

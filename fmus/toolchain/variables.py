@@ -1,8 +1,7 @@
 """Declarations of a model's quantities: written once, used everywhere.
 
 A declaration becomes a line of the modelDescription, a row of the README's table, the bounds that
-the slave enforces and the unit that a case file is checked against.
-"""
+the slave enforces and the unit that a case file is checked against."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -37,8 +36,7 @@ UNITS: dict[str, dict[str, float]] = {
 class Usual:
     """The usual range of a parameter in its unit, both ends included. A value outside is questioned, not refused.
 
-    It is wide: it finds a wrong unit (ms for s, kVA for MVA) or a wrong base, and does not judge data.
-    """
+    It is wide: it finds a wrong unit (ms for s, kVA for MVA) or a wrong base, and does not judge data."""
 
     low: float
     high: float
@@ -57,8 +55,7 @@ class Variable:
     ``name``: Dotted name, as the FMU shows it.
     ``unit``: One of `UNITS`.
     ``description``: One sentence; for per-unit quantities it is followed by the base.
-    ``base``: What 1 pu is, for the unit ``pu``: ``"S_n"`` (the device's rating) or ``"100 MVA"``.
-    """
+    ``base``: What 1 pu is, for the unit ``pu``: ``"S_n"`` (the device's rating) or ``"100 MVA"``."""
 
     name: str
     unit: str
@@ -108,8 +105,7 @@ class Input(Variable):
 class State(Variable):
     """A continuous state; its initial value is computed from the parameters.
 
-    ``stepwise``: it is held during a communication step, as inputs are, and moves by rate × step size at its end.
-    """
+    ``stepwise``: it is held during a communication step, as inputs are, and moves by rate × step size at its end."""
 
     stepwise: bool = False
 

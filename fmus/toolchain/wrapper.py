@@ -7,8 +7,7 @@
   process. ``c/resources_path.c`` goes before its fmi2Instantiate. The one for Windows is left as it is: it opens files
   by names in the code page of the system.
 - Both say that the FMU ended its simulation by itself wherever a step fails, and some masters then go on to the results
-  as if all were well; some repeat a discarded step for ever. A step that fails is an error.
-"""
+  as if all were well; some repeat a discarded step for ever. A step that fails is an error."""
 
 import base64
 import struct
@@ -40,8 +39,7 @@ def wrapper_binaries() -> dict[Path, bytes]:
     """FMI platform and file name → contents.
 
     Raises `SetupError` if pythonfmu is not there as a whole, as while it is being installed: an FMU without them would
-    be kept and could run nowhere.
-    """
+    be kept and could run nowhere."""
     root = Path(pythonfmu.__file__).parent / "resources" / "binaries"
     found = {file.relative_to(root): _mended(file.read_bytes()) for file in sorted(root.rglob("*.*"))}
     if not found:

@@ -3,8 +3,7 @@
 The DLL's code runs in that process and can write the file as well. So it is taken for what the DLL says of itself: read
 as a plain file of bounded size, of the form that was asked for, with no character that XML or a terminal takes for more
 than text. An answer of the DLL's own making that has this form says no more than its Model_GetInfo could have said; and
-how it keeps its state is tried again by `gfor fmu check`.
-"""
+how it keeps its state is tried again by `gfor fmu check`."""
 
 import json
 import os
@@ -29,8 +28,7 @@ class ForeignAnswerError(ValueError):
 def read_plain_file(path: Path, most: int = _MOST_BYTES) -> bytes:
     """The content of a file that foreign code may have put there.
 
-    Raises `ForeignAnswerError` if it is a link, a pipe or a device, or larger than ``most`` bytes.
-    """
+    Raises `ForeignAnswerError` if it is a link, a pipe or a device, or larger than ``most`` bytes."""
     try:
         number = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
     except OSError as error:

@@ -38,8 +38,7 @@ def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
 
     ``reader``: Module that is run for it.
     ``longest``: Time for the DLL's own code, counted from when it is loaded [s].
-    ``more``: Further words of the command.
-    """
+    ``more``: Further words of the command."""
     folder = own_folder("dll")
     try:
         answer = folder / "answer.json"

@@ -1,8 +1,7 @@
 """The circuit around a vendor's controller: filter, transformer and averaged two-level bridge, at our port.
 
 Complex quantities are per unit on the rating, in the network frame, which turns at ω_b. What the controller measures
-are phase quantities: the frame's angle brings them to the standing frame, 1 pu is the amplitude of the rated one.
-"""
+are phase quantities: the frame's angle brings them to the standing frame, 1 pu is the amplitude of the rated one."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -51,8 +50,7 @@ def converter_circuit(name: str, filter_kind: FilterKind, bridge: BridgeKind) ->
 
     ``filter_kind``: ``L``: one inductor. ``LC``: an inductor and a capacitor. ``LCL``: a second inductor, before the
     transformer.
-    ``bridge``: What the controller gives: ``modulation`` of half the DC voltage, or a phase ``voltage`` [kV].
-    """
+    ``bridge``: What the controller gives: ``modulation`` of half the DC voltage, or a phase ``voltage`` [kV]."""
     m = ModelBuilder(name, "Converter circuit around a vendor's controller", internal_step=1e-5)
     rating = declare_rating(m, S_N)
     port = device_port_of(m, rating, P_0)

@@ -39,8 +39,7 @@ def dll_description(
     ``interface``, ``trial``: What the DLL declares, and how it keeps its state.
     ``variables``: All of the FMU, in the order of their value references.
     ``guid``, ``identifier``: As in the standard; the identifier also names the binaries.
-    ``tool``: Name and version for ``generationTool``.
-    """
+    ``tool``: Name and version for ``generationTool``."""
     attributes = {
         "fmiVersion": "2.0",
         "modelName": interface.texts["ModelName"] or identifier,

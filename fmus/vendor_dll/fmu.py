@@ -70,8 +70,7 @@ def read_dll(
     runs.
     ``texts``, ``folder``: Values of text parameters, and where the files lie that they name.
 
-    Raises `DllError` if it is no such DLL, is not for this machine, or declares what no host can run.
-    """
+    Raises `DllError` if it is no such DLL, is not for this machine, or declares what no host can run."""
     path = Path(path).absolute()
     platform = platform_of(path, also)
     given, files = {name: value for name, value in (texts or {}).items() if isinstance(value, str)}, dict[str, Path]()
@@ -140,8 +139,7 @@ def dll_fmu(
     """Write the FMU of a DLL into a folder; it holds the DLL itself.
 
     ``texts``: Value of parameters that are text; by default the DLL's own.
-    ``device``: The circuit around the controller; by default there is none.
-    """
+    ``device``: The circuit around the controller; by default there is none."""
     return write_archive(destination / f"{dll.identifier}.fmu", dll_members(dll, texts, device))
 
 

@@ -1,7 +1,6 @@
 """Declarations of an IEEE/CIGRE DLL: its signals, parameters and states, and where each lies in the host's memory.
 
-Source of the structures: CIGRE Technical Brochure 958 (2025) and the header of its API, version 2.
-"""
+Source of the structures: CIGRE Technical Brochure 958 (2025) and the header of its API, version 2."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,7 @@
 """Read what a DLL declares, and try how it keeps its state. Run as a process of its own: foreign code may do anything.
 
 ``python -m fmus.vendor_dll.reading FILE ANSWER`` writes JSON to the file ANSWER; the DLL may print what it likes. With
-a third word, values of text parameters as JSON, the DLL is tried.
-"""
+a third word, values of text parameters as JSON, the DLL is tried."""
 
 import ctypes as c
 import json

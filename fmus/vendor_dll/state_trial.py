@@ -1,8 +1,7 @@
 """Where a DLL keeps its state, found by running it twice from the same arrays.
 
 The interface asks a DLL to keep its state in arrays of the host. Then a host can save and restore it. Some DLLs keep
-variables of their own as well: the library's writable memory then changes in a run, and belongs to the state.
-"""
+variables of their own as well: the library's writable memory then changes in a run, and belongs to the state."""
 
 import ctypes as c
 import math

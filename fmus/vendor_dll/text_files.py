@@ -19,8 +19,7 @@ def places(interface: DllInterface, texts: Mapping[str, str], library: Path, fol
     """Where files would lie that text parameters name.
 
     ``texts``: Values that somebody gave, absolute or from ``folder`` on.
-    ``library``: The DLL, whose own defaults name files in its folder only: it must not choose what it may read.
-    """
+    ``library``: The DLL, whose own defaults name files in its folder only: it must not choose what it may read."""
     found = {}
     for name, value in _values(interface, texts).items():
         with contextlib.suppress(OSError, ValueError):

@@ -15,8 +15,7 @@ class _MallocInfo(ctypes.Structure):
 def memory_in_use() -> int | None:
     """Bytes that are allocated now; the resident size where the C library does not tell, None where nothing does.
 
-    Garbage of Python is freed before, so that it does not matter when Python would have done so.
-    """
+    Garbage of Python is freed before, so that it does not matter when Python would have done so."""
     gc.collect()
     try:
         info = ctypes.CDLL(None).mallinfo2

@@ -1,8 +1,7 @@
 """The process of a foreign FMU that is checked, seen from outside: it is asked for measurements, never for a verdict.
 
 What comes from it lies in memory that the FMU's code can write. So it is taken for what the FMU says, of the form that
-was asked for, and nothing else in this process is in the FMU's reach.
-"""
+was asked for, and nothing else in this process is in the FMU's reach."""
 
 from collections.abc import Callable, Iterable, Sequence
 from ctypes import c_uint, memmove
@@ -46,8 +45,7 @@ class FmuProcess:
     """A process with instances of one FMU.
 
     ``deadline``: `time.monotonic` after which no answer is waited for.
-    ``protections``: What keeps it from the rest of the machine.
-    """
+    ``protections``: What keeps it from the rest of the machine."""
 
     def __init__(self, description: FmuDescription, directory: Path, limits: Limits) -> None:
         self.description, self.limits = description, limits
@@ -111,8 +109,7 @@ class FmuProcess:
         ``step_size``: Communication step [s].
 
         Returns of the call that was refused, or 0 or 1; what that call is; how many steps were finished; what was read,
-        shape (steps, len(out)), or one row without a step.
-        """
+        shape (steps, len(out)), or one row without a step."""
         if self._ended is not None:
             raise self._ended
         if max(len(into), len(out)) > MOST:
@@ -170,8 +167,7 @@ class FmuProcess:
         """Ask and wait; the status, or an error that says how the process ended.
 
         After an interrupt nothing more is asked: the answer to the question before would be taken for one that nobody
-        asked for.
-        """
+        asked for."""
         if self._interrupted is not None:
             raise self._interrupted
         try:
@@ -265,8 +261,7 @@ class HostedComponent(RemoteCalls, Derived):
         ``rows``: values of the inputs, shape (n, inputs): one row a step; after the last row they stay.
         ``steps``: how many; with 0 the first row is set and one row read, without a step.
         ``time``: at which the first step starts [s].
-        ``step_size``: communication step [s].
-        """
+        ``step_size``: communication step [s]."""
         status, stage, done, values = self._process.run(
             self.number, _references(into), rows, _references(out), steps, time, step_size
         )

@@ -1,8 +1,7 @@
 """Acceptance tests of one FMU.
 
 The checks run here; the FMU runs in a process of its own, which it may crash, hang or flood, and from which nothing but
-measurements come. So it reaches no verdict.
-"""
+measurements come. So it reaches no verdict."""
 
 import hashlib
 import traceback
@@ -136,8 +135,7 @@ def check_fmu(
     ``seed``: of what is drawn at random; from the file's own bytes where None, so that its author cannot know it
     before.
     Raises an `InputError` if there is no such file or no such check, or the binding is not TOML, not of its form or not
-    filled in.
-    """
+    filled in."""
     unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
     if unknown:
         known = ", ".join([*FILE_CHECKS, *CHECKS])
@@ -255,8 +253,7 @@ class _Runner:
     def _with_whom(self, result: CheckResult) -> CheckResult:
         """A crash, with the checks before it where it does not come without them.
 
-        A call that damages the FMU's memory is often survived; the process then ends in a later one.
-        """
+        A call that damages the FMU's memory is often survived; the process then ends in a later one."""
         before = self._asked
         if result.fault != CRASH or not before or self._process is None or self._process.alive:
             return result

@@ -1,7 +1,6 @@
 """The process in which a foreign FMU is checked: it does what it is asked; `supervisor` calls it.
 
-No check runs here and no verdict is made here: code of the FMU can change whatever is in its process.
-"""
+No check runs here and no verdict is made here: code of the FMU can change whatever is in its process."""
 
 import ctypes
 import gc

@@ -11,8 +11,7 @@ def standing_apart(master: Master, model: LinearModel, zeros: int) -> list[str]:
     angle.
 
     Their zeros are not counted among those that nothing restores. An integrator of a controller that is off looks just
-    like that, so that whoever believes it on must be told. A state in seconds is a clock.
-    """
+    like that, so that whoever believes it on must be told. A state in seconds is a clock."""
     if zeros + len(model.apart) <= 1:
         return []
     names = [name for name in model.apart if _unit(master, name) != "s"]

@@ -1,8 +1,7 @@
 """Arnoldi's method with many vectors at once, for systems whose equations are dense in part.
 
 A solution for one vector reads a whole dense factor and does little with it; one for sixteen takes hardly longer. What
-ARPACK saves by beginning anew with few vectors it pays in solutions, so all vectors are kept here.
-"""
+ARPACK saves by beginning anew with few vectors it pays in solutions, so all vectors are kept here."""
 
 from collections.abc import Callable, Sequence
 
@@ -38,8 +37,7 @@ class BlockArnoldi:
     ``apply``: The operator, for complex vectors as columns, shape (n, k).
 
     ``values``, ``accuracy``: Approximations of the eigenvalues, largest first; and how large what they leave over is,
-    as a part of each.
-    """
+    as a part of each."""
 
     def __init__(self, apply: Callable[[Vector], Vector], size: int, most: int = MOST) -> None:
         self._apply, self._size = apply, size

@@ -43,8 +43,7 @@ class Blocks:
     lines, components are linearised over a part of the step, and not told the step.
 
     ``period``: Communication steps after which the system repeats; 1 where each step is like every other.
-    ``declared``: By component and output: the inputs that its FMU says it depends on directly.
-    """
+    ``declared``: By component and output: the inputs that its FMU says it depends on directly."""
 
     def __init__(
         self,
@@ -216,8 +215,7 @@ def linearize_within(
     """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step.
 
     ``master``: at the operating point; it is left as it was.
-    ``step_size``: communication step to linearise over [s].
-    """
+    ``step_size``: communication step to linearise over [s]."""
     exchange, time = master.exchanges[name], master.time
     with other_step(master, name, 0.0 if without_step else step_size):
         if directional:

@@ -1,7 +1,6 @@
 """Linear model of one running FMU over one communication step, by perturbation of its states and inputs.
 
-Where an FMU gives directional derivatives, these give the same model in an independent way.
-"""
+Where an FMU gives directional derivatives, these give the same model in an independent way."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -83,8 +82,7 @@ def linearize_component(
     ``step_size``: communication step to linearise over [s].
     ``inputs`` and ``observed``: tunable parameters or open inputs, and outputs, in addition to the connected ones.
     ``derivatives``: also difference the FMU's own derivatives, if it declares them; it costs a third more.
-    ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0.
-    """
+    ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0."""
     component = exchange.component
     StateAccess(component)  # refuses a component that can neither be perturbed nor has a model inside
     if (inside := embedded_model(component)) is not None:
@@ -139,8 +137,7 @@ def linearize_by_derivatives(
 
     The map over one communication step is the exact one of the continuous model; an FMU's integrator comes close.
     The derivatives are compared with differences of the FMU's own variables, or where its states cannot be set with
-    its response to small steps of its inputs.
-    """
+    its response to small steps of its inputs."""
     component = exchange.component
     states = component.description.states
     rates = component.description.rates

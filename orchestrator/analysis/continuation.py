@@ -1,6 +1,5 @@
 """Following one mode by its eigenvectors while a parameter changes. The linear model can be computed for any value of
-the parameter.
-"""
+the parameter."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -97,8 +96,7 @@ def follow_along(
     ``start``: the mode at ``begin``.
     ``begin`` and ``end``: ends of the path; the end may be the smaller one.
     ``common``: states by which modes are recognised, where not all models have the same; the start's vectors hold these
-    alone.
-    """
+    alone."""
     shortest = abs(end - begin) * strides.shortest
     here, pair, stride = begin, start, end - begin
     while here != end:
@@ -118,8 +116,7 @@ def between(one: LinearModel, other: LinearModel) -> Callable[[float], LinearMod
     """The linear models on the straight way from one (0) to another (1), both of the same operating point.
 
     A gain that stands in one element of a component's matrices runs from one value to the other on this way. There is
-    none between models of other states or over another step, nor with states that were fitted.
-    """
+    none between models of other states or over another step, nor with states that were fitted."""
     alike = one.names == other.names and one.G.shape == other.G.shape
     if not alike or (one.step_size, one.period) != (other.step_size, other.period):
         return None

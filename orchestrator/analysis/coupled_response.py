@@ -3,8 +3,7 @@ FMU.
 
 A step map is found from single communication steps and from the states that the FMUs declare. It is wrong without any
 sign if an FMU has undeclared states, or if a controller is sampled and a step contains no sample. Therefore all states
-are disturbed a little, the FMUs run for a while, and their states must follow z⁺ = A·z.
-"""
+are disturbed a little, the FMUs run for a while, and their states must follow z⁺ = A·z."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -74,8 +73,7 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
 
     ``master``: the running system at the model's operating point; it is restored.
     ``model``: the step map composed of the blocks.
-    ``stability``: the verdict on ``model``.
-    """
+    ``stability``: the verdict on ``model``."""
     if not stability.stable:
         return stability
     foreign = [name for name in foreign_components(master) if blocks.how[name] != IDENTIFIED]
@@ -91,8 +89,7 @@ def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Sta
 
 def _standstill(blocks: Blocks, foreign: Sequence[str]) -> str:
     """The reason why a component has no usable step map: its states stand still in a step although their derivatives
-    are not zero.
-    """
+    are not zero."""
     for name in foreign:
         c = blocks.components[name]
         rows = np.abs(np.hstack([c.A - np.eye(len(c.A)), c.B])).max(axis=1, initial=0.0) <= _STANDS
@@ -112,8 +109,7 @@ def _standstill(blocks: Blocks, foreign: Sequence[str]) -> str:
 
 def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tuple[str, str]:
     """Sentences on the difference between the FMUs' response and the model's, or on limits of the comparison; empty
-    without either.
-    """
+    without either."""
     try:
         found = worst_disagreement(master, model)
     except ComponentError as error:
@@ -182,8 +178,7 @@ def _run(
     master: Master, state: CoupledState, model: LinearModel, x: Matrix, every: int, times: int | None
 ) -> tuple[Matrix, Matrix]:
     """States from x on at regular numbers of steps, until the wanted number of times or the computing time is reached;
-    and z at the start.
-    """
+    and z at the start."""
     held = [master.output_names.index(name.removesuffix(HELD)) for name in model.names if name.endswith(HELD)]
     interval = every * master.clock.step_size
     rows: list[Matrix] = []

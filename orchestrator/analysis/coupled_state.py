@@ -34,8 +34,7 @@ class CoupledState:
     def settle(self) -> None:
         """Exchange outputs until they stop changing; two passes do, unless feed-through is chained.
 
-        Over a connection with a delay all arrives at once, as if it had long been so.
-        """
+        Over a connection with a delay all arrives at once, as if it had long been so."""
         for _ in range(2):
             for name in [name for group in self._master.schedule.groups for name in group]:
                 self._master.renew(name)

@@ -3,8 +3,7 @@
 A device whose current follows its voltage at once, such as i = (E − v)/Z, closes a loop with the network's voltage
 that goes around once in a communication step. With a gain above 1 it diverges within milliseconds, and another
 component is the first to fail. A black box cannot be perturbed where it is, so instances of their own are stepped, with
-the inputs as they are and with each of them moved; all others are linearised as always.
-"""
+the inputs as they are and with each of them moved; all others are linearised as always."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -46,8 +45,7 @@ def coupling_growth(master: Master, boxes: Sequence[str]) -> list[str]:
 def _responding(master: Master, name: str) -> ComponentLinearization:
     """A component as its response to steps of its inputs, over a few communication steps.
 
-    Its states are past inputs.
-    """
+    Its states are past inputs."""
     exchange = master.exchanges[name]
     rest, m, p = exchange.inputs.values.copy(), len(exchange.inputs.names), len(exchange.outputs.names)
     before = _run(master, name, rest)

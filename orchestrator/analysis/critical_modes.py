@@ -2,8 +2,7 @@
 
 Around a point σ of the complex plane, Arnoldi's method on (A − σI)⁻¹ finds the eigenvalues nearest to σ. All
 eigenvalues nearer than the farthest one found are then known. Discs around a few points cover the region of the
-critical modes: a range of frequencies, from well into instability to a damping that needs no attention.
-"""
+critical modes: a range of frequencies, from well into instability to a damping that needs no attention."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -76,8 +75,7 @@ def find_critical_modes(
     ``model``: step map or continuous matrix, of any size.
     ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; the lowest must exceed 0.
     ``damping``: damping ratio between 0 and 0.9. All modes with less damping are found, down to a damping ratio of
-    −0.1.
-    """
+    −0.1."""
     if not (0 < lowest_hz < highest_hz and 0 < damping <= 0.9):
         raise AnalysisError(
             f"a search from {lowest_hz:g} to {highest_hz:g} Hz below a damping ratio of {damping:g} is none; "
@@ -180,8 +178,7 @@ class Search:
     """Arnoldi's method on (A − σI)⁻¹ around one point λ = ``centre``.
 
     ``sigma``: The point in the plane of A's own eigenvalues.
-    ``reach``: Distance from ``sigma`` up to which the last search has found every eigenvalue.
-    """
+    ``reach``: Distance from ``sigma`` up to which the last search has found every eigenvalue."""
 
     def __init__(self, model: LinearModel, centre: complex) -> None:
         self._model, self.centre = model, centre
@@ -206,8 +203,7 @@ class Search:
         """All eigenvalues nearer than ``radius``; None if there are too many. Those that are not wanted may be rough.
 
         ``radius``: distance from ``centre`` [rad/s].
-        ``wanted``: whether an eigenvalue λ is looked for.
-        """
+        ``wanted``: whether an eigenvalue λ is looked for."""
         if self._solver.takes_many:
             self._blocks = BlockArnoldi(self._solver.solve, len(self._model.names))
             return self._reaching_in_blocks(self._blocks, radius, wanted)

@@ -2,8 +2,7 @@
 
 In a step map a short delay is a shift register, exact at every frequency. A register of thousands of places would make
 the matrices large, so that a long delay is the transport line's projection on Legendre polynomials: with q of them its
-transfer function is the Padé approximation [q−1/q] of e^{−sT}, in a basis whose numbers stay small.
-"""
+transfer function is the Padé approximation [q−1/q] of e^{−sT}, in a basis whose numbers stay small."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -48,8 +47,7 @@ class WireLink:
 class DelayLine:
     """s⁺ = A·s + B·u, and what arrives: C·s + d·u in this step, C_before·s in the one before.
 
-    In a continuous model ṡ = A·s + B·u; nothing is asked of the step before there.
-    """
+    In a continuous model ṡ = A·s + B·u; nothing is asked of the step before there."""
 
     A: Matrix
     B: Matrix
@@ -85,8 +83,7 @@ def _long(delay: float, step_size: float) -> DelayLine:
     """A long delay: two values sent before, the polynomials, and what arrived in the step before.
 
     Values are held over a step and three of them are weighted, which delays slow signals by a step and a half: the line
-    is as much shorter, and a little for what is left of it.
-    """
+    is as much shorter, and a little for what is left of it."""
     shorter = 1.5 * step_size
     for _ in range(3):
         A_c, B_c, C_c = transport(delay - shorter)
@@ -125,8 +122,7 @@ def transport(delay: float) -> tuple[Matrix, Matrix, Matrix]:
 
 def representation_error(link: WireLink, eigenvalue: complex, step_size: float | None) -> float:
     """How far a model's delay is from the true one at an eigenvalue [rad/s], as a part of it; infinite where the
-    true one is beyond any number.
-    """
+    true one is beyond any number."""
     if step_size is None:
         line, at = continuous_line(link.delay), eigenvalue
     else:

@@ -32,8 +32,7 @@ def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[st
     ``component``: lets its states be set, and saves and restores its state.
     ``given``: shape (unknowns, knowns).
     ``unknowns``: variables whose derivatives are given, one for each row: rates and outputs.
-    ``knowns``: variables by which the unknowns are differentiated, one for each column: states and inputs.
-    """
+    ``knowns``: variables by which the unknowns are differentiated, one for each column: states and inputs."""
     one, two = _central_differences(component, unknowns, knowns)
     allowed = AGREES * np.abs(one) + 3 * np.abs(one - two) + _ROUNDING * np.abs(one).max(axis=1, initial=0.0)[:, None]
     differs = np.abs(given - one)
@@ -63,8 +62,7 @@ def _right_nearby(
     """The doubted elements that are right for smaller changes; the larger change has run into a limit.
 
     Only an element whose difference quotient depends on the size is looked at again: a wrong derivative of something
-    linear stays wrong.
-    """
+    linear stays wrong."""
     right = np.zeros_like(doubted)
     columns = np.flatnonzero(doubted.any(axis=0))
     some = [knowns[k] for k in columns.tolist()]

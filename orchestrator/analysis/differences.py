@@ -45,8 +45,7 @@ class PerturbedStep:
 
         ``varied``: places in ``names``.
         ``size``: of the perturbation, relative to max(1, |value|).
-        ``rates``: names of the states' time derivatives, which are read before the step.
-        """
+        ``rates``: names of the states' time derivatives, which are read before the step."""
         component, names = self.component, self.names
         z_0 = RealBatch(component, names).read().copy()
         after, outputs, slopes = (RealBatch(component, group) for group in (self.states, self.exits, rates))

@@ -2,8 +2,7 @@
 
 The number does not come from any search, so it shows whether a search has missed a mode. The logarithm of the
 determinant is followed from point to point, and points are added where it changes quickly. The eigenvalues of the
-components alone are divided out first: what is left comes to rest far from 0.
-"""
+components alone are divided out first: what is left comes to rest far from 0."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -32,8 +31,7 @@ def count_growing(equations: ShiftedEquations, alone: Sequence[complex] | Vector
     """Number of eigenvalues to the right of `GROWING`, at any frequency; a pair counts twice.
 
     ``alone``: all eigenvalues of its components, each alone with its inputs held [rad/s]. Far from 0, the system's
-    determinant is theirs.
-    """
+    determinant is theirs."""
     poles = np.asarray(alone, dtype=complex)
 
     def logarithm(s: complex) -> complex:

@@ -14,8 +14,7 @@ def eigenvalue_shift(
 
     ``model`` and ``varied``: with the same states, in the same order: that with the eigenvalue, and the changed one.
     ``eigenvalue``: λ of ``model`` [rad/s].
-    ``left`` and ``right``: its eigenvectors, shape (n,), with lᴴ·r = 1.
-    """
+    ``left`` and ``right``: its eigenvectors, shape (n,), with lᴴ·r = 1."""
     change = complex(np.vdot(left, _apply(varied, right) - _apply(model, right)))
     if model.step_size is not None:
         change /= complex(np.exp(eigenvalue * model.step_size)) * model.step_size
@@ -29,8 +28,7 @@ def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> 
     opposite directions, and their sum by the error itself.
 
     ``model`` and ``varied``: with the same states, in the same order.
-    ``radius``: largest |λ| that counts [rad/s].
-    """
+    ``radius``: largest |λ| that counts [rad/s]."""
     step, A, changed = model.step_size, model.A, varied.A
 
     def is_near(real: float, imaginary: float = 0.0) -> bool:

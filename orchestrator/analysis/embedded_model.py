@@ -1,8 +1,7 @@
 """The linear model inside an FMU in place of perturbation, for FMUs whose states a master cannot set.
 
 It holds at one operating point and for one set of parameters, so both are compared with
-the running FMU before it is used.
-"""
+the running FMU before it is used."""
 
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.component import Component

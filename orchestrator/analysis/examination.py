@@ -1,7 +1,6 @@
 """Examination of a linear model's verdict: comparison with the FMUs, their perturbation and the communication step.
 
-Every command that linearises uses this examination, and so all of them give the same warnings.
-"""
+Every command that linearises uses this examination, and so all of them give the same warnings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -48,8 +47,7 @@ def examine(
     ``modes``: oscillations that must not depend on the perturbation; by default those of the range. If a component is
     doubtful, all oscillations from 0.1 to 2 Hz are added.
     ``shown``: modes that must not depend on the communication step; by default the same.
-    ``frequency_range``: [Hz]
-    """
+    ``frequency_range``: [Hz]"""
     if spectrum is None:
         small = len(model.names) <= WHOLE
         spectrum = find_spectrum(model, *frequency_range) if small and modes is None else whole_spectrum(model)

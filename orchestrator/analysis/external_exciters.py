@@ -1,8 +1,7 @@
 """Whether exciters outside of their machines hold what the machines were started for, and what to type if not.
 
 A machine with ``exciter = "external"`` computes the field voltage and the terminal voltage of its operating point. Its
-exciter is another component, whose start and reference nobody but the user knows by name.
-"""
+exciter is another component, whose start and reference nobody but the user knows by name."""
 
 from collections.abc import Iterator
 from typing import NamedTuple

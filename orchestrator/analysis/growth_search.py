@@ -3,8 +3,7 @@ half-plane.
 
 The half-plane is cut into sectors of rings around 0. Arnoldi's method on (A − σI)⁻¹ around the middle σ of a sector
 gives the eigenvalues nearest to it; the sector is done when they reach beyond its edge, and is cut where they do not.
-Modes of a step map that grow by a tenth or more in each step stand out: Arnoldi's method on A alone finds them.
-"""
+Modes of a step map that grow by a tenth or more in each step stand out: Arnoldi's method on A alone finds them."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -59,8 +58,7 @@ class _Sector:
 
     def holds(self, value: complex) -> bool:
         """Whether a point lies in the sector, which includes its lower edges but not the upper ones. The last sector of
-        a ring includes the imaginary axis.
-        """
+        a ring includes the imaginary axis."""
         angle = float(np.angle(value))
         return self.inner <= abs(value) < self.outer and self.low <= angle < self.high
 

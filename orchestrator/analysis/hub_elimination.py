@@ -7,8 +7,7 @@ equations fall apart into small blocks. They are eliminated exactly; what is lef
     | R  T | |y| = |c|
 
 Nothing is neglected. A sparse factorisation of the whole does not see the blocks: its order of elimination, made for
-rows with few entries, lets the hub's rows fill almost everything.
-"""
+rows with few entries, lets the hub's rows fill almost everything."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -80,8 +79,7 @@ class HubEquations:
     @cached_property
     def colours(self) -> tuple[Places, Places]:
         """A colour for each column of Q, such that no two of one colour enter the same block; and, by block and colour,
-        the column, or −1.
-        """
+        the column, or −1."""
         count, block = self.blocks
         Q = self.quadrants[1]
         colour = np.full(Q.shape[1], -1, dtype=np.int64)

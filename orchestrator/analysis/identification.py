@@ -1,8 +1,7 @@
 """Modes seen in a recorded signal: the matrix pencil method.
 
 Hua and Sarkar, "Matrix pencil method for estimating parameters of exponentially damped/undamped
-sinusoids in noise", IEEE Trans. ASSP 38(5), 1990.
-"""
+sinusoids in noise", IEEE Trans. ASSP 38(5), 1990."""
 
 from dataclasses import dataclass
 
@@ -50,8 +49,7 @@ def identify_modes(
 
     ``times`` and ``signal``: shape (n,); equally spaced samples of a free response, [s] and any unit.
     ``tolerance``: singular values below this fraction of the largest are taken for noise.
-    ``highest_hz``: the signal is thinned to ten samples per period of this frequency.
-    """
+    ``highest_hz``: the signal is thinned to ten samples per period of this frequency."""
     used = sampling(times, highest_hz)
     thin, interval = used.thin, used.interval
     y = signal[::thin]

@@ -18,8 +18,7 @@ def line_model(blocks: Blocks, schedule: Schedule) -> LinearModel:
 
     Raises an `AnalysisError` if direct feed-through closes a loop; if an output depends on an input of which its FMU
     says that it does not, as such an output is not read again after the step; or if a connection does more than carry
-    its value.
-    """
+    its value."""
     if blocks.links:
         disturbed = ", ".join(link.name for link in blocks.links.values())
         raise AnalysisError(

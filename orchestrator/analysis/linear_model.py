@@ -2,8 +2,7 @@
 
 z⁺ = F·z + G·w and w = H·z + K·w (ż for z⁺ where the model is continuous): z holds the states, w the outputs on
 their way between components. The matrix A = F + G·(I − K)⁻¹·H that this comes down to is dense in large parts;
-the equations are not, which is what a search for a few eigenvalues of a large system lives on.
-"""
+the equations are not, which is what a search for a few eigenvalues of a large system lives on."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -64,8 +63,7 @@ class LinearModel:
         ``A``: shape (n, n); in 1/s for a continuous model.
         ``names``: of the states, length n.
         ``step_size``: communication step [s]; None for a continuous model.
-        ``disagreement``: as in `LinearModel`.
-        """
+        ``disagreement``: as in `LinearModel`."""
         n = len(A)
         G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))
         return cls(sp.csr_array(A), G, H, K, names, step_size, disagreement)
@@ -91,8 +89,7 @@ class LinearModel:
     @cached_property
     def apart(self) -> tuple[str, ...]:
         """Names of the states that stand or advance by themselves, and are coupled with no other: clocks, and the
-        integrators of controllers that are off.
-        """
+        integrators of controllers that are off."""
         return tuple(self.names[k] for k in np.flatnonzero(self._is_apart))
 
     @cached_property
@@ -130,8 +127,7 @@ class LinearModel:
     @property
     def is_searched_in_blocks(self) -> bool:
         """Whether a search takes many vectors at once: in large models with a hub, whose dense rest is read once for
-        all of them.
-        """
+        all of them."""
         return len(self.names) >= LEAST_IN_BLOCKS and self._hub is not None
 
     @property

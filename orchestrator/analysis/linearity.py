@@ -2,8 +2,7 @@
 
 Every component was perturbed with two sizes, and up as well as down. At the edge of a limit, inside a dead band that is
 smaller than the perturbation, or in noise the results differ, and the linear model describes neither side. How far the
-difference moves each mode follows from its eigenvectors, to first order.
-"""
+difference moves each mode follows from its eigenvectors, to first order."""
 
 import copy
 from collections.abc import Sequence

@@ -3,8 +3,7 @@
 The coupled state z holds the states of all components and, where the schedule makes an output
 travel one step late, that output as well: an output with direct feed-through from an input that is
 older than itself is memory that the exchange adds. So is what is on its way over a connection with a delay. Everything
-else follows from the states.
-"""
+else follows from the states."""
 
 from collections.abc import Callable, Mapping
 
@@ -28,8 +27,7 @@ def linearize(master: Master, step_size: float | None = None, schedule: Schedule
 
     ``master``: at an operating point; it is left as it was.
     ``step_size`` and ``schedule``: by default the master's own; other values show the coupling's effect with another
-    step or schedule.
-    """
+    step or schedule."""
     return compose(Blocks(master, step_size), schedule or master.schedule)
 
 
@@ -133,8 +131,7 @@ def continuous(blocks: Blocks) -> LinearModel:
 def continuous_model(master: Master, blocks: Blocks | None = None) -> LinearModel | None:
     """The system without a communication step; None if a component gives no derivatives.
 
-    ``blocks``: blocks with derivatives, if they exist already. They are used if no component knows the step.
-    """
+    ``blocks``: blocks with derivatives, if they exist already. They are used if no component knows the step."""
     if blocks is None or not blocks.serves_continuous:
         return where_given(lambda: continuous(Blocks(master, without_step=True)))
     return where_given(lambda: continuous(blocks))

@@ -2,8 +2,7 @@
 
 Where the modes of one operating point are made from those of another, a mode that was not critical there, or not there
 at all, is missed. With the known modes projected out, Arnoldi's method around a few points finds what else lies
-nearby; mostly nothing.
-"""
+nearby; mostly nothing."""
 
 from itertools import pairwise
 
@@ -32,8 +31,7 @@ def missed(
     """Eigenvalues [rad/s] of a region beside the known ones.
 
     ``lowest`` and ``highest``: range of Im λ [rad/s], above 0.
-    ``damping``: damping ratio below which nothing may be missed, down to −0.3. What is found is rough.
-    """
+    ``damping``: damping ratio below which nothing may be missed, down to −0.3. What is found is rough."""
     norms = np.einsum("ij,ij->j", known.left.conj(), known.right)
     left = (known.left / norms.conj()).conj().T
     edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(_STRETCH)))).tolist()

@@ -30,8 +30,7 @@ def with_doubts(
 
     ``length``: of the window [s].
     ``others``: modes of the same signal by another order and window; None where that shows none.
-    ``noise_like``: whether the modes leave nothing of the signal but noise.
-    """
+    ``noise_like``: whether the modes leave nothing of the signal but noise."""
     energies = [_energy(mode, length) for mode in modes]
     total = sum(energy for mode, energy in zip(modes, energies, strict=True) if _swings(mode, length))
     return [
@@ -45,8 +44,7 @@ def with_doubts(
 def is_trend(mode: IdentifiedMode, length: float) -> bool:
     """Whether a component is a part of an offset or a trend.
 
-    In the window it changes by less than a factor e and turns by less than one radian.
-    """
+    In the window it changes by less than a factor e and turns by less than one radian."""
     return abs(mode.eigenvalue) * length < 1
 
 
@@ -56,8 +54,7 @@ def worth_showing(modes: Sequence[IdentifiedMode], length: float, weakest: float
     A straight line comes out as exponentials of huge amplitudes that cancel, so that oscillations are compared with the
     strongest one that swings at least once in the window.
 
-    ``length``: of the window [s].
-    """
+    ``length``: of the window [s]."""
     largest = max((mode.amplitude for mode in modes), default=0.0)
     swing = max((mode.amplitude for mode in modes if _swings(mode, length)), default=largest)
     return [mode for mode in modes if mode.amplitude >= weakest * (swing if mode.frequency_hz > 0 else largest)]
@@ -116,8 +113,7 @@ def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> 
     """A sentence on a window that is too short for the strongest oscillation; else empty.
 
     ``modes``: the strongest first.
-    ``start`` and ``stop``: of the window [s].
-    """
+    ``start`` and ``stop``: of the window [s]."""
     length = stop - start
     strongest = next((mode for mode in modes if mode.frequency_hz > 0 and not is_trend(mode, length)), None)
     if strongest is None or strongest.frequency_hz * length >= FEWEST_PERIODS:
@@ -132,8 +128,7 @@ def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> 
 def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:
     """A sentence where no oscillation was found in a window of this length [s]; else empty.
 
-    ``length``: of the window [s].
-    """
+    ``length``: of the window [s]."""
     if not modes:
         return "Nothing above the noise: the window shows no mode."
     if any(mode.frequency_hz > 0 and not is_trend(mode, length) for mode in modes):
@@ -144,8 +139,7 @@ def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:
 def straight_line(times: NDArray[np.float64], signal: NDArray[np.float64]) -> float:
     """By how much the straight line through a signal changes from its first to its last sample [unit of the signal].
 
-    ``times`` and ``signal``: shape (n,); [s] and any unit.
-    """
+    ``times`` and ``signal``: shape (n,); [s] and any unit."""
     centred = times - times.mean()
     return float(centred @ (signal - signal.mean()) / (centred @ centred) * (times[-1] - times[0]))
 
@@ -155,8 +149,7 @@ def over_a_trend(modes: Sequence[IdentifiedMode], length: float, line: float) ->
 
     ``modes``: the strongest first.
     ``length``: of the window [s].
-    ``line``: change of the straight line through the signal, as `straight_line`.
-    """
+    ``line``: change of the straight line through the signal, as `straight_line`."""
     swing = max((2 * mode.amplitude for mode in modes if _swings(mode, length)), default=0.0)
     trends = any(is_trend(mode, length) for mode in modes)
     if not trends or abs(line) <= STEEP * swing:

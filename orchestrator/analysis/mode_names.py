@@ -77,8 +77,7 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
     """Give every name to the mode that fits it, no mode getting two, so that the sum of all measures is largest.
 
     A name stays free where no mode fits, where two fit about equally, or where the only mode that fits well has another
-    name.
-    """
+    name."""
     names = list(measures)
     fit = np.array([[measures[name](mode) for mode in modes] for name in names]).reshape(len(names), len(modes))
     column = _assigned(fit)

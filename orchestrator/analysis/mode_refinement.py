@@ -1,8 +1,7 @@
 """Modes of a model from those of a similar one, by two-sided inverse iteration in the space of all of them.
 
 The known eigenvectors of both sides, improved by one solution each at a point near their eigenvalues, span a small
-space; its eigenvalues are those of the model up to the square of what the vectors still lack.
-"""
+space; its eigenvalues are those of the model up to the square of what the vectors still lack."""
 
 from dataclasses import dataclass
 
@@ -37,8 +36,7 @@ def refine(
 ) -> RefinedModes:
     """Modes of a continuous model, from values and vectors that are nearly so.
 
-    ``values`` and ``left`` and ``right``: as in `RefinedModes`, of a similar model with the same states.
-    """
+    ``values`` and ``left`` and ``right``: as in `RefinedModes`, of a similar model with the same states."""
     settled = False
     for _ in range(_ROUNDS):
         new_left, new_right = left.copy(), right.copy()

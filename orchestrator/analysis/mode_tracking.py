@@ -2,8 +2,7 @@
 
 Sorted lists of eigenvalues lose a mode where two eigenvalues cross; eigenvectors stay the same. The similarity of
 `orchestrator.analysis.similarity` is the magnitude of a product, and these products sum to 1 over all modes b of a
-point. A similarity above a half therefore means that most of mode a is in mode b.
-"""
+point. A similarity above a half therefore means that most of mode a is in mode b."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -67,8 +66,7 @@ class Link:
 def similarities(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
     """Similarity of every mode of one point with every mode of another, shape (m_a, m_b), from 0 to 1.
 
-    A state that only one of the points has counts as 0 in the other's eigenvectors.
-    """
+    A state that only one of the points has counts as 0 in the other's eigenvectors."""
     place_in_b = {name: k for k, name in enumerate(b.names)}
     both = [(k, place_in_b[name]) for k, name in enumerate(a.names) if name in place_in_b]
     of_a, of_b = [k for k, _ in both], [k for _, k in both]
@@ -84,8 +82,7 @@ def match(a: ModeSet, b: ModeSet, threshold: float = THRESHOLD) -> list[Link]:
     """Pair the modes of two points so that the sum of their similarities is largest.
 
     Pairs below the threshold, and pairs with another candidate that is nearly as good, are left out: the mode is
-    ambiguous, new or gone.
-    """
+    ambiguous, new or gone."""
     if not (len(a.eigenvalues) and len(b.eigenvalues)):
         return []
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
@@ -111,8 +108,7 @@ def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], t
     """Whether a mode of one point has no partner in the other without being near an end of the range [Hz].
 
     ``frequency_range``: in which modes were looked for [Hz].
-    ``threshold``: least similarity of partners, from 0 to 1.
-    """
+    ``threshold``: least similarity of partners, from 0 to 1."""
     links = match(a, b, threshold)
     paired = ({link.source for link in links}, {link.target for link in links})
     return any(

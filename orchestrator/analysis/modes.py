@@ -135,8 +135,7 @@ def eigenvectors(model: LinearModel) -> tuple[NDArray[np.complex128], Vector, Ve
 
 def in_range(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) -> list[int]:
     """Mask of the eigenvalues [rad/s] with a frequency in a range [Hz], both ends included, one of each conjugate
-    pair.
-    """
+    pair."""
     hertz = values.imag / (2 * np.pi)
     mask = (values.imag >= 0) & (lowest_hz <= hertz) & (hertz <= highest_hz)
     return [int(k) for k in np.flatnonzero(mask)]
@@ -155,8 +154,7 @@ def find_spectrum(
     """Every eigenvalue, and the modes with a frequency in a range, one of each conjugate pair.
 
     ``model``: step map or continuous matrix.
-    ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues.
-    """
+    ``lowest_hz`` and ``highest_hz``: range of Im λ/2π [Hz], both ends included; 0 includes real eigenvalues."""
     lambdas, vectors = _values_and_vectors(model)
     chosen, k = in_range(lambdas, lowest_hz, highest_hz), index_of_rightmost(lambdas)
     wanted = chosen if k is None else [*chosen, k]
@@ -213,8 +211,7 @@ def make_mode(
 
     ``value``: λ [rad/s].
     ``left``: eigenvector of Aᴴ, shape (n,), of any length and angle.
-    ``right``: eigenvector of A, shape (n,), of any length and angle.
-    """
+    ``right``: eigenvector of A, shape (n,), of any length and angle."""
     factors = np.abs(left.conj() * right)
     factors /= factors.sum()
     order = np.argsort(-factors)

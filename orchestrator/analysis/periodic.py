@@ -2,8 +2,7 @@
 
 Each state is perturbed, and the whole system is run for a period: delays and held values are in its map as they are.
 The multiplier μ of a mode over a period T gives λ = ln μ/T, but for a multiple of 2π/T in its frequency. The mode's
-own motion during the period tells which multiple it is (Floquet's theorem).
-"""
+own motion during the period tells which multiple it is (Floquet's theorem)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -75,8 +74,7 @@ def period_model(master: Master, blocks: Blocks) -> LinearModel:
 
 def _names_and_scales(blocks: Blocks, schedule: Schedule) -> tuple[tuple[str, ...], Matrix]:
     """All states, held outputs among them, and what is 1 to each: at least 1, or what a change of another one by 1 does
-    to it in one step.
-    """
+    to it in one step."""
     model = compose(blocks, schedule, within_period=True)
     if delayed := [name for name in model.names if DELAYED in name]:
         raise AnalysisError(
@@ -163,8 +161,7 @@ def _turns(right: Complex, left: Complex, exponents: Complex, maps: NDArray[np.f
     """Whole turns that each mode makes during a period, beside the angle of its multiplier, shape (modes,).
 
     A mode's motion is e^(λt)·p(t) with a periodic p. Its turns are those of p's largest harmonic; each state counts
-    with its weight in the left eigenvector.
-    """
+    with its weight in the left eigenvector."""
     looks = len(maps)
     shares = np.arange(looks) / looks
     motions = (

@@ -1,8 +1,7 @@
 """How large a perturbation is: two sizes that agree, for each state and each input.
 
 A limit or a dead band close to the operating point answers one size otherwise than another, and upwards otherwise than
-downwards.
-"""
+downwards."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,8 +41,7 @@ class PerturbationResult:
 def perturb(step: PerturbedStep, rates: Sequence[str]) -> PerturbationResult:
     """Perturb every state and input, with smaller sizes where two sizes disagree.
 
-    What answers differently up and down keeps the answer upwards of the usual size: a limit is that close.
-    """
+    What answers differently up and down keeps the answer upwards of the usual size: a limit is that close."""
     names, h = step.names, step.step_size
     columns: Sequence[int] = range(len(names))
     found: tuple[Differences, Differences] | None = None

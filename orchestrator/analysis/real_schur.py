@@ -4,8 +4,7 @@ LAPACK's driver for eigenvectors computes all of them, on both sides, which in a
 time. Here its steps are taken one by one: balancing, Hessenberg form, real Schur form A = Q·T·Qᵀ. They are those of the
 driver, so that the eigenvalues are the same to the last bit. Then only the wanted vectors are computed from T.
 
-Other threads of Python run meanwhile, which they do not during SciPy's `eig`.
-"""
+Other threads of Python run meanwhile, which they do not during SciPy's `eig`."""
 
 import ctypes
 from collections.abc import Sequence
@@ -27,8 +26,7 @@ class RealSchur:
 
     ``A``: Real, shape (n, n), n > 0.
 
-    ``values``: All eigenvalues, shape (n,): the same as those of `scipy.linalg.eig`, in the same order.
-    """
+    ``values``: All eigenvalues, shape (n,): the same as those of `scipy.linalg.eig`, in the same order."""
 
     def __init__(self, A: Matrix) -> None:
         A = np.asarray_chkfinite(A, dtype=float)
@@ -40,8 +38,7 @@ class RealSchur:
     def vectors(self, chosen: Sequence[int]) -> tuple[Vector, Vector]:
         """Left and right eigenvectors, each of shape (n, m), of any length: lᴴ·A = λ·lᴴ and A·r = λ·r.
 
-        ``chosen``: places of m eigenvalues in ``values``.
-        """
+        ``chosen``: places of m eigenvalues in ``values``."""
         places = np.asarray(chosen, dtype=np.int64)
         if self._all is not None:
             left, right = self._all

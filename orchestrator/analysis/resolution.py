@@ -3,8 +3,7 @@ resolves them.
 
 Inputs are held over a communication step. This delays every coupling by half a step or more and moves the modes, in
 proportion to the step. With a step that is far too long, the step map's modes have no relation to the system. The
-continuous system, from the components' own derivatives, has the true modes.
-"""
+continuous system, from the components' own derivatives, has the true modes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -57,8 +56,7 @@ class Pair:
     @property
     def is_lost(self) -> bool:
         """Whether the step map's mode has no relation to the true one: it is far away, or on the other side of
-        stability.
-        """
+        stability."""
         return self.error > LOST or (self.error > MOVED and self.seen.real * self.exact.real < 0)
 
 
@@ -161,8 +159,7 @@ def _pairs(
     """The oscillations of the step map, each paired with the nearest one of the continuous system; in a small system
     also the reverse pairs.
 
-    The reverse pairs show modes that the step map has lost altogether.
-    """
+    The reverse pairs show modes that the step map has lost altogether."""
     low, high = max(frequency_range[0], _SLOWEST_HZ), frequency_range[1]
     seen = [mode.eigenvalue for mode in modes if _swings(mode.eigenvalue, low, high)]
     nearest = _nearest(system)

@@ -4,8 +4,7 @@ The inputs are stepped up and down between communication points, all at once and
 FMU is put back. A model with states passes if three conditions hold at every compared time: the FMU's derivatives are
 A·x + B·u of its own states, its outputs are C·x + D·u of these states, and states and outputs follow the response of
 the model alone. The first two conditions show an error in a single element of a slow state, which hardly moves. The
-third shows states that the FMU hides.
-"""
+third shows states that the FMU hides."""
 
 import hashlib
 from collections.abc import Sequence
@@ -120,8 +119,7 @@ def check_response(component: Component, model: ContinuousModel, what: str, time
     ``time``: of the operating point [s].
     ``step_size``: communication step [s].
     Raises an `AnalysisError` if the responses differ, with the signal, time and size of the largest difference; or if
-    the FMU is not linear there.
-    """
+    the FMU is not linear there."""
     values = RealBatch(component, (*model.states, *model.inputs, *model.outputs)).read().copy()
     key = _digest(model, values, step_size)
     agreed = _AGREED.setdefault(component, set())

@@ -1,8 +1,7 @@
 """Sampled controllers: after how many communication steps a running system repeats.
 
 A controller that is sampled beside the communication step, or that works on phase quantities, does not do the same in
-each step. At rest it repeats after a common multiple of the step, its sample time and the network's period.
-"""
+each step. At rest it repeats after a common multiple of the step, its sample time and the network's period."""
 
 from collections.abc import Iterable
 from fractions import Fraction

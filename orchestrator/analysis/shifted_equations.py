@@ -19,8 +19,7 @@ class Factors:
     def solve(self, right: Vector, *, adjoint: bool = False) -> Vector:
         """X with (A − σI)·X = right, or (A − σI)ᴴ·X = right.
 
-        ``right``: shape (n, k).
-        """
+        ``right``: shape (n, k)."""
         whole = np.zeros((self._lu.shape[0], right.shape[1]), dtype=complex)
         whole[: self._n] = right
         solution: Vector = self._lu.solve(whole, "H" if adjoint else "N")[: self._n]

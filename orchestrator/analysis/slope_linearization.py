@@ -1,8 +1,7 @@
 """Continuous model of one running FMU from differences of its own derivatives, without a step.
 
 A screening linearises thousands of operating points, and only a system without a communication step is asked for. What
-answers differently up and down, as at a limit, is left to the perturbation over a step, which tries smaller sizes.
-"""
+answers differently up and down, as at a limit, is left to the perturbation over a step, which tries smaller sizes."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -46,8 +45,7 @@ def linearize_slopes(
     ``inputs`` and ``observed``: tunable parameters or open inputs, and outputs, in addition to the connected ones.
     ``like``: the same FMU at another operating point. Variables that had no common effect there are perturbed together;
     a perturbation in all directions then shows whether that holds here, too. It serves where it has all states, inputs
-    and outputs that are asked for.
-    """
+    and outputs that are asked for."""
     component = exchange.component
     states, rates = component.description.states, component.description.rates
     entries, exits = (*exchange.inputs.names, *inputs), (*exchange.outputs.names, *observed)

@@ -1,8 +1,7 @@
 """The verdict on the stability of a coupled system over its whole spectrum, with the growing modes and the cause.
 
 The step map is what a simulation runs, the continuous model is the system itself. Both are judged: a coupling may
-destabilise a stable system, and a long communication step may damp a mode that grows in the system.
-"""
+destabilise a stable system, and a long communication step may damp a mode that grows in the system."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -56,8 +55,7 @@ class Cause(StrEnum):
 @dataclass(frozen=True)
 class Hidden:
     """Oscillatory modes outside of a frequency range [Hz]: how many, the least damped of them, and those of which it is
-    known that generators swing in them [rad/s].
-    """
+    known that generators swing in them [rad/s]."""
 
     frequency_range: tuple[float, float]
     count: int
@@ -220,8 +218,7 @@ def grows(values: NDArray[np.complex128]) -> NDArray[np.bool_]:
 
 def fastest_growth(values: NDArray[np.complex128], *, step_map: bool) -> complex | None:
     """The fastest growing eigenvalue [rad/s]; None if no eigenvalue grows. Slow eigenvalues of a step map are left out
-    (`SLOW`).
-    """
+    (`SLOW`)."""
     growing = values[grows(values)]
     if step_map:
         growing = growing[np.abs(growing) > SLOW]
@@ -247,8 +244,7 @@ def judge(
 
     ``spectrum``: all eigenvalues of the model where they are known already.
     ``system``: the continuous model of the same system; None where a component gives no derivatives.
-    ``of_system``: all eigenvalues of ``system`` where they are known already.
-    """
+    ``of_system``: all eigenvalues of ``system`` where they are known already."""
     spectrum = spectrum or whole_spectrum(model)
     own = _look_at(model, spectrum)
     if model.step_size is None:

@@ -77,8 +77,7 @@ def read_linear_model(path: Path) -> StateSpace:
 
 def state_space(blocks: Blocks, schedule: Schedule | None) -> StateSpace:
     """The state space between the inputs and outputs that ``blocks`` was made with: the step map of a schedule, or the
-    continuous model for None.
-    """
+    continuous model for None."""
     model = compose(blocks, schedule) if schedule else continuous(blocks)
     n, m = model.G.shape
     external = m - len(blocks.inputs) + np.arange(len(blocks.inputs))

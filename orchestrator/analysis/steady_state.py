@@ -1,8 +1,7 @@
 """The operating point: the fixed point of the coupled step map. It is verified, and solved for if the system moves.
 
 A simulation never settles at an unstable equilibrium, but an equation can be solved for it. Only single communication
-steps are simulated here.
-"""
+steps are simulated here."""
 
 from dataclasses import dataclass
 
@@ -43,8 +42,7 @@ def find_operating_point(
     over a shorter step.
     ``accept``: below this change, the power flow's point is taken as it is. Between ``accept`` and ``tolerance`` a
     better point is searched for, and kept if it is better.
-    ``max_iterations``: largest number of iterations of Newton's method on the step map.
-    """
+    ``max_iterations``: largest number of iterations of Newton's method on the step map."""
     if (steps := steps_of_period(master, master.clock.step_size)) > 1:
         return _periodic_point(master, steps, tolerance, accept, max_iterations)
     state = CoupledState(master)

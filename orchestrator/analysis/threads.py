@@ -24,8 +24,7 @@ def side_by_side() -> Iterator[Executor]:
     one thread on each side, so that both cores work and no last digit depends on their number. What is submitted must
     not touch an FMU, nor what the block changes.
 
-    Yields its ``submit(compute).result()`` raises what ``compute`` raised.
-    """
+    Yields its ``submit(compute).result()`` raises what ``compute`` raised."""
     with one_thread(), ThreadPoolExecutor(2) as pool:
         try:
             yield pool
@@ -44,8 +43,7 @@ def alone() -> Iterator[None]:
 
     FMUs and the limit on BLAS belong to the whole process, whose workers may be threads of a Dask cluster. With one
     BLAS thread each, several workers do not fight, and rounding is the same everywhere. The thread that is alone may
-    ask for it again.
-    """
+    ask for it again."""
     with _one_at_a_time, one_thread():
         yield
 

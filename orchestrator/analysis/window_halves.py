@@ -29,8 +29,7 @@ class WindowPart:
     def shows(self, mode: IdentifiedMode) -> bool | None:
         """Whether this part shows a mode of all of the signal; None where it cannot tell.
 
-        It cannot where it is too short, or where a beat, noise or the decay hides the mode.
-        """
+        It cannot where it is too short, or where a beat, noise or the decay hides the mode."""
         if mode.frequency_hz * self.length < _FEWEST_PERIODS:
             return None
         here = near(self.modes, mode)
@@ -56,8 +55,7 @@ class WindowPart:
         """Least standard deviation of an eigenvalue in white noise, as a part of |λ|.
 
         Rife and Boorstyn, "Single-tone parameter estimation from discrete-time observations", IEEE Trans. Information
-        Theory 20(5), 1974, for a real signal of amplitude 2·|A|; a damped one counts for one of its time constants.
-        """
+        Theory 20(5), 1974, for a real signal of amplitude 2·|A|; a damped one counts for one of its time constants."""
         lasting = min(self.length, 1 / max(abs(mode.eigenvalue.real), 1e-9))
         count = max(self.samples * lasting / self.length, 1.0)
         deviation = np.sqrt(24 / count) * self.remainder / (2 * mode.amplitude * lasting)
@@ -73,8 +71,7 @@ def near(modes: Sequence[IdentifiedMode] | None, mode: IdentifiedMode) -> Identi
 def part_of(times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequence[IdentifiedMode]) -> WindowPart:
     """What the modes of a part of a signal leave of it.
 
-    ``times`` and ``signal``: shape (n,); the part of the signal, [s] and any unit.
-    """
+    ``times`` and ``signal``: shape (n,); the part of the signal, [s] and any unit."""
     thin = -(-len(times) // _MOST_SAMPLES)
     t, y = times[::thin] - times[0], signal[::thin]
     length = float(t[-1])

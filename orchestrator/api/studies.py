@@ -23,8 +23,7 @@ from orchestrator.points.store import PointStore
 class WantedInteractions(TypedDict, total=False):
     """What may be asked of a study of interactions; `InteractionsRequest` says what each means.
 
-    ``devices`` and ``bindings`` are files by the name of a device that is tried beside the case's, at ``places``.
-    """
+    ``devices`` and ``bindings`` are files by the name of a device that is tried beside the case's, at ``places``."""
 
     threshold: float
     frequencies: tuple[float, float]

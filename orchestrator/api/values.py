@@ -1,8 +1,7 @@
 """Arguments as they are given in Python, as the rest of the program takes them; one clear error where they do not fit.
 
 A caller gives a list where one name would do, a text where a number is meant, ``None`` from a table that was empty.
-Each reader here raises an `InputError` that says which argument it was, the value seen, and how to write it.
-"""
+Each reader here raises an `InputError` that says which argument it was, the value seen, and how to write it."""
 
 from __future__ import annotations
 

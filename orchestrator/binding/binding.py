@@ -28,8 +28,7 @@ def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescript
     """Describe an FMU, through a binding where one is given.
 
     The description can be added to a `System` or given to `open_component`; behind a binding it has the variables of
-    our port.
-    """
+    our port."""
     description = read_description(fmu)
     return description if binding is None else bind(description, binding)
 
@@ -285,8 +284,7 @@ class _Reader:
 
 def _phase(table: PhasorTable) -> str | None:
     """Kind of the phasor's amplitude. For three phases it is the phase peak, because their variables are instantaneous
-    values.
-    """
+    values."""
     return "phase peak" if table.form == "abc" else table.value
 
 

@@ -59,8 +59,7 @@ def draft_binding(fmu: FmuDescription, beside: Path | None = None) -> str:
     ``beside``: Folder of the binding file. The FMU's path is written relative to it; None writes the file's name alone.
 
     Returns TOML. Lines with ``GUESS`` are to be confirmed; values that begin with ``REQUIRED`` are to be filled in, and
-    `bind` accepts none of them.
-    """
+    `bind` accepts none of them."""
     voltage = _find(fmu, "input", _VOLTAGE, VOLTS, ("rectangular", "dq", "polar", "abc"))
     current = _find(fmu, "output", _CURRENT, AMPERES, ("rectangular", "dq", "polar", "abc"))
     current = current or _find(fmu, "output", _POWER, WATTS, ("power",))
@@ -182,8 +181,7 @@ def _rating(S_n: VariableInfo | None, fmu: FmuDescription, *ports: Guess | None)
 
 def _rated_voltage(fmu: FmuDescription, ports: Iterable[Guess | None]) -> str:
     """V_n from a parameter of that name. Without such a parameter the user must fill it in if the port is in volts or
-    amperes.
-    """
+    amperes."""
     known = [v for v in fmu.variables.values() if v.causality == "parameter" and v.type == "Real" and v.start]
     named = next((v for v in known if v.unit in VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None)
     if named is not None:

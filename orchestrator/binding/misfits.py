@@ -1,6 +1,5 @@
 """Whether a device and its binding fit together, by what it gives at an operating point: one verdict, in one place's
-words, for every command.
-"""
+words, for every command."""
 
 from cmath import phase
 from collections.abc import Callable, Mapping

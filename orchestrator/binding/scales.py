@@ -44,8 +44,7 @@ def factor(unit: str, target: str, name: str) -> float:
 def amount(text: str | float, unit: str, what: str) -> float:
     """A number from text with a unit, which is required.
 
-    Raises a `ValueError` if the text is not a quantity of this kind, or the number does not exceed 0.
-    """
+    Raises a `ValueError` if the text is not a quantity of this kind, or the number does not exceed 0."""
     try:
         value = to_unit(text, unit)
     except ValueError as error:
@@ -60,8 +59,7 @@ class Bases:
 
     ``rating``: s_n [MVA].
     ``voltage``: v_n, line to line [kV]; None if the binding does not give it.
-    ``frequency``: f_n [Hz].
-    """
+    ``frequency``: f_n [Hz]."""
 
     def __init__(self, rating: float, voltage: float | None, frequency: float) -> None:
         self.rating, self.voltage, self.frequency = rating, voltage, frequency
@@ -75,8 +73,7 @@ class Bases:
         """Number of the FMU's units in 1 pu of voltage.
 
         ``base``: voltage of 1 pu, such as ``"220 kV"``; V_n where None. Only the unit pu has a base.
-        ``value``: kind of value, such as ``"phase peak"``; required for every unit except pu.
-        """
+        ``value``: kind of value, such as ``"phase peak"``; required for every unit except pu."""
         if unit == PER_UNIT:
             if base in (None, "V_n"):
                 return 1.0
@@ -89,8 +86,7 @@ class Bases:
         """Number of the FMU's units in 1 pu of current on the rating.
 
         ``base``: power of the base, such as ``"100 MVA"``; S_n where None. Only the unit pu has a base.
-        ``value``: ``"rms"`` or ``"peak"``; required for every unit except pu.
-        """
+        ``value``: ``"rms"`` or ``"peak"``; required for every unit except pu."""
         if unit == PER_UNIT:
             return self.rating / self._power_base(base, name)
         peak = {"rms": 1.0, "phase rms": 1.0, "peak": sqrt(2), "phase peak": sqrt(2)}

@@ -1,8 +1,7 @@
 """A test bench: one FMU alone at a bus whose voltage we impose, brought to the same operating point for every run.
 
 An FMU that can save its state is put back to it; any other is instantiated anew. Nothing but FMI is used: no states
-are read or set, and parameters only before initialisation.
-"""
+are read or set, and parameters only before initialisation."""
 
 import ctypes
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -71,8 +70,7 @@ class Runs:
     """Runs on a bench; each begins at the operating point.
 
     ``still_after``: Time that the device needed to come to rest [s].
-    ``operating_point``: Outputs at the operating point, shape (p,).
-    """
+    ``operating_point``: Outputs at the operating point, shape (p,)."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
@@ -156,8 +154,7 @@ class Runs:
 
     def _come_to_rest(self) -> Numbers:
         """Hold the voltage until no output moves. A device that starts exactly at the power flow's values is at rest at
-        once.
-        """
+        once."""
         bench = self._bench
         second = round(1.0 / bench.step_size)
         while True:

@@ -2,8 +2,7 @@
 
 The box is measured alone, at an ideal bus that holds the voltage of the operating point, and a model over the
 communication step is fitted to it. All other components are perturbed where they are. The step map is composed as
-always; the box's states in it are those of the fitted model and mean nothing one by one, only together.
-"""
+always; the box's states in it are those of the fitted model and mean nothing one by one, only together."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -66,8 +65,7 @@ def component_participation(mode: Mode, component: str) -> float:
     """|Σ l*·r| over the states of one component, with lᴴ·r = 1 over all states.
 
     Unlike the sum of the states' factors it does not depend on which states describe the component, so it is the same
-    for a fitted model as for the device's own equations.
-    """
+    for a fitted model as for the device's own equations."""
     names = [name for name in mode.shape if name.partition(".")[0] == component]
     return float(abs(sum(mode.left[name].conjugate() * mode.shape[name] for name in names)))
 
@@ -86,8 +84,7 @@ def linearize_with_box(
     well.
     ``component``: name of the black box. Only its inputs are set and its outputs read.
     ``excitation``: signals that excite the box; the usual signals where None.
-    ``restore``: whether the bench saves and restores the box's state; None if it does so whenever the FMU can.
-    """
+    ``restore``: whether the bench saves and restores the box's state; None if it does so whenever the FMU can."""
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
     require_fitting()
@@ -113,8 +110,7 @@ def modes_with_boxes(
     """Modes as `modes_of` finds them; components that hide their states are identified first.
 
     ``prepared`` and ``master`` and ``frequency_range`` and ``critical``: as `modes_of`; to identify anything, the
-    master must be at rest at the power flow's operating point.
-    """
+    master must be at rest at the power flow's operating point."""
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:
         return modes_of(prepared, master, frequency_range, critical)
@@ -169,8 +165,7 @@ def _respond(
 
 def _check_still(master: Master, boxes: Sequence[str]) -> float:
     """Largest change of a known state in one communication step. With a black box, no better operating point can be
-    solved for.
-    """
+    solved for."""
     if steps_of_period(master, master.clock.step_size, without=boxes) > 1:
         sampled = ", ".join(name for name in repeating(master) if name not in boxes)
         raise AnalysisError(

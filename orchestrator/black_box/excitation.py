@@ -1,8 +1,7 @@
 """Signals that excite a device, and its frequency response from the responses to them.
 
 The device is seen at communication points: u[k] holds over step k, and y[k] is read at its end. Its response is
-M(z) = Σ m[k]·z^(−k−1) at z = e^(jωH), where m is the response to u = 1, 0, 0, …
-"""
+M(z) = Σ m[k]·z^(−k−1) at z = e^(jωH), where m is the response to u = 1, 0, 0, …"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,7 @@ _CHUNK = 4096
 def odd_lines(lowest_hz: float, highest_hz: float, count: int) -> NDArray[np.int64]:
     """About ``count`` odd multiples of the lowest frequency up to the highest, spread over its logarithm.
 
-    Even multiples stay silent, so that a quadratic part of the device does not reach the excited ones.
-    """
+    Even multiples stay silent, so that a quadratic part of the device does not reach the excited ones."""
     last = int((highest_hz / lowest_hz * (1 + 1e-9) - 1) // 2)  # the largest odd multiple is 2·last + 1
     wanted = (np.geomspace(1.0, 2 * last + 1, count) - 1) / 2
     return np.asarray(2 * np.unique(np.round(wanted).astype(np.int64)) + 1)
@@ -43,8 +41,7 @@ def line_response(u: Numbers, y: Numbers, lines: NDArray[np.int64]) -> Complex:
     """M at the excited lines from whole periods, shape (f, p).
 
     ``u``: one period, shape (n,).
-    ``y``: the same period of the outputs, shape (n, p).
-    """
+    ``y``: the same period of the outputs, shape (n, p)."""
     delay = np.exp(-2j * np.pi * lines / len(u))  # y[k] is read one step after u[k] begins
     return np.asarray(np.fft.rfft(y, axis=0)[lines] / np.fft.rfft(u)[lines][:, None] * delay[:, None])
 
@@ -52,8 +49,7 @@ def line_response(u: Numbers, y: Numbers, lines: NDArray[np.int64]) -> Complex:
 def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Complex:
     """M at any frequencies [Hz] from the response to a pulse of one step, shape (f, p).
 
-    ``m``: response, shape (n, p), long enough to have died out.
-    """
+    ``m``: response, shape (n, p), long enough to have died out."""
     total = np.zeros((len(frequencies), m.shape[1]), dtype=complex)
     turn = -2j * np.pi * np.asarray(frequencies)[:, None] * step_size
     within = np.exp(turn * (np.arange(_CHUNK) + 1)[None, :])

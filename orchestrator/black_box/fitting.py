@@ -3,8 +3,7 @@
 With the bilinear transform w = (2/H)·(z − 1)/(z + 1) the unit circle becomes the imaginary axis, and a response that
 is rational in z is rational in w, with as many poles: nothing is lost to the hold or to sampling. What vector fitting
 gives is poles p and residue matrices R. At a simple pole of a device R has rank one, so each pole takes as many states
-as R has singular values that matter, and the model is no larger than what was seen of the device.
-"""
+as R has singular values that matter, and the model is no larger than what was seen of the device."""
 
 import warnings
 from dataclasses import dataclass
@@ -38,8 +37,7 @@ def require_fitting() -> None:
 class IdentifiedModel:
     """x⁺ = A·x + B·u, y = C·x + D·u over a communication step, u held.
 
-    ``poles``: As eigenvalues λ = ln μ/H [rad/s], shape (n,).
-    """
+    ``poles``: As eigenvalues λ = ln μ/H [rad/s], shape (n,)."""
 
     A: Matrix
     B: Matrix
@@ -65,8 +63,7 @@ class IdentifiedModel:
 def fit(response: FrequencyResponse, largest_error: float = 0.01) -> IdentifiedModel:
     """Fit the smallest model that is as close as the measurement is certain.
 
-    Raises an `AnalysisError` if none of `ORDERS` comes within ``largest_error``.
-    """
+    Raises an `AnalysisError` if none of `ORDERS` comes within ``largest_error``."""
     wanted = max(_WANTED, response.largest_bound)
     best: IdentifiedModel | None = None
     for real, pairs in ORDERS:

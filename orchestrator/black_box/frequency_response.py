@@ -78,8 +78,7 @@ class FrequencyResponse:
         """The response of the device itself, without the hold: M over (1 − e^(−jωH))/(jωH).
 
         Components above half the communication rate appear at lower frequencies; they are ignored. The result is close
-        only well below half the communication rate.
-        """
+        only well below half the communication rate."""
         x = 2j * np.pi * self.frequencies * self.step_size
         return np.asarray(self.values * (x / (1 - np.exp(-x)))[:, None, None])
 
@@ -185,8 +184,7 @@ def _by_pulses(
 def _check_returned(bench: Bench, column: int, away: float, size: float) -> None:
     """A device that ran away to another operating point, a limit for instance, answers there as calmly as a stable one.
 
-    Raises an `AnalysisError` if the rest of the response [pu] is too large a part of it.
-    """
+    Raises an `AnalysisError` if the rest of the response [pu] is too large a part of it."""
     if not away <= _AWAY * size:
         raise AnalysisError(
             f"{bench.description.path.name}: excited by a small {bench.inputs[column]} at an ideal bus, its outputs "

@@ -2,8 +2,7 @@
 
 With currents counted into the device, Y = −i/v, a device is passive at a frequency where Y + Yᴴ has no negative
 eigenvalue: it then takes power from every oscillation there and can drive none. A negative index names the frequencies
-at which it could, together with a grid that lets it.
-"""
+at which it could, together with a grid that lets it."""
 
 from dataclasses import dataclass
 

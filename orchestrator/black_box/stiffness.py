@@ -25,8 +25,7 @@ class Stiffness:
         """Least size of one of them in a band, and its frequency [Hz].
 
         ``values``: one of its responses, shape (f,).
-        ``low`` and ``high``: band [Hz].
-        """
+        ``low`` and ``high``: band [Hz]."""
         inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
         if not len(inside):
             raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
@@ -42,8 +41,7 @@ def stiffness(response: FrequencyResponse, voltage: complex, omega_b: float) -> 
 
     ``response``: from the voltage to the current that the device feeds in, both as real and imaginary part [pu].
     ``voltage``: at the operating point [pu].
-    ``omega_b``: 2π times the rated frequency [rad/s].
-    """
+    ``omega_b``: 2π times the rated frequency [rad/s]."""
     Y = response.continuous()
     current = complex(*response.operating_point)
     by_voltage = np.array([[current.real, current.imag], [-current.imag, current.real]])

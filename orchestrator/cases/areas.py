@@ -10,8 +10,7 @@ def areas_of(areas: Mapping[str, Sequence[str]], system: System) -> dict[str, st
     """Area of every component that has one.
 
     ``areas``: patterns by area. A component belongs to the first area with a pattern that fits its own name, or the bus
-    (the scope of the variables) that feeds it.
-    """
+    (the scope of the variables) that feeds it."""
     return {name: found[0] for name, found in _fitting(areas, system).items()}
 
 

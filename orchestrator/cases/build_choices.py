@@ -2,8 +2,7 @@
 
 ``<component>.native`` chooses the kind of FMU, ``<component>.exciter`` and the other `PARTS` what a generator is made
 of, ``units.alpha`` the converters' share of the units. No FMU has such a variable. They are taken out where a layer of
-values is made, and the preparation reads them before it knows the FMUs.
-"""
+values is made, and the preparation reads them before it knows the FMUs."""
 
 import fnmatch
 from collections.abc import Callable, Mapping
@@ -88,8 +87,7 @@ def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> La
     """Part what a source gives into values and choices.
 
     ``given``: By ``component.variable`` or a choice's key.
-    ``has_units``: Whether the case has a table of units; without one, nothing has a share.
-    """
+    ``has_units``: Whether the case has a table of units; without one, nothing has a share."""
     values: dict[str, Value] = {}
     natives: list[NativeChoice] = []
     parts: list[PartChoice] = []

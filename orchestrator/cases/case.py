@@ -71,8 +71,7 @@ class Case(CaseDefinition):
         ``step_size``, ``stop_time``: [s]; the file's where None.
         ``parameters``: Parameter files. Their values have priority over the scenario's, and ``overrides`` have priority
         over theirs.
-        ``dispatch``: What the units fed before an outage that they share; None where each feeds its own ``P_0``.
-        """
+        ``dispatch``: What the units fed before an outage that they share; None where each feeds its own ``P_0``."""
         if (other := self._of_kind(overrides, parameters)) is not self:
             return other.prepare(scenarios, overrides, step_size, stop_time, parameters, dispatch)
         problems = list(self.problems)
@@ -163,8 +162,7 @@ class Case(CaseDefinition):
         """Names in ``[analysis]`` and ``[[plots]]`` that match nothing in any scenario.
 
         Scenarios are assembled one after the other until every name is found. A scenario that cannot be assembled
-        leaves the rest undecided.
-        """
+        leaves the rest undecided."""
         named, problems = Named(), list[Problem]()
         for name in self.scenarios:
             preparer = self._preparer(name, None, ())
@@ -222,8 +220,7 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
     """Read a built-in case by name, or a case file or an SSP by path.
 
     ``trust_fmus``: Whether foreign FMUs may run in this process, where the file says ``isolated = false``; else that is
-    a problem.
-    """
+    a problem."""
     path = Path(name_or_path)
     if str(name_or_path) in built_in_cases():
         path = BUILT_IN / str(name_or_path) / "case.toml"
@@ -276,8 +273,7 @@ def _case(
     """The case, with what its scenarios' parameter files say now and paths that outlast a change of the folder.
 
     ``table``, ``text``, ``path``, ``problems``, ``numbered``, ``trust_fmus``: As in `CaseDefinition`.
-    ``directory``: Folder to which paths in the tables are relative.
-    """
+    ``directory``: Folder to which paths in the tables are relative."""
     files: dict[str, ParameterFile | str] = {}
     for name in (name for scenario in table.scenarios.values() for name in scenario.parameters):
         try:
@@ -320,8 +316,7 @@ def _validate(raw: dict[str, Any], text: str, path: Path) -> tuple[CaseTable, li
 
 def _join_names(raw: dict[str, Any]) -> list[tuple[str, ...]]:
     """Join the parts of unquoted names: TOML makes of `grid.X_L = 0.5` a table `grid` with a key `X_L`. The places of
-    names that are given both ways.
-    """
+    names that are given both ways."""
     scenarios, twice = raw.get("scenarios"), list[tuple[str, ...]]()
     named = scenarios.items() if isinstance(scenarios, dict) else ()
     tables: list[tuple[tuple[str, ...], Any]] = [(("scenarios", name, "set"), table) for name, table in named]

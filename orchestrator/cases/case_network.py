@@ -129,8 +129,7 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
 def _with_switches(network: Network, draft: Draft) -> Network:
     """The network with the faults and switched shunts of all scenarios, which share one FMU.
 
-    Unknown names are the events' matter.
-    """
+    Unknown names are the events' matter."""
     case = draft.given.case
     network = replace(network, injections=network.buses) if draft.given.injections else network
     tables = [*case.events, *(event for scenario in case.scenarios.values() for event in scenario.events or ())]

@@ -1,6 +1,5 @@
 """FMUs of the catalogue's models: described first, so that a whole case can be checked, and built when nothing is
-wrong.
-"""
+wrong."""
 
 from dataclasses import dataclass
 from functools import cache, partial

@@ -19,8 +19,7 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
     """All rows of a file that must have some columns.
 
     Raises an `InputError` if the file or one of the columns is missing, a column stands twice, columns are separated by
-    semicolons or tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows.
-    """
+    semicolons or tabs, the file is not text in UTF-8, or it has more than `MOST_ROWS` rows."""
     path = seen_from_here(path)
     if not path.is_file():
         wanted = f"it should hold the columns {', '.join(columns)}" if columns else "give the path of a .csv"

@@ -56,8 +56,7 @@ _LONG_FAULT = 10.0  # duration of a fault [s] above which one without a unit is 
 
 def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Event, ...]:
     """The events of the scenario, or of the case if the scenario has no events, up to the stop time [s]. Problems are
-    noted.
-    """
+    noted."""
     own = draft.given.scenario.events is not None
     tables = draft.given.scenario.events if draft.given.scenario.events is not None else draft.given.case.events
     if clock is None:
@@ -90,8 +89,7 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
 
 def other_scenarios(draft: Draft, wanted: Collection[str]) -> Iterator[Problem]:
     """What is wrong with events of scenarios that are not asked for: a time after the run, an element that the network
-    of this one lacks. Their units may be others.
-    """
+    of this one lacks. Their units may be others."""
     for name in (name for name in draft.given.case.scenarios if name not in wanted):
         other = replace(draft, given=replace(draft.given, name=name), found=Findings())
         for index, table in enumerate(draft.given.case.scenarios[name].events or ()):

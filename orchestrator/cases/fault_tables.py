@@ -38,8 +38,7 @@ def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, 
 
     ``clock``: Whose communication points the times must be.
     ``stop``: End of the run [s]; a delay that lasts beyond it is noted.
-    ``where``: Place of the table in the file.
-    """
+    ``where``: Place of the table in the file."""
     end = table.end
     if end is not None:
         if end <= table.time:

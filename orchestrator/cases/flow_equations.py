@@ -46,8 +46,7 @@ class FlowEquations:
 
         ``active``: active power that units feed, by bus [pu, 100 MVA].
         ``held``: magnitudes of held voltages, by bus [pu].
-        ``slack_bus``: the bus that balances the power.
-        """
+        ``slack_bus``: the bus that balances the power."""
         position = {bus: k for k, bus in enumerate(buses)}
         triplets: list[tuple[int, int, complex]] = []
         for line in lines:

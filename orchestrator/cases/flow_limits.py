@@ -56,8 +56,7 @@ def solve_with_limits(equations: FlowEquations, limits: Limits) -> tuple[FlowEqu
     """Solve, and let every bus that exceeds a limit feed that limit instead of holding its voltage; the slack bus
     holds its own whatever it takes.
 
-    Returns the equations that were solved at last, their result, and the buses at their limit.
-    """
+    Returns the equations that were solved at last, their result, and the buses at their limit."""
     position = {bus: k for k, bus in enumerate(equations.buses)}
     at_limit: dict[str, float] = {}
     returns = dict.fromkeys(limits, 0)

@@ -1,6 +1,5 @@
 """Newton's method for a power flow, in polar voltages, with a sparse Jacobian and a shortened step where a whole one
-goes too far.
-"""
+goes too far."""
 
 import warnings
 from dataclasses import dataclass, replace
@@ -36,8 +35,7 @@ class NewtonResult:
 
 def solve(equations: FlowEquations) -> NewtonResult:
     """Solve from the DC angles, or else from a flat start, or else step by step from a network without load and
-    generation; the first of these that converges.
-    """
+    generation; the first of these that converges."""
     first = _newton(equations, _start(equations, equations.dc_angles()))
     if first.converged:
         return first
@@ -52,8 +50,7 @@ def solve(equations: FlowEquations) -> NewtonResult:
 
 def grow(equations: FlowEquations) -> tuple[float, NewtonResult | None]:
     """The largest share of all given powers, loads and units alike, with a solution that is reached from no power at
-    all, and this solution; (0, None) where there is none without power.
-    """
+    all, and this solution; (0, None) where there is none without power."""
     found = _newton(scaled(equations, 0.0), _start(equations, np.zeros(len(equations.buses))))
     if not found.converged:
         return 0.0, None

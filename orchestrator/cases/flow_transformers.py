@@ -18,8 +18,7 @@ def legs_of(transformer: ThreeWinding, *, closed: bool = True) -> list[FlowLine]
     """The legs from the buses to the star point.
 
     A leg with both a ratio and a negative reactance is two in series. An open transformer keeps its star point with the
-    first bus, without a current.
-    """
+    first bus, without a current."""
     legs, star = [], f"{transformer.name}.star"
     for k, bus in enumerate(transformer.buses):
         name, X, R = f"{transformer.name}.leg_{k + 1}", transformer.X[k], transformer.R[k]

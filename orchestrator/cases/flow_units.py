@@ -39,8 +39,7 @@ def undecided_units(draft: Draft, units: Mapping[str, str], slack: str) -> Itera
     """Ask about grid-following units that say neither what voltage they hold nor what they feed; the slack's need not.
 
     They do not hold a voltage by themselves. What does, a machine or a grid-forming converter, holds 1 pu if nothing
-    else is said.
-    """
+    else is said."""
     for name, bus in units.items():
         plan = draft.system.components[name]
         follows = any(variable.startswith("pll.") for variable in plan.description.parameters)

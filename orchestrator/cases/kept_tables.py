@@ -1,7 +1,6 @@
 """Tables of pandapower's networks, kept between runs: pandapower takes seconds to import and to solve a network.
 
-The name of a kept file is a hash of the network, of the versions of what made the tables, and of the code that did.
-"""
+The name of a kept file is a hash of the network, of the versions of what made the tables, and of the code that did."""
 
 import hashlib
 import json

@@ -24,8 +24,7 @@ class OptionValues(ParameterFile):
 
 def value_layers(draft: Draft, parameters: Sequence[ParameterFile], overrides: Mapping[str, Value]) -> list[Layer]:
     """All layers, weakest first: files of the scenario, the scenario, files of the command line, values of the command
-    line.
-    """
+    line."""
     has_units = draft.given.case.units is not None
     layers: list[Layer] = []
 

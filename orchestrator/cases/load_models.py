@@ -1,6 +1,5 @@
 """How loads follow voltage and frequency: each load's own keys, then those of ``[network.load_model]``, and parts of
-constant impedance and current that a source tells apart.
-"""
+constant impedance and current that a source tells apart."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -42,8 +41,7 @@ def with_laws(
     Without a key, a load is a constant impedance, and static generation (P < 0) a constant current.
 
     ``own``: the load's own keys, which decide first.
-    ``parts``: what of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest.
-    """
+    ``parts``: what of the load is a constant impedance and a constant current [MW, Mvar]; the keys are for the rest."""
     feeds = load.p_mw < 0
     models = [m for m in (own, table.generation_model if feeds else table.load_model) if m is not None]
     usual: LoadLaw = "current" if feeds else "impedance"

@@ -1,7 +1,6 @@
 """Names in ``[analysis]``, ``[[plots]]`` and ``solver.record`` that match nothing in any scenario of a case.
 
-Components may be absent from some scenarios. A name is therefore wrong only if no scenario has a match for it.
-"""
+Components may be absent from some scenarios. A name is therefore wrong only if no scenario has a match for it."""
 
 import fnmatch
 from collections.abc import Iterator

@@ -28,8 +28,7 @@ def kind_wanted(overrides: Mapping[str, Value] | None, parameters: Sequence[Para
 def of_kind(table: CaseTable, kind: str) -> CaseTable:
     """A case with all models of the catalogue of one kind, and what its table ``[emt]`` or ``[phasor]`` says.
 
-    Signals that both kinds have under different names keep their meaning in plots and patterns.
-    """
+    Signals that both kinds have under different names keep their meaning in plots and patterns."""
     special = table.emt if kind == "emt" else table.phasor
     components = {
         name: c if c.model is None else c.model_copy(update={"model": twin(c.model, kind)})

@@ -37,8 +37,7 @@ def file_name(name: str) -> str:
 
 def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
     """A hint at the name in another kind of model, at names with the same parts (``line_5_4`` for ``line_4_5``), at the
-    same name in a part of the component (``pod_p.K`` for ``K``), or otherwise at similar names.
-    """
+    same name in a part of the component (``pod_p.K`` for ``K``), or otherwise at similar names."""
     names = list(known)
     head, dot, last = wanted.rpartition(".")
     twin = f"{head}{dot}{TWINS.get(last, last)}"

@@ -2,8 +2,7 @@
 
 A bus with two branches and nothing else carries one current. Both branches, without charging, are then exactly one
 branch with the sum of their impedances. A bus with three branches and nothing else is the star point of a three-winding
-transformer, which is an element of its own.
-"""
+transformer, which is an element of its own."""
 
 from fmus.grid.network import SMALLEST_REACTANCE, Line, ThreeWinding
 
@@ -11,8 +10,7 @@ from fmus.grid.network import SMALLEST_REACTANCE, Line, ThreeWinding
 def without_negative_reactances(lines: list[Line], kept: set[str]) -> tuple[list[Line], set[str]]:
     """The lines with each negative reactance joined to the line in series, and the buses that are no more.
 
-    A negative reactance that nothing can be joined with stays, for the network to refuse by name.
-    """
+    A negative reactance that nothing can be joined with stays, for the network to refuse by name."""
     merged: set[str] = set()
     for line in [line for line in lines if line.X < SMALLEST_REACTANCE]:
         for bus in (line.from_bus, line.to_bus):
@@ -49,8 +47,7 @@ def _joined_legs(line: Line, other: Line) -> Line | None:
 
 def without_star_points(lines: list[Line], kept: set[str]) -> tuple[list[Line], list[ThreeWinding], set[str]]:
     """The lines without those of negative reactance at star points, the transformers in their place, and the buses that
-    are no more.
-    """
+    are no more."""
     transformers, gone = [], set[str]()
     for line in [line for line in lines if line.X < SMALLEST_REACTANCE]:
         for star in {line.from_bus, line.to_bus} - kept - gone:

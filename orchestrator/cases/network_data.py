@@ -55,8 +55,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
     """Buses, lines, loads and shunts of a network table, its files and its source included.
 
     Raises an `InputError` if a file is missing, lacks a column, holds something that is not a number, or a source holds
-    something that the grid model does not have.
-    """
+    something that the grid model does not have."""
     found = _source(table, directory)
     source = found.network
     lines = [Line(n, t.from_bus, t.to_bus, t.X, t.R, t.B, t.tap, t.shift, t.X_C) for n, t in table.lines.items()]

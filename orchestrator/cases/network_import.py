@@ -20,8 +20,7 @@ _NO_LIMIT = 1e4
 @dataclass(frozen=True, slots=True)
 class Generation:
     """Total power [MW] and common voltage [pu] of the generators at a bus, a suitable rating [MVA], and their least and
-    most reactive power together [Mvar], infinite where the source has no limit.
-    """
+    most reactive power together [Mvar], infinite where the source has no limit."""
 
     label: str
     p_mw: float
@@ -45,8 +44,7 @@ class _Member:
 @dataclass(frozen=True)
 class ImportedNetwork:
     """Elements of a network, the generation at each bus, and the parts of constant impedance and current of loads [MW,
-    Mvar], by the load's name. By bus, as the source has them: loads below zero [MW] and capacitors [Mvar].
-    """
+    Mvar], by the load's name. By bus, as the source has them: loads below zero [MW] and capacitors [Mvar]."""
 
     buses: tuple[str, ...] = ()
     lines: tuple[Line, ...] = ()
@@ -110,8 +108,7 @@ def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], di
     source].
 
     A π section has one capacitance for both ends; a conductance, a difference between the ends and an inductive
-    part (magnetisation) go to the buses.
-    """
+    part (magnetisation) go to the buses."""
     lines: list[Line] = []
     to_earth: dict[int, complex] = {}
     seen: Counter[str] = Counter()
@@ -158,8 +155,7 @@ def _generators(source: SourceTables, labels: dict[int, str]) -> dict[int, list[
 
 def _loads(source: SourceTables, rows: dict[int, Matrix], at_bus: dict[int, list[_Member]]) -> list[Load]:
     """Loads; a negative one is static generation. At a generator's bus it is added to the generators there, unless it
-    has parts that follow the voltage.
-    """
+    has parts that follow the voltage."""
     loads = []
     for number, row in rows.items():
         label, p, q = source.labels[number], float(row[2]), float(row[3])

@@ -1,8 +1,7 @@
 """Networks of other programs: MATPOWER's case files, and pandapower's networks, both as MATPOWER's tables.
 
 pandapower makes these tables itself for its power flow: switches, three-winding transformers and
-everything out of service are dealt with there.
-"""
+everything out of service are dealt with there."""
 
 import logging
 import re

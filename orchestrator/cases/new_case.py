@@ -36,8 +36,7 @@ class WantedConverter:
 @dataclass(frozen=True)
 class WantedCase:
     """What `gfor new` is asked for: a vendor's ``device`` stands in place of our converter, ``models`` (emt, phasor) is
-    chosen where None, ``command`` is as it was typed.
-    """
+    chosen where None, ``command`` is as it was typed."""
 
     files: tuple[Path, ...]
     out: Path
@@ -67,8 +66,7 @@ class NewCase:
 def read_converter(text: str) -> WantedConverter:
     """Read ``bus 9, 300 MVA, 200 MW, less sg3``, in any order.
 
-    Raises `InputError` with what is missing, given twice or not understood.
-    """
+    Raises `InputError` with what is missing, given twice or not understood."""
     how = "write it like 'bus 9, 300 MVA, 200 MW, less sg3' (the last part may be left out)"
     found: dict[str, str] = {}
     for part in (part.strip() for part in text.split(",")):
@@ -97,8 +95,7 @@ def read_converter(text: str) -> WantedConverter:
 def write_case(wanted: WantedCase) -> NewCase:
     """Compose a case, with the questions about its data as comments at their lines.
 
-    Raises `InputError` if a file, a bus or a machine cannot be used; as a case of these files would be refused.
-    """
+    Raises `InputError` if a file, a bus or a machine cannot be used; as a case of these files would be refused."""
     sources = sources_of(wanted.files)
     base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
     place = None if wanted.converter is None else _placed(wanted.converter, base)
@@ -361,8 +358,7 @@ def _stray_capacitance(base: PreparedScenario) -> tuple[float, str]:
     """Capacitance [pu, 100 MVA] that EMT models need at buses without one, and why.
 
     Unit and bus swing at ω_b/√(X''·B), and exchange values once in a step H: H·ω_b/√(X''·B) ≤ 1 for the largest unit at
-    a bus without capacitance.
-    """
+    a bus without capacitance."""
     network, plans = base.network, base.system.components
     if network is None:
         return 0.05, ""

@@ -28,8 +28,7 @@ def read_parameter_file(path: Path) -> ParameterFile:
     """Read a file whose one table ``[set]`` holds values by ``component.variable``.
 
     Raises an `InputError` if there is no such file, it is not TOML, or it has no table ``[set]``.
-    Raises a `CaseError` with every key and value that is not valid.
-    """
+    Raises a `CaseError` with every key and value that is not valid."""
     text, raw = read_toml(path, "the parameter file", "`gfor design` writes one")
     table = raw.get(_TABLE)
     if not isinstance(table, dict) or not table:

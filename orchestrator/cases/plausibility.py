@@ -1,8 +1,7 @@
 """Impossible data are refused, and most unusual data are questioned; both with their place in the file.
 
 A question is a warning: the case runs. It is answered by the key ``meant`` of the case, a list of names
-``component.variable`` (patterns such as ``sg*.machine.H`` fit several).
-"""
+``component.variable`` (patterns such as ``sg*.machine.H`` fit several)."""
 
 import fnmatch
 import math
@@ -89,8 +88,7 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
 
 def question_loading(draft: Draft) -> None:
     """Ask about converters whose operating point exceeds their rating. The operating point is the power flow's if there
-    is one.
-    """
+    is one."""
     asked = {question.place for question in draft.found.questions}  # one question about a rating is enough
     question(draft, (d for d in _overloaded(draft) if d.place not in asked))
 

@@ -1,7 +1,6 @@
 """Usual ranges of a network's data; those of components are declared by their models.
 
-The ranges are wide: they find a wrong unit (ms for s, kVA for MVA) or a wrong base, and do not judge data.
-"""
+The ranges are wide: they find a wrong unit (ms for s, kVA for MVA) or a wrong base, and do not judge data."""
 
 from fmus.toolchain.variables import Usual
 

@@ -19,8 +19,7 @@ _TOLERANCE = 1e-9  # largest power mismatch of a bus that is accepted [pu, 100 M
 @dataclass(frozen=True, slots=True)
 class FlowUnit:
     """A unit that feeds P_0 [pu, S_n] and holds v_0 [pu] together with the others at its bus; or, where Q_0 [pu, S_n]
-    is given, feeds that as well and holds nothing. An unconnected unit does neither.
-    """
+    is given, feeds that as well and holds nothing. An unconnected unit does neither."""
 
     name: str
     bus: str
@@ -70,8 +69,7 @@ def solve_power_flow(
     ``keep_limits``: whether a bus gives its voltage up at a limit; otherwise the limits that are exceeded are only
     named.
     Raises an `InputError` if the units at a bus disagree about its voltage, no unit is connected at the slack bus,
-    buses have no way to it, or no solution is found.
-    """
+    buses have no way to it, or no solution is found."""
     at_bus: dict[str, list[FlowUnit]] = {}
     fixed: dict[str, complex] = {}
     for unit in (unit for unit in units if unit.connected):

@@ -16,8 +16,7 @@ def references_of(draft: Draft, imperfections: Mapping[str, float | bool]) -> di
     command line or one of its parameter files sets a value that is no condition.
 
     A condition is compared in the variable's own unit, with the value that is set, else with the default. A name that
-    nothing has is noted as a problem.
-    """
+    nothing has is noted as a problem."""
     table = draft.given.case.reference
     if table is None:
         return {}

@@ -15,8 +15,7 @@ Groups = tuple[tuple[str, ...], ...]
 
 def groups_of(solver: SolverTable, grid: str | None, names: Collection[str], removed: Collection[str]) -> Groups:
     """The groups of the file. By default the devices step first and then the grid, or every component is a group of
-    its own.
-    """
+    its own."""
     if solver.groups is not None:
         groups = [tuple(name for name in group if name not in removed) for group in solver.groups]
         return tuple(group for group in groups if group)

@@ -64,8 +64,7 @@ class SolverTable(Table):
 
 class ComponentTable(Table):
     """An FMU file or a vendor's DLL, behind a binding or not, or a model of the catalogue, with its values; ``vendor``
-    is whose make it is.
-    """
+    is whose make it is."""
 
     model: str | None = None
     fmu: str | None = None
@@ -90,8 +89,7 @@ class ComponentTable(Table):
 
 class PowerFlowTable(Table):
     """Which component is the grid, which unit or bus balances it, whether limits of reactive power are kept (None names
-    those that are exceeded), and how units share what an outage takes away.
-    """
+    those that are exceeded), and how units share what an outage takes away."""
 
     grid: str
     slack: Bus | None = None
@@ -188,8 +186,7 @@ class NetworkTable(Table):
 class UnitsTable(Table):
     """Many units, each a generator and a converter that share its rating and power.
 
-    They come from a file; without one, every generator bus of the network's source is a unit.
-    """
+    They come from a file; without one, every generator bus of the network's source is a unit."""
 
     file: str | None = None
     dyr: str | None = None

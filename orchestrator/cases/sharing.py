@@ -100,8 +100,7 @@ def droop_gain(plan: ComponentPlan) -> float:
 def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, float]:
     """Least and most active power from which a unit starts [pu, S_n]; infinite where its model has no limit.
 
-    ``reactive``: Reactive power that it feeds [pu, S_n]: the current that is left is active.
-    """
+    ``reactive``: Reactive power that it feeds [pu, S_n]: the current that is left is active."""
     low, high = [-math.inf], [math.inf]
 
     def turbine(least: str, most: str, factor: float = 1.0, idle: float = 0.0) -> None:
@@ -132,8 +131,7 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
 def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
     """Power of each unit [MW] after a change of the units' whole power; a unit at its limit leaves the rest to others.
 
-    ``change``: What they have to feed beside what they fed [MW].
-    """
+    ``change``: What they have to feed beside what they fed [MW]."""
     found = {one.name: one.before for one in reserves}
     free = [one for one in reserves if one.gain > 0]
     rest = change
@@ -182,8 +180,7 @@ def shared_flow(
     ``units``, ``plans``: As they are after the outage, and their values.
     ``slack_bus``: As in `orchestrator.cases.power_flow.solve_power_flow`.
     ``dispatch``: What they fed before.
-    ``active``: Least and most active power that data give units [MW], by name.
-    """
+    ``active``: Least and most active power that data give units [MW], by name."""
     left = [replace(one, P_0=dispatch.powers[one.name].real) if one.connected else one for one in units]
     if dispatch.rule is SharingRule.SLACK:
         return solve(left)

@@ -3,8 +3,7 @@
 The convention: an initial three-phase short circuit from 1 pu everywhere (c = 1). Machines are R_s + jX''_d (jX'_d of
 the classical one) with their own transformer, external grids their impedance, lines and transformers have their ratio.
 Loads, shunts and charging are left out. A converter feeds a declared current, by default none, which adds to the
-others' without regard to its angle, as converters do in IEC 60909-0:2016.
-"""
+others' without regard to its angle, as converters do in IEC 60909-0:2016."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -32,8 +31,7 @@ _FARTHEST = 1e5  # largest factor on the impedances at a bus, and the inverse of
 class BusStrength:
     """A bus: its short-circuit power [MVA], X/R of its impedance, and the converters there.
 
-    ``rating_mva`` is that of the converters, or the one that was asked for; None without either.
-    """
+    ``rating_mva`` is that of the converters, or the one that was asked for; None without either."""
 
     bus: str
     s_sc_mva: float
@@ -53,8 +51,7 @@ class BusStrength:
 @dataclass(frozen=True)
 class ShortCircuit:
     """A network as a short circuit sees it: ``sources`` are admittances [pu, 100 MVA] at buses, ``converters`` buses
-    and ratings [MVA].
-    """
+    and ratings [MVA]."""
 
     buses: tuple[str, ...]
     lines: tuple[FlowLine, ...]

@@ -45,8 +45,7 @@ def start_from_power_flow(
     ``keep_limits``: whether a bus gives its voltage up at a limit.
     ``returning``: units that an event connects; a limit of theirs must stay.
     ``dispatch``: what the units fed before an outage that they share; None where each feeds its own ``P_0``.
-    ``active``: least and most active power of units that share [MW], beside their models' own limits.
-    """
+    ``active``: least and most active power of units that share [MW], beside their models' own limits."""
     feeding = [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()]
 
     def solve(fed: Sequence[FlowUnit]) -> PowerFlow:

@@ -15,8 +15,7 @@ class UnitRow:
     """One generating unit.
 
     ``q_min_mvar``, ``q_max_mvar``, ``p_min_mw``, ``p_max_mw``: Limits of reactive and of active power; infinite
-    without.
-    """
+    without."""
 
     label: str
     bus: str

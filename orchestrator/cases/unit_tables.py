@@ -1,6 +1,5 @@
 """Generating units of a case, from rows of a file or generators of the network's source. A generator and a converter
-share each unit.
-"""
+share each unit."""
 
 import re
 from collections import Counter
@@ -37,8 +36,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     """Generators ``sg<label>`` with the share 1 − α and converters ``gfor<label>`` with the share α of each unit. A
     share of 0 gives no component.
 
-    All names that any share can give are added to the draft's known names.
-    """
+    All names that any share can give are added to the draft's known names."""
     table = draft.given.case.units
     if table is None or (draft.found.network_failed and table.file is None):
         return {}
@@ -233,8 +231,7 @@ def _parts_of(table: UnitsTable) -> dict[str, str]:
 def _alphas(draft: Draft, table: UnitsTable, rows: Sequence[UnitRow]) -> dict[str, float]:
     """Share of every unit: from the strongest layer that gives one, otherwise from the row, otherwise from the table.
 
-    Within a layer, a choice for this unit goes before the one for all.
-    """
+    Within a layer, a choice for this unit goes before the one for all."""
     alphas = {row.label: table.alpha if row.alpha is None else row.alpha for row in rows}
     converters = {row.label: row.converter for row in rows if row.converter is not None}
     for choice in (choice for layer in draft.given.layers for choice in layer.shares):

@@ -19,8 +19,7 @@ def use_in_case(
 
     ``component``: name of the component; None for the component that has this file.
     ``step_size``: communication step [s]; the case's where None.
-    ``scenario``: name of the scenario; None for the first one with the component.
-    """
+    ``scenario``: name of the scenario; None for the first one with the component."""
     loaded = load_case(case, trust_fmus=True)  # of which nothing runs here
     name = _component(loaded, component, fmu)
     table = loaded.table.components[name]

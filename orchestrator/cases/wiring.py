@@ -31,8 +31,7 @@ def _taken_by_port(draft: Draft) -> dict[str, list[str]]:
 
 def _check_forms(draft: Draft, names: list[str]) -> None:
     """Refuse EMT models in a network of phasors, and question phasor models in a network of the other kind; once for
-    each model, whatever the number of its components.
-    """
+    each model, whatever the number of its components."""
     if draft.found.network_failed or draft.network is None or draft.grid not in draft.system.components:
         return
     taken = draft.system.components[draft.grid].description.inputs

@@ -29,8 +29,7 @@ _HEAD = """\
 
 def write_case(request: CertificationRequest, switches: Mapping[str, bool], folder: Path) -> Case:
     """Write ``case.toml`` into a folder, and copy the FMU and its binding beside it. The folder then needs no other
-    files. ``switches`` are what ``--pod`` sets in the converter.
-    """
+    files. ``switches`` are what ``--pod`` sets in the converter."""
     request.check()
     lay_files(request, folder)
     tables = _tables(request)

@@ -63,8 +63,7 @@ def is_judged(frequency_hz: float) -> bool:
 
 def is_near(frequency_hz: float) -> bool:
     """Whether a judged mode may have this frequency without the converter, or a mode of this frequency may become a
-    judged one.
-    """
+    judged one."""
     return PAIRED[0] <= frequency_hz <= PAIRED[1]
 
 
@@ -78,8 +77,7 @@ def judged_modes(matched: Iterable[ModeVerdict]) -> list[ModeVerdict]:
     """Those of the judged range, least damped first.
 
     A mode below 5 % is accepted only where the same mode had less than 5 % without the converter already: the norm
-    asks that the converter introduces none and takes none below.
-    """
+    asks that the converter introduces none and takes none below."""
     return sorted((m for m in matched if is_judged(m.frequency_hz)), key=lambda v: v.damping_percent)
 
 
@@ -105,8 +103,7 @@ def matched_modes(having: ModeSet, lacking: ModeSet, components: list[str] | Non
 
 def _comparable(having: ModeSet, lacking: ModeSet) -> NDArray[np.bool_]:
     """Mask of the pairs that may be one mode: a judged mode and a mode that is not judged must have near
-    frequencies.
-    """
+    frequencies."""
     judged, near = ([[f(hz) for hz in s.frequencies] for s in (having, lacking)] for f in (is_judged, is_near))
     forbidden = np.logical_and.outer(judged[0], np.logical_not(near[1]))
     forbidden |= np.logical_and.outer(np.logical_not(near[0]), judged[1])
@@ -116,8 +113,7 @@ def _comparable(having: ModeSet, lacking: ModeSet) -> NDArray[np.bool_]:
 def _partners(alike: NDArray[np.float64]) -> dict[int, int]:
     """Column for each row. Each column is used once, the sum of the similarities is largest, and pairs below the
     threshold are left out. If each row took its largest similarity, one mode without the converter could excuse several
-    modes with it.
-    """
+    modes with it."""
     from scipy.optimize import linear_sum_assignment  # noqa: PLC0415 - half a second to import
 
     enough = np.where(alike >= THRESHOLD, alike, 0.0)
@@ -146,8 +142,7 @@ def stability_fault(
     without: Mapping[str, Any] | None = None,
 ) -> str | None:
     """The fault of a converter that makes the system unstable at any frequency, or whose stability is not known; None
-    without such a fault. A system that was unstable without the converter excuses it.
-    """
+    without such a fault. A system that was unstable without the converter excuses it."""
     if not np.isfinite(growth_with):
         return "the largest growth rate with the converter is not a number, so that nothing shows that it is stable"
     if growth_with > ZERO >= growth_without:

@@ -33,8 +33,7 @@ def devices_of(
     of all.
 
     Raises `InputError` if two devices have one name, a binding does not say whose it is, a device has two, or a value
-    is of a device that is not there.
-    """
+    is of a device that is not there."""
     named = [_split(text) for text in files]
     names = _names(named)
     own = _bindings(names, bindings)

@@ -20,8 +20,7 @@ def environment() -> dict[str, str]:
 
 def commit() -> str:
     """The commit of the checkout that this program runs from, with a note on uncommitted changes; otherwise a note that
-    there is no checkout.
-    """
+    there is no checkout."""
     if not (_ROOT / ".git").exists():
         return "none: installed from a package"
     try:

@@ -85,15 +85,13 @@ def read_record(file: Path) -> Any:
 
 def seal_of(content: Mapping[str, Any]) -> str:
     """SHA-256 of the contents of a certificate's JSON. It shows accidental changes only, because anybody can compute
-    it.
-    """
+    it."""
     return _hash_without(content, "seal")
 
 
 def figures_hash(content: Mapping[str, Any]) -> str:
     """SHA-256 of the contents without the hashes of files. The page states this hash, which ties the page to these
-    figures.
-    """
+    figures."""
     return _hash_without(content, "seal", "files")
 
 

@@ -129,8 +129,7 @@ def judge(
 ) -> PointVerdict:
     """All criteria at one reactance, from the system with and without the converter.
 
-    ``known``: Which mode is which without the converter; None where the modes' shapes are to tell it.
-    """
+    ``known``: Which mode is which without the converter; None where the modes' shapes are to tell it."""
     if lacking.failure:
         unknown = f"the study failed without the converter: {lacking.failure}"
         return PointVerdict(having.X_L, (), None, None, (), unknown=unknown)

@@ -40,8 +40,7 @@ def margin_text(margin: float | None, limit: float | None = None, value: float |
     """A margin in percent of its limit; a dash where there is none.
 
     Beyond `MOST` the limit is next to nothing, and the distance from it says more: in the quantity's own unit where
-    that is given.
-    """
+    that is given."""
     if margin is None:
         return "–"
     if abs(margin) > MOST:

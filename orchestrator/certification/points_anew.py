@@ -83,8 +83,7 @@ def _compare_point(
 
 def _differ_figures(point: dict[str, Any], scenario: str, again: PointResult, tolerance: float) -> Iterator[str]:
     """Differences in stability at all frequencies, in the power fed in, and in the model that replaces the
-    converter.
-    """
+    converter."""
     stated, growth = point["growth"][scenario], again.growth
     known = np.nan if stated is None else float(stated)
     if not (np.isnan(known) and np.isnan(growth)) and not abs(known - growth) <= tolerance * max(1.0, abs(growth)):

@@ -1,6 +1,5 @@
 """The certificate anew from what its folder keeps, by the judgement that made it: from the FMU, the case file, the
-responses and, of a damping test, the eigenvalues.
-"""
+responses and, of a damping test, the eigenvalues."""
 
 import json
 import tomllib
@@ -127,8 +126,7 @@ def _verdict(point: dict[str, Any], having: PointResult, lacking: PointResult, p
     """Judged again; why it was not accepted or not judged is told in the words of then.
 
     Modes are matched by shapes, which are not kept: which mode was which without the converter is taken as stated. A
-    point without a whole response failed or was not judged, and the reasons are taken as stated too.
-    """
+    point without a whole response failed or was not judged, and the reasons are taken as stated too."""
     again = judge(having, lacking, pod, event, [_matched(mode) for mode in (*point["modes"], *point["modes_beside"])])
     if point["time_without"] is None:
         again = replace(again, base_time=None)

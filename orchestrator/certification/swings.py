@@ -2,8 +2,7 @@
 
 Maxima P1, P2, … of the signal are joined by straight lines; ΔPkMk is the vertical distance from the minimum Mk between
 Pk and Pk+1 to the line through these two. Accepted is ΔP5M5 < 0.25·ΔP1M1. For a single mode that asks for 5.5 %
-of damping, since e^(−2π·4·ζ/√(1 − ζ²)) = 0.25 at ζ = 0.0551.
-"""
+of damping, since e^(−2π·4·ζ/√(1 − ζ²)) = 0.25 at ζ = 0.0551."""
 
 from dataclasses import dataclass
 
@@ -70,8 +69,7 @@ def slow_part(times: Numbers, signal: Numbers) -> Numbers:
     """The signal without parts faster than `FASTEST`, such as the ripple of a network resonance.
 
     A Butterworth filter of order 4 runs over the signal forwards and backwards. It causes no delay, and the judged
-    modes keep their size to 0.1 %.
-    """
+    modes keep their size to 0.1 %."""
     if not np.isfinite(signal).all():
         return signal
     from scipy.signal import butter, sosfiltfilt  # noqa: PLC0415 - a second to import
@@ -83,8 +81,7 @@ def slow_part(times: Numbers, signal: Numbers) -> Numbers:
 def extrema(times: Numbers, signal: Numbers, start: float, resolution: float = RESOLUTION) -> list[Extremum]:
     """Turning points after a time, maxima and minima in turn.
 
-    ``resolution``: Smallest movement that counts, as a part of the range of the signal after the event.
-    """
+    ``resolution``: Smallest movement that counts, as a part of the range of the signal after the event."""
     after = times >= start - 1e-9
     t, y = times[after], signal[after]
     least = resolution * float(np.ptp(y))

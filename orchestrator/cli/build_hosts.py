@@ -15,8 +15,7 @@ class Host:
     """What to build for a host.
 
     ``why``: the reason for the kind, the version and the port.
-    ``source``: where that is to be read; "here" where our own tests run such FMUs in it.
-    """
+    ``source``: where that is to be read; "here" where our own tests run such FMUs in it."""
 
     native: bool
     fmi: FmiVersion

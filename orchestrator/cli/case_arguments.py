@@ -23,8 +23,7 @@ def add_case_arguments(
     parser: argparse.ArgumentParser, *, optional: bool = False, schedule: bool = False, several: bool = True
 ) -> None:
     """The case, which may be left out where ``optional``, ``several`` scenarios or one, what is changed; its schedule
-    where asked for.
-    """
+    where asked for."""
     parser.add_argument("case", metavar="CASE", nargs="?" if optional else None, help="a built-in case (two_area), or "
                         "the path of a case file or an .ssp")  # fmt: skip
     text = f"only this scenario{' (repeatable)' if several else ''}"
@@ -78,8 +77,7 @@ def chosen(options: argparse.Namespace) -> list[Scenario]:
 def values_set(options: argparse.Namespace) -> dict[str, Value]:
     """The values of ``--set`` and ``--native``; of a name that is given twice, the last value, at its last place.
 
-    Patterns make the order matter: a value overrides those before it.
-    """
+    Patterns make the order matter: a value overrides those before it."""
     values: dict[str, Value] = {}
     for key, value in options.set:
         values.pop(key, None)

@@ -77,8 +77,7 @@ def _tested(
 ) -> MatrixCell:
     """One device under one code; what cannot be tested says why, and the others go on.
 
-    The acceptance tests of a device are run for its first certificate; ``options`` of the device remember them.
-    """
+    The acceptance tests of a device are run for its first certificate; ``options`` of the device remember them."""
     cell = MatrixCell(device.name, key, place)
     with failure_kept(cell):
         own = folder / place

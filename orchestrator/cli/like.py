@@ -34,8 +34,7 @@ def rules_of(options: argparse.Namespace) -> MasterRules | None:
 def run(scenarios: Sequence[PreparedScenario], rules: MasterRules, folder: Path, turns: str | None) -> int:
     """Run scenarios as another master would; their trajectories are all that is written.
 
-    ``turns`` are components with commas between them, in the order in which they step; the master's own where None.
-    """
+    ``turns`` are components with commas between them, in the order in which they step; the master's own where None."""
     order = turns.split(",") if turns else None
     run_id = new_run_id()
     for prepared in scenarios:

@@ -44,8 +44,7 @@ def with_request(options: argparse.Namespace) -> argparse.Namespace:
     """The options of a new run, or those of the run that is to be resumed, and its id as ``run``.
 
     Raises `InputError` if there is no case, nothing to resume, or something is asked of a resumed run that it did not
-    have.
-    """
+    have."""
     if options.resume is None:
         if options.case is None:
             raise InputError("the case is missing: gfor run CASE, such as gfor run two_area")

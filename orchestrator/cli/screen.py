@@ -68,8 +68,7 @@ def _parts(summary: Summary) -> Iterator[RenderableType]:
 def _exit_code(found: Screening, stable: bool | None, *, fail_unstable: bool) -> int:
     """1 if nothing has modes, after an internal error, and where ``--fail-unstable`` asks for it; of a part likewise.
 
-    A part without a stretch has nothing that could fail.
-    """
+    A part without a stretch has nothing that could fail."""
     counts, items = found.summary.counts, found.result.items
     failed = bool(items) and not counts[Status.COMPUTED]
     return int(failed or bool(counts[Status.INTERNAL]) or (fail_unstable and not stable))

@@ -2,8 +2,7 @@
 
 The copies are made before an FMU is loaded or anything is drawn, so that nothing is imported or prepared twice, and no
 thread of ours is lost in them. A scenario's files are written by its copy; its result comes back through a pipe. Linux
-alone copies a process safely; elsewhere scenarios run one after the other.
-"""
+alone copies a process safely; elsewhere scenarios run one after the other."""
 
 import os
 import signal
@@ -73,8 +72,7 @@ class SideBySide:
 
         After one that failed no other is begun. Ctrl-C and SIGTERM end all that are under way, at their next step.
 
-        ``report``: told the index, and how many of its steps are done of how many.
-        """
+        ``report``: told the index, and how many of its steps are done of how many."""
         waiting, idle = list(range(count)), [*self._copies]
         under_way: dict[Connection, int] = {}
         done: dict[int, Outcome] = {}
@@ -152,8 +150,7 @@ def _serve(
 ) -> None:
     """In a copy: do what is asked for until the pipe ends, or the original does; never return.
 
-    Ctrl-C of a terminal, which reaches every process, is the original's to pass on, as SIGUSR1.
-    """
+    Ctrl-C of a terminal, which reaches every process, is the original's to pass on, as SIGUSR1."""
     code = 1
     try:
         die_with_parent(signal.SIGKILL)

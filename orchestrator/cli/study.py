@@ -41,8 +41,7 @@ def working_in(
 ) -> Iterator[tuple[Plan, Callable[..., Shown]]]:
     """Plan, make the folder and keep other commands from it; after an interrupt say how the study goes on.
 
-    Gives the plan and what computes it.
-    """
+    Gives the plan and what computes it."""
     executor, progress = choose_executor(options, study.imports), Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on):
         planned = plan()

@@ -74,8 +74,7 @@ def print_sources(console: Console, results: Sequence[ModesResult]) -> None:
 
 def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> None:
     """Before anything is computed: what the network's files come to, and on standard error, once, questions about data
-    that are most unusual.
-    """
+    that are most unusual."""
     from orchestrator.cases.facts import facts_of  # noqa: PLC0415 - imports the reading of cases
 
     facts = None if as_json else facts_of(scenarios[0])

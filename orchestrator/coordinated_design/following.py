@@ -16,8 +16,7 @@ _OPEN = 1e-9  # part of the gains with which the loops are as good as open, and 
 def followed(loops: OpenLoops, setting: Setting, value: complex) -> complex:
     """Where a mode of the open loops [rad/s] is with a setting.
 
-    Raises `AnalysisError` if it meets another one on its way.
-    """
+    Raises `AnalysisError` if it meets another one on its way."""
 
     def at(part: float) -> LinearModel:
         scaled = {place: replace(own, gain=part * own.gain) for place, own in setting.items()}
@@ -32,8 +31,7 @@ def with_followed_names(
 ) -> list[PointModes]:
     """The points with a setting, whose names are borne by the modes that bear them without it.
 
-    A name that cannot be followed is borne by none there, whatever its mode's shape.
-    """
+    A name that cannot be followed is borne by none there, whatever its mode's shape."""
     found = []
     for one, other in zip(before, after, strict=True):
         named = dict(other.named)

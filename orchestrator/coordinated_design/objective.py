@@ -62,8 +62,7 @@ def floors_of(values: Iterable[complex], least: float) -> dict[int, float]:
     """The damping ratio, by band, that other modes may not fall below.
 
     ``values``: the other modes without the controllers [rad/s], one of each pair.
-    ``least``: the bound; a band that has a mode below it keeps what it has, less `ALLOWED`.
-    """
+    ``least``: the bound; a band that has a mode below it keeps what it has, less `ALLOWED`."""
     floors = dict.fromkeys(range(len(BANDS_HZ) + 1), least)
     for value in values:
         band = band_of(value)
@@ -76,8 +75,7 @@ def split(values: Complex, targets: Iterable[int] | None, floors: Mapping[int, f
 
     ``values``: all eigenvalues [rad/s].
     ``targets``: places of the modes that the design damps; None for all electromechanical ones.
-    ``floors``: as `floors_of` gives them.
-    """
+    ``floors``: as `floors_of` gives them."""
     chosen = None if targets is None else set(targets)
     found = []
     for place in np.flatnonzero(oscillations(values)).tolist():
@@ -113,8 +111,7 @@ _ROUNDING = 1e-7
 def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, point: int = 0) -> Worth:
     """The worth of a spectrum.
 
-    ``growing`` and ``growing_before``: as `growth` gives them, with the setting and without it [1/s].
-    """
+    ``growing`` and ``growing_before``: as `growth` gives them, with the setting and without it [1/s]."""
     damped = [mode for mode in watched if mode.floor is None]
     worst = min((mode.damping for mode in damped), default=1.0)
     rest = min((mode.damping for mode in damped if not mode.hardly_moved), default=worst)
@@ -127,8 +124,7 @@ class RatedPoint:
     """One operating point of the search: its loops, and what its modes may not fall below.
 
     ``largest``: the largest gain of every loop that may be closed [pu]; None where all modes count, also those that no
-    loop moves.
-    """
+    loop moves."""
 
     def __init__(self, number: int, loops: OpenLoops, aim: Aim, largest: Mapping[PodPlace, float] | None) -> None:
         self.number, self.loops, self._aim = number, loops, aim

@@ -20,8 +20,7 @@ def search_settings(
 
     The search is that of a design over operating points, and finds the same.
 
-    ``frequency``: the mode's [rad/s], to which the centres of the lead/lag relate.
-    """
+    ``frequency``: the mode's [rad/s], to which the centres of the lead/lag relate."""
     group = PodGroup(request.controller, target.components, target.key, target.stages)
     loops = measure(*loop.opened(), group.places)
     space = SettingSpace([group], request.gain_bounds, frequency)

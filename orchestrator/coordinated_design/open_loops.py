@@ -1,8 +1,7 @@
 """The linear system of one operating point with its POD loops open, and closed with any setting.
 
 Each loop is measured on the running FMU: from where its signal acts to its signal with unit gain and without lead/lag.
-Washout, filter and sign are the FMU's own. Only the gain and the lead/lag are put in between here.
-"""
+Washout, filter and sign are the FMU's own. Only the gain and the lead/lag are put in between here."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -80,16 +79,14 @@ class OpenLoops:
         """The system of full matrices, reduced where it is large.
 
         ``A`` and ``U`` and ``V``: shapes (n, n), (n, m), (m, n).
-        ``D``: shape (m, m); none where no loop's signal reaches another, or itself, without a state between.
-        """
+        ``D``: shape (m, m); none where no loop's signal reaches another, or itself, without a state between."""
         whole = cls(A, U, V, np.zeros((len(places), len(places))) if D is None else D, tuple(places), tuple(names))
         return (_reduced(whole) if len(A) > REDUCED else None) or whole
 
     def closed(self, setting: Setting) -> Vector:
         """The matrix of the system with some loops closed.
 
-        Returns shape (r + k, r + k): behind the states x stand those of the lead/lag stages, loop by loop.
-        """
+        Returns shape (r + k, r + k): behind the states x stand those of the lead/lag stages, loop by loop."""
         used = [k for k, place in enumerate(self.places) if place in setting and setting[place].gain]
         parts = [setting[self.places[k]] for k in used]
         stages = [part.filters.N_S if part.filters.T_S2 else 0 for part in parts]
@@ -136,8 +133,7 @@ class OpenLoops:
     def whole(self, vector: Complex, *, left: bool = False) -> Complex:
         """An eigenvector of a closed loop in all n states and the stages.
 
-        ``vector``: as `solve` gives it, shape (r + k,).
-        """
+        ``vector``: as `solve` gives it, shape (r + k,)."""
         if self.right is None or self.left is None:
             return vector
         r = len(self.A)
@@ -176,8 +172,7 @@ def _reduced(whole: OpenLoops) -> OpenLoops | None:
 def _seen_by(A: Matrix, V: Matrix) -> NDArray[np.bool_]:
     """Mask of the states that the loops' signals depend on, if only by way of other states.
 
-    The others, such as those of controllers that are off, have eigenvalues of their own that no loop moves.
-    """
+    The others, such as those of controllers that are off, have eigenvalues of their own that no loop moves."""
     seen: NDArray[np.bool_] = np.asarray((V != 0).any(axis=0))
     while True:
         more = seen | (A[seen] != 0).any(axis=0)
@@ -190,8 +185,7 @@ def _real_form(values: Complex, rows: Complex, columns: Complex) -> tuple[Matrix
     """The real matrix of some modes, with blocks for pairs, and the way from its states to all and back.
 
     ``values``: λ [rad/s], shape (r,), both of every pair.
-    ``rows`` and ``columns``: left and right eigenvectors with rows·columns = 1, shapes (r, n) and (n, r).
-    """
+    ``rows`` and ``columns``: left and right eigenvectors with rows·columns = 1, shapes (r, n) and (n, r)."""
     real, upper = np.flatnonzero(values.imag == 0), np.flatnonzero(values.imag > 0)
     blocks = [np.array([[value]]) for value in values[real].real]
     blocks += [np.array([[z.real, z.imag], [-z.imag, z.real]]) for z in values[upper].tolist()]

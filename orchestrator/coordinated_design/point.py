@@ -52,8 +52,7 @@ class PointModes:
     @property
     def zeros(self) -> int:
         """Number of eigenvalues that are zero, clocks left out: one is the free angle, two are a frequency that
-        nothing holds.
-        """
+        nothing holds."""
         return int((np.abs(self.values) <= ZERO).sum()) - self.clocks
 
 

@@ -38,8 +38,7 @@ def ranked(
     ``stages``: N_S of each.
     ``largest``: the largest gain [pu].
     ``frequency``: ω that the centres relate to [rad/s].
-    ``known``: A controller that was designed alone already, with its setting.
-    """
+    ``known``: A controller that was designed alone already, with its setting."""
     by_shift = sorted(((_shift(place, points), place) for place in places), key=lambda one: (-one[0], one[1]))
     found = []
     for k, (shift, place) in enumerate(by_shift):

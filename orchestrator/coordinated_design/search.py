@@ -2,8 +2,7 @@
 
 Each step takes the eigenvalues of all operating points with their sensitivities to all settings, and asks a linear
 program for the change that raises the least damping ratio most, without other modes falling below their floors. The
-change counts only if the eigenvalues that it really gives are better.
-"""
+change counts only if the eigenvalues that it really gives are better."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -66,8 +65,7 @@ class SettingSearch:
         """The best vector that the search finds; it harms no other mode, unless every vector does.
 
         ``starts``: number of vectors of the coarse scan that are improved; by default 4, for several groups 6.
-        ``polish``: whether the best is improved without sensitivities as well.
-        """
+        ``polish``: whether the best is improved without sensitivities as well."""
         several = len(self._space.groups) > 1
         scanned = sorted((self.tried(x) for x in self._coarse()), key=lambda one: -one.merit)
         chosen = self._alone() if several else []
@@ -82,8 +80,7 @@ class SettingSearch:
     def over_grid(self, found: Tried) -> tuple[Tried, int]:
         """The better of a vector and what an exhaustive grid of settings leads to, and the number of its settings.
 
-        There is none for several groups, and where the eigenvalues of so many settings would take too long.
-        """
+        There is none for several groups, and where the eigenvalues of so many settings would take too long."""
         cost = sum(len(point.loops.A) ** 3 for point in self._points)
         if len(self._space.groups) > 1 or cost > _MOST_CUBED:
             return found, 0
@@ -209,8 +206,7 @@ class _Program:
     """A linear program: the change within a radius that raises the least damping ratio most.
 
     Behind the change stand the least damping ratio of all modes, that of the modes that are moved more than hardly, and
-    the breach.
-    """
+    the breach."""
 
     def __init__(self, rows: Sequence[tuple[Watched, Numbers]], lowest: Numbers, highest: Numbers) -> None:
         self._lowest, self._highest = lowest, highest

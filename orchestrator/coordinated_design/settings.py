@@ -37,8 +37,7 @@ class SettingSpace:
     """Vectors x with three numbers for each group: turn and gain as parts of their ranges, logarithm of the centre.
 
     ``gain_bounds``: of every gain [pu].
-    ``frequency``: ω of the modes to be damped [rad/s], to which the centres relate.
-    """
+    ``frequency``: ω of the modes to be damped [rad/s], to which the centres relate."""
 
     def __init__(self, groups: Sequence[PodGroup], gain_bounds: tuple[float, float], frequency: float) -> None:
         self.groups, self.frequency = tuple(groups), frequency

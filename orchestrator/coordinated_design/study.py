@@ -89,8 +89,7 @@ def plan_points_design(
     """Check a design over operating points, and build the FMUs that it needs.
 
     ``points``: CSV file with the operating points, as `gfor screen` takes it.
-    ``outages``: as `orchestrator.operating_points.outages.read_outages` takes them.
-    """
+    ``outages``: as `orchestrator.operating_points.outages.read_outages` takes them."""
     groups = _groups(case, request)
     known = [table.name for table in case.table.analysis.modes]
     for name in request.modes:
@@ -191,8 +190,7 @@ def design_over_points(
     """Find the settings, and compute all modes anew with them.
 
     ``plan``: as `plan_points_design` gives it.
-    ``work``: counts the points first without and then with the controllers.
-    """
+    ``work``: counts the points first without and then with the controllers."""
     stage("operating points without the controllers")
     before = modes_at(plan, plan.off, plan.candidates, replace(work, report=lambda n, of: work.report(n, 2 * of)))
     usable = [k for k, point in enumerate(before) if point.loops is not None]
@@ -291,8 +289,7 @@ def modes_at(
     """The modes of all operating points and outages with some values, from the power flow on.
 
     ``values``: by ``component.variable``; they go before all layers.
-    ``places``: loops that are measured as well.
-    """
+    ``places``: loops that are measured as well."""
     study = StudyCase.of(plan.prepared, (*plan.layers, OptionValues.of(values)), plan.request.step_size)
     parts = [plan.read.items[k : k + TOGETHER] for k in range(0, len(plan.read.items), TOGETHER)]
     tasks = [PointsTask(study, part, tuple(places)) for part in parts]

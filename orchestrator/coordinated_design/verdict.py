@@ -161,8 +161,7 @@ class PointsVerdict:
 
     ``wanted``: damping ratio that is wanted everywhere; None for the best that there is.
     ``largest``: the largest gain that the search was allowed [pu].
-    ``compared``: number of settings of an exhaustive grid none of which was better; 0 without one.
-    """
+    ``compared``: number of settings of an exhaustive grid none of which was better; 0 without one."""
 
     def __init__(
         self, points: Sequence[JudgedPoint], wanted: float | None, largest: float = 0.0, compared: int = 0
@@ -201,8 +200,7 @@ class PointsVerdict:
     @property
     def met(self) -> bool | None:
         """Whether the wanted damping is reached everywhere, or, where none is wanted, the least one is better than
-        before; None where points have no modes or a limit is near, and no other point says no.
-        """
+        before; None where points have no modes or a limit is near, and no other point says no."""
         wanted, worst, before = self.wanted, self.worst, self.worst_before
         enough = worst is None or (worst >= wanted if wanted is not None else before is None or worst > before)
         if self.unstable or self.harmed or not enough:

@@ -42,8 +42,7 @@ class CoordinatedDesign:
     def met(self) -> bool | None:
         """Whether the wanted damping is reached at every point; where none is wanted, whether the least one is better.
 
-        None where points have no modes, and no other point says no.
-        """
+        None where points have no modes, and no other point says no."""
         return self.result.verdict.met
 
     @property

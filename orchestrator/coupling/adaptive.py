@@ -2,8 +2,7 @@
 
 Each pair of steps is done twice from the same state: as one step of double length, and as two. Their difference
 estimates the error of the two (C. Runge; Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, II.4). A
-pair whose error is above the tolerance is taken back and done in shorter steps.
-"""
+pair whose error is above the tolerance is taken back and done in shorter steps."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -42,8 +41,7 @@ class AdaptiveLoop:
     ``groups``: components that step together, in the order of the schedule.
     ``y``: all coupled outputs; the loops write them.
     ``tracks``: where each output went; the loops write them.
-    ``step_size``: the communication step [s].
-    """
+    ``step_size``: the communication step [s]."""
 
     def __init__(
         self,

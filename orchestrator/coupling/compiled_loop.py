@@ -96,8 +96,7 @@ class CompiledLoop:
 
     ``library``: `loop_library`.
     ``threads``: how many step; None for as many as make a step shortest, up to one for each core, and only while they
-    are seen to be faster than one.
-    """
+    are seen to be faster than one."""
 
     def __init__(
         self,

@@ -36,8 +36,7 @@ class CoupledComponents:
     """Components at their common start; a context manager that releases every FMU.
 
     ``y``: All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
-    ``wires``: The connections that do more than carry a value.
-    """
+    ``wires``: The connections that do more than carry a value."""
 
     def __init__(
         self,

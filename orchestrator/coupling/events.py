@@ -1,7 +1,6 @@
 """Events at given times. Each says in the field's words what happens.
 
-Most come down to variables that are set; faults of connections and components set none (`Fault`).
-"""
+Most come down to variables that are set; faults of connections and components set none (`Fault`)."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -25,8 +24,7 @@ ForcingShape = Literal["sine", "square"]
 class Event:
     """Something that happens at a communication point, before the step that starts there.
 
-    ``time``: [s]
-    """
+    ``time``: [s]"""
 
     time: float
     component: str
@@ -173,8 +171,7 @@ class Fault(Event):
 class WireFault(Fault):
     """A connection gets an imperfection, in place of another of its kind.
 
-    ``time``, ``component``: As `Event`; the component is the one that the connection leads to.
-    """
+    ``time``, ``component``: As `Event`; the component is the one that the connection leads to."""
 
     connection: Connection
     imperfection: Imperfection
@@ -217,8 +214,7 @@ class Forcing(Fault):
     ``variable``: The tunable variable that is set, such as ``governor.delta_P_ref``.
     ``frequency``: [Hz]
     ``amplitude``: Half of what the reference goes through, in the variable's unit.
-    ``end``: From then on the reference has its own value again [s]; None for the end of the run.
-    """
+    ``end``: From then on the reference has its own value again [s]; None for the end of the run."""
 
     variable: str
     frequency: float
@@ -233,8 +229,7 @@ class Forcing(Fault):
     def values(self, step_size: float, stop: float) -> Iterator[ParameterChange]:
         """What is set one after the other, at communication points of a step [s], until ``stop`` [s].
 
-        A sine is held for at most a two hundredth of its period, at its value in the middle of that time.
-        """
+        A sine is held for at most a two hundredth of its period, at its value in the middle of that time."""
         end = stop if self.end is None else min(self.end, stop)
         first, last = round(self.time / step_size), round(end / step_size)
         parts = 2 if self.shape == "square" else FORCING_POINTS

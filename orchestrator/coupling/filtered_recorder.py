@@ -31,8 +31,7 @@ class FilteredRecorder(Recorder):
     Its delay is 0: a row at t is made of what was within 25 intervals before and after t. Before the start and after
     the end the first and the last values are taken to hold. What jumps shows beforehand, too, as small ripples.
 
-    ``keep``: each ``keep``-th row stays in memory.
-    """
+    ``keep``: each ``keep``-th row stays in memory."""
 
     def __init__(self, names: Sequence[str], interval: int, *, sink: RowSink | None = None, keep: int = 1) -> None:
         super().__init__(names, 1, sink=sink, keep=keep)

@@ -1,8 +1,7 @@
 """What a connection does to the value that it carries, and which connections of a system do so.
 
 The order along a connection is fixed: the sensor's bias and noise, its quantisation, the way's delay, and last whether
-the value arrives at all.
-"""
+the value arrives at all."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -28,8 +27,7 @@ class Noise:
     ``deviation``: standard deviation, in the signal's unit, with a bandwidth as without.
     ``seed``: together with the connection's name it determines every value.
     ``bandwidth``: cut-off frequency of a first-order low-pass [Hz]; None for noise that is white at the communication
-    step.
-    """
+    step."""
 
     deviation: float
     seed: int

@@ -22,8 +22,7 @@ def state_of(
     """All that another process needs to go on from here.
 
     ``components``: serialised state of each FMU; by default they are asked for it.
-    ``applied`` and ``seconds`` and ``spent``: see `RunState`.
-    """
+    ``applied`` and ``seconds`` and ``spent``: see `RunState`."""
     if components is None:
         components = {name: state_as_bytes(component) for name, component in stepper.components.items()}
     return RunState(

@@ -1,7 +1,6 @@
 """The inner loop of the master: in C, where one call does many communication steps, or in Python.
 
-Where no library can be compiled for the platform, and for what is special about other masters' steps, it is Python.
-"""
+Where no library can be compiled for the platform, and for what is special about other masters' steps, it is Python."""
 
 from collections.abc import Callable, Sequence
 from time import perf_counter
@@ -20,8 +19,7 @@ from orchestrator.fmi.interrupts import calls
 class PythonLoop:
     """Steps a system in Python.
 
-    ``hand_over``: sets all inputs before each step; by default each component takes its own as it steps.
-    """
+    ``hand_over``: sets all inputs before each step; by default each component takes its own as it steps."""
 
     def __init__(
         self,
@@ -106,8 +104,7 @@ def make_loop(
     ``groups``: components that step together, in the order of the schedule.
     ``y``: all coupled outputs; the loop writes them.
     ``tracks``: where each output went; the loop writes them.
-    ``threads``: as for `CompiledLoop`; the loop in Python has one.
-    """
+    ``threads``: as for `CompiledLoop`; the loop in Python has one."""
     library = compiled_loop.loop_library() if schedule.is_plain else None
     if library is None:
         return PythonLoop(groups, y, tracks, schedule, hand_over)

@@ -27,8 +27,7 @@ class Master(Stepper):
     ``tracks``: Where each of them went, step by step, since an observer last looked.
     ``late_starts``: By component, which output was another just after initialisation than just before its end, at the
     same inputs. Its partners were initialised with the first value.
-    ``wires``: The connections that do more than carry a value.
-    """
+    ``wires``: The connections that do more than carry a value."""
 
     def run(
         self,
@@ -44,8 +43,7 @@ class Master(Stepper):
 
         ``stop_time``: [s]
         ``keeper``: Says where an earlier run of the same system is taken up, and keeps this one's state when it is due,
-        at the end, and where an interrupt ends it.
-        """
+        at the end, and where an interrupt ends it."""
         calls.watch()  # again: a notebook hands Ctrl-C back to Python after each cell
         stop = self.clock.index(stop_time, "the stop")
         due: dict[int, list[Event]] = {}

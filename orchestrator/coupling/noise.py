@@ -1,8 +1,7 @@
 """Noise that depends on its seed, the connection's name and the number of the communication step, and on nothing else.
 
 Values come from a counter-based generator in blocks: a step's value is the same whichever steps were asked for before,
-however many other noises there are, and in whatever order or thread they are computed.
-"""
+however many other noises there are, and in whatever order or thread they are computed."""
 
 import hashlib
 

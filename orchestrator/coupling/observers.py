@@ -18,8 +18,7 @@ class ObservedRun(Protocol):
 
     ``index``, ``time``: Number of communication steps done, and the time [s] reached.
     ``y``: All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
-    ``tracks``: Where each of them went, step by step, since an observer last looked.
-    """
+    ``tracks``: Where each of them went, step by step, since an observer last looked."""
 
     @property
     def index(self) -> int:

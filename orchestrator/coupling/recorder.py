@@ -31,8 +31,7 @@ class Recorder:
     ``keep``: Each ``keep``-th row stays in memory, beginning with the first.
 
     ``times``: [s], shape (n,), of the rows that are kept.
-    ``values``: Shape (n, number of names), in the order of ``names``; only what was reached before a failure.
-    """
+    ``values``: Shape (n, number of names), in the order of ``names``; only what was reached before a failure."""
 
     def __init__(
         self,

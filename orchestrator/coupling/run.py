@@ -74,8 +74,7 @@ class Run:
     def _steps(self, stop: int, due: Mapping[int, Sequence[Event]], first: int) -> Iterator[None]:
         """Step from event to event; each time that it yields, the run is whole.
 
-        ``first``: communication point at which the run began.
-        """
+        ``first``: communication point at which the run began."""
         for target in sorted({stop, *(i for i in due if self._stepper.index <= i < stop)}):
             yield from self._run_to(target, first)
             if target < stop and target != self._applied:

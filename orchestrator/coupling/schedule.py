@@ -4,8 +4,7 @@ Components of one group step side by side: all take their inputs, all step, all 
 Groups follow one another, and each sees the new outputs of those before it. One group is the Jacobi
 scheme; several are Gauss-Seidel. Both hold what an output was at one instant and are of first order in the step. Two
 schedules of second order let inputs follow straight lines: ``midpoint`` extrapolates them, ``newton`` repeats the step
-until they end at the new outputs.
-"""
+until they end at the new outputs."""
 
 import math
 from dataclasses import dataclass
@@ -45,8 +44,7 @@ TOLERANCES = (1e-8, 0.1)  # smallest and largest tolerance of a step's error
 def check_tolerance(tolerance: float) -> None:
     """Refuse a tolerance that is none.
 
-    Raises an `InputError` if it is outside of `TOLERANCES`.
-    """
+    Raises an `InputError` if it is outside of `TOLERANCES`."""
     least, most = TOLERANCES
     if isinstance(tolerance, bool) or not least <= tolerance <= most:
         raise InputError(f"tolerance = {tolerance!r}: give a number from {least:g} to {most:g}, such as 1e-4")
@@ -66,8 +64,7 @@ class Schedule:
     rounding makes not quite equal. None tells them the communication step itself.
     ``micro_step``: of second order: an FMU does a step in parts of at most this [s]; None does it in one.
     ``tolerance``: largest error of a coupled output in a pair of steps, of 1 or of its value: steps are as long as it
-    allows. None takes each communication step as it is. Only for schedules of second order.
-    """
+    allows. None takes each communication step as it is. Only for schedules of second order."""
 
     name: str
     groups: tuple[tuple[str, ...], ...]
@@ -89,8 +86,7 @@ class Schedule:
         """Whether inputs follow straight lines during a step.
 
         Components that know the communication step give their outputs for the middle of the next one, because inputs
-        are held. Here they are told 0: the schedule itself finds the middle.
-        """
+        are held. Here they are told 0: the schedule itself finds the middle."""
         return self.coupling != "held"
 
     def parts(self, step_size: float) -> int:
@@ -147,8 +143,7 @@ def newton(groups: tuple[tuple[str, ...], ...], micro_step: float | None = None)
     """Inputs on straight lines between both ends of the step, found by Newton's method on the repeated step.
 
     Of second order. Every FMU must save and restore its state. The groups say only in which order initial values are
-    exchanged.
-    """
+    exchanged."""
     return Schedule("newton", groups, coupling="newton", micro_step=micro_step)
 
 

@@ -1,8 +1,7 @@
 """Communication steps in which inputs follow straight lines: schedules of second order.
 
 A component does its step in parts, each with the input of the part's middle, so that an FMU that only knows held inputs
-sees a line. Held over the whole step, a current would hide its rate of change from the network's inductances.
-"""
+sees a line. Held over the whole step, a current would hide its rate of change from the network's inductances."""
 
 import ctypes
 from collections.abc import Iterator, Sequence
@@ -189,8 +188,7 @@ class NewtonLoop(_LineLoop):
     """Repeats each step until its lines end at the outputs that it gives.
 
     The derivatives of the outputs by the lines' ends come from nudged steps of each component alone. Those of each
-    step size are kept as long as the repetitions converge.
-    """
+    step size are kept as long as the repetitions converge."""
 
     def __init__(self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule) -> None:
         super().__init__(groups, y, tracks, schedule)
@@ -244,8 +242,7 @@ class NewtonLoop(_LineLoop):
 
     def _derivatives(self, index: int, step_size: float, start: Values, saved: Sequence[Any]) -> Any:
         """A solver for (1 − J)·x = b, J being the outputs' derivatives by the ends of the lines; states are left as
-        saved.
-        """
+        saved."""
         rows, columns, values = [], [], []
         for turn, state in zip(self._turns, saved, strict=True):
             if not turn.outputs.names:

@@ -22,8 +22,7 @@ def shares(calls: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.flo
     """Share out the calls of a group, the costly ones first, each to who has least.
 
     ``bound``: of every call, whether the calling thread alone may do it.
-    ``costs``: of every call [s].
-    """
+    ``costs``: of every call [s]."""
     own = tuple(call for call in calls if bound[call])
     loads = [0.0] * threads
     loads[0] = float(costs[list(own)].sum())

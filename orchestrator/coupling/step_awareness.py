@@ -42,8 +42,7 @@ def knows_step(master: Master, name: str) -> bool:
 def other_step(master: Master, name: str, step_size: float) -> Iterator[None]:
     """Inside, a component that knows the master's step is given another one [s]; 0 is the continuous system's.
 
-    A component whose parameter was set to something else, or that takes no other value any more, keeps what it has.
-    """
+    A component whose parameter was set to something else, or that takes no other value any more, keeps what it has."""
     component = master.components[name]
     if step_size == master.clock.step_size or not knows_step(master, name):
         yield

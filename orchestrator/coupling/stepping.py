@@ -131,8 +131,7 @@ class Stepper(CoupledComponents):
         """Speed of a run.
 
         ``seconds``: how long it took [s].
-        ``before``: what `seconds` gave when it began.
-        """
+        ``before``: what `seconds` gave when it began."""
         names = [name for group in self.schedule.groups for name in group]
         spent = [after - then for after, then in zip(self.seconds(), before, strict=True)]
         if self.wires:  # the banks' own share is none of a component

@@ -60,8 +60,7 @@ class ComponentPlan:
 class System:
     """Components by name, with checked connections.
 
-    ``wires``: Connections that do more than carry a value, or may in a run, by their target.
-    """
+    ``wires``: Connections that do more than carry a value, or may in a run, by their target."""
 
     def __init__(self) -> None:
         self.components: dict[str, ComponentPlan] = {}
@@ -84,8 +83,7 @@ class System:
         ``name``: by which connections and signals mean it.
         ``parameters``: values that are set before initialisation, by variable.
         ``inputs``: constants for inputs that nothing feeds, by variable.
-        ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do.
-        """
+        ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do."""
         if name in self.components:
             raise InputError(f"component {name!r} is added twice; give each instance a name of its own")
         self.components[name] = ComponentPlan(description, dict(parameters or {}), dict(inputs or {}), isolated)

@@ -1,8 +1,7 @@
 """Threads that share the calls of the compiled loop.
 
 Python starts them and they never run its code: they stay in C (``team.c``) until they are dismissed. One that logs in
-the name of an FMU waits for Python's lock, which the caller gives away while it waits for the others.
-"""
+the name of an FMU waits for Python's lock, which the caller gives away while it waits for the others."""
 
 import ctypes
 import logging

@@ -9,8 +9,7 @@ _LOW, _HIGH, _LAST, _CHANGE, _TURNS = range(5)
 class Tracks:
     """Extremes of every coupled output over the communication steps since the last look, and how often it turned.
 
-    The inner loop keeps them, in C as in Python; ``inner_loop.c`` has the same five numbers an output.
-    """
+    The inner loop keeps them, in C as in Python; ``inner_loop.c`` has the same five numbers an output."""
 
     def __init__(self, count: int, more: int = 0) -> None:
         self._whole = np.zeros((count + more, 5))

@@ -21,8 +21,7 @@ class Trial:
         """Note what communication steps took.
 
         ``steps``: how many were done, at most `most`.
-        ``seconds``: wall-clock time [s].
-        """
+        ``seconds``: wall-clock time [s]."""
         self._left -= steps
         if self._block is not None:
             self._seconds[self.together] += seconds

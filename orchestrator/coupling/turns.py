@@ -16,8 +16,7 @@ class Exchange:
     y.
     ``sources``: For each input the index in y of the output that feeds it.
     ``delivered``: The index of what arrives at each input: the same, or behind the outputs the place of what a
-    connection makes of it (`orchestrator.coupling.wires`).
-    """
+    connection makes of it (`orchestrator.coupling.wires`)."""
 
     def __init__(
         self, component: Component, inputs: RealBatch, outputs: RealBatch, window: slice, sources: NDArray[np.int64]
@@ -95,8 +94,7 @@ class Loop(Protocol):
         """Do communication steps.
 
         Raises a `ComponentError` if a call fails; ``completed`` tells how many steps were done before.
-        Raises a `NotFiniteError` if a step gives an output that is no finite number.
-        """
+        Raises a `NotFiniteError` if a step gives an output that is no finite number."""
 
     completed: int  # communication steps that the last call did
     before: NDArray[np.float64] | None  # the outputs one step earlier, where inputs are extrapolated; else None
@@ -115,6 +113,5 @@ class Loop(Protocol):
 def not_finite(outputs: Batch, index: int, time: float) -> NotFiniteError:
     """The error of an output that is no finite number.
 
-    ``time``: at which it was read [s].
-    """
+    ``time``: at which it was read [s]."""
     return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)

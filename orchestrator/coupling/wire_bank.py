@@ -1,8 +1,7 @@
 """The connections into one group of components that change what they carry, stepped as a component before the group.
 
 The compiled loop calls a bank as it calls an FMU, so that it is the same loop with connections of this kind as without.
-Where no library can be compiled, the same arithmetic runs in Python and gives the same bits.
-"""
+Where no library can be compiled, the same arithmetic runs in Python and gives the same bits."""
 
 import ctypes
 import math
@@ -75,8 +74,7 @@ class WireBank:
     ``outputs``: where what arrives is written, shape (number of connections,).
     ``window``: where that is in the vector that the loop reads.
     Raises an `InputError` if a delay is no multiple of the communication step, or a noise's bandwidth is beyond what
-    the step shows.
-    """
+    the step shows."""
 
     name, one_thread = "connections", "no FMU"
 

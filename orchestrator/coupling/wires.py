@@ -19,8 +19,7 @@ class Wires:
     ``system`` and ``schedule``: the system, and the order in which its components step.
     ``step_size``: communication step [s].
     ``output_index``: where in y each coupled output stands.
-    ``values``: y, and behind it a place for what arrives over each of these connections.
-    """
+    ``values``: y, and behind it a place for what arrives over each of these connections."""
 
     def __init__(
         self,

@@ -10,8 +10,7 @@ from orchestrator.report.html.network_map import HEIGHT, WIDTH, places
 
 def diagram(scenario: Scenario) -> dict[str, Any] | None:
     """Buses with their places, and branches, loads and units with the names of the values that move them; None for a
-    case without a network. A value that an element lacks is None.
-    """
+    case without a network. A value that an element lacks is None."""
     prepared = scenario.prepared
     network, grid = prepared.network, prepared.grid
     if network is None:

@@ -23,8 +23,7 @@ _POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 
 class Explorer:
     """The server, its pages, and the processes that compute: for what is asked, and beside it for slopes and for runs.
 
-    ``beginning``: what the page begins with, as JSON's types.
-    """
+    ``beginning``: what the page begins with, as JSON's types."""
 
     def __init__(
         self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER

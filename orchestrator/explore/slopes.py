@@ -30,8 +30,7 @@ def slopes(
 ) -> dict[str, Any]:
     """``value``, ``eigenvalues`` there, and ``slopes``, each a list of [real, imag]; None where no slope is known.
 
-    The operating point moves with the parameter, and the FMUs are started and linearised at both sides of its value.
-    """
+    The operating point moves with the parameter, and the FMUs are started and linearised at both sides of its value."""
     here = scenario_with(values)
     component, _, variable = parameter.partition(".")
     plan = here.prepared.system.components.get(component)

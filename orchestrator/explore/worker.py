@@ -1,7 +1,6 @@
 """The process that computes for the page: a line of JSON for each question, lines of JSON for its answer.
 
-It has a process of its own so that an FMU that dies or hangs ends a computation, and not the page.
-"""
+It has a process of its own so that an FMU that dies or hangs ends a computation, and not the page."""
 
 import json
 import os

@@ -1,8 +1,7 @@
 """A component that is a federate, as the master sees it.
 
 Until the run begins, a federate of ours is its FMU in this process, so that it is initialised and linearised as any
-other; then its state goes to the federate. A foreign federate is only what it publishes.
-"""
+other; then its state goes to the federate. A foreign federate is only what it publishes."""
 
 import base64
 import ctypes
@@ -37,8 +36,7 @@ class FederatedComponent(Derived):
 
     ``description``: of the FMU; of a foreign federate only what it publishes and takes.
     ``inner``: the FMU in this process until `hand_over`; None of a foreign federate.
-    ``published``: outputs that the federate publishes, in this order.
-    """
+    ``published``: outputs that the federate publishes, in this order."""
 
     def __init__(
         self,

@@ -2,8 +2,7 @@
 
 It steps one FMU, which runs in a process of its own: the libraries of HELICS and those of an FMU that share a process
 can stop each other, as a Python-backed FMU showed that was loaded after them. Numbers come and go as values of HELICS.
-What is more than numbers (its set-up, its state, events) comes as commands of HELICS, which need no time to pass.
-"""
+What is more than numbers (its set-up, its state, events) comes as commands of HELICS, which need no time to pass."""
 
 import base64
 import ctypes
@@ -38,8 +37,7 @@ from orchestrator.fmi.instance import open_component
 class OwnFederate:
     """An FMU that steps when HELICS grants it time.
 
-    ``to_join``: how long a broker is waited for [s].
-    """
+    ``to_join``: how long a broker is waited for [s]."""
 
     def __init__(self, name: str, description: FmuDescription, broker: str, to_join: float) -> None:
         self.name, self._description, self._broker, self._to_join = name, description, broker, to_join
@@ -52,8 +50,7 @@ class OwnFederate:
         """Join, and step until the federation ends.
 
         Raises a `ComponentError, InputError` if the FMU gives no instance, the broker does not answer, or the
-        federation ends with an error.
-        """
+        federation ends with an error."""
         helics = library()
         with open_component(self.name, self._description, isolated=True) as component:
             self._component = component

@@ -1,8 +1,7 @@
 """A federation for one run: its processes, what they are told, and their end, whatever happens.
 
 Processes are started anew, never forked. Each of them ends when its standard input does, which is when this process is
-gone, however that came about.
-"""
+gone, however that came about."""
 
 import json
 import pickle
@@ -48,8 +47,7 @@ class Federation:
     ``prepared``: Inside of ``with``: the scenario with foreign federates as what they publish.
 
     Raises `InputError` on entering: if the choice does not fit the scenario, the broker does not answer or its port is
-    taken, or a federate does not join, has other names or is of another version.
-    """
+    taken, or a federate does not join, has other names or is of another version."""
 
     def __init__(self, prepared: PreparedScenario, federates: Federates) -> None:
         self.prepared, self._choice = prepared, federates

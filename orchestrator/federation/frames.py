@@ -23,8 +23,7 @@ class Frames:
         """Receive a frame; after a TimeoutError the same call can be made again.
 
         Raises a `TimeoutError` if no whole frame came within the time [s].
-        Raises an `EOFError` if the other side is gone.
-        """
+        Raises an `EOFError` if the other side is gone."""
         self._socket.settimeout(seconds)
         while True:
             if len(self._rest) >= _HEAD.size:
@@ -56,8 +55,7 @@ class Door:
     def accept(self, seconds: float) -> Frames:
         """The hub's call.
 
-        Raises a `TimeoutError` if it does not come within the time [s].
-        """
+        Raises a `TimeoutError` if it does not come within the time [s]."""
         self._server.settimeout(seconds)
         while True:
             frames = Frames(self._server.accept()[0])

@@ -26,8 +26,7 @@ def library() -> ModuleType:
 def join(name: str, broker: str, seconds: float) -> Any:
     """A federate at a broker.
 
-    Raises a `helics.HelicsException` if the broker does not answer within the time [s], or the name is taken.
-    """
+    Raises a `helics.HelicsException` if the broker does not answer within the time [s], or the name is taken."""
     helics = library()
     host, port = address_of(broker)
     info = helics.helicsCreateFederateInfo()

@@ -1,8 +1,7 @@
 """The process that speaks HELICS for gfor: its federate, and the broker where gfor starts one; see `federation`.
 
 A hang or a fault inside of HELICS stays in this process, which gfor can end at any time. It ends by itself when gfor is
-gone, and ends the federation with it.
-"""
+gone, and ends the federation with it."""
 
 import json
 import os

@@ -1,7 +1,6 @@
 """Answers of a process in which a foreign FMU's code runs: each is of the form that was asked for, or refused.
 
-The FMU can write whatever it wants into the memory from which they are read.
-"""
+The FMU can write whatever it wants into the memory from which they are read."""
 
 from typing import Any
 

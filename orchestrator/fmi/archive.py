@@ -2,8 +2,7 @@
 
 An archive may name files outside its folder, unpack to more than a disk holds, or hide a document whose entities grow
 without end. Nothing here trusts what it declares: names are checked before the first byte is written, bytes are counted
-while they are written, and a model description may not define a document type.
-"""
+while they are written, and a model description may not define a document type."""
 
 import lzma
 import os
@@ -97,8 +96,7 @@ def extract(path: Path, folder: Path | None = None) -> Path:
 
     ``folder``: where to; by default a new temporary folder.
     Raises a `FmuFileError` if the archive is damaged, would write outside of the folder, or is larger than
-    `MOST_BYTES`. Nothing is left behind then.
-    """
+    `MOST_BYTES`. Nothing is left behind then."""
     with _opened(path) as archive:
         target = own_folder("fmu") if folder is None else folder
         target.mkdir(parents=True, exist_ok=True)

@@ -1,8 +1,7 @@
 """A running FMU behind our port: its variables are converted in C, between the master and the FMU.
 
 The converted component has the same three functions as any other, so the compiled loop needs to know nothing of
-bindings, and components without one lose no time.
-"""
+bindings, and components without one lose no time."""
 
 import ctypes
 import struct

@@ -2,8 +2,7 @@
 
 A Python-backed FMU runs in our interpreter. Its wrapper puts the FMU's resources first on ``sys.path``, so that each
 module of the FMU would stand before an installed one of that name, and stay in ``sys.modules`` for all. Here an import
-looks into the FMU only where code of the FMU asks, or its binary does.
-"""
+looks into the FMU only where code of the FMU asks, or its binary does."""
 
 import builtins
 import sys

@@ -1,8 +1,7 @@
 """What every running FMU offers, wherever it runs, and its Real variables in batches.
 
 An instance is loaded into this process (`loaded`), runs in one of its own (`isolation`) or stands behind a binding
-(`bound`); the acceptance tests have a fourth kind. They share this form and no data.
-"""
+(`bound`); the acceptance tests have a fourth kind. They share this form and no data."""
 
 import ctypes
 from collections.abc import Iterable, Mapping, Sequence
@@ -82,8 +81,7 @@ class Component(Protocol):
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
         """Partial derivatives of Real variables by others, from the FMU's own directional derivatives.
 
-        Returns shape (unknowns, knowns).
-        """
+        Returns shape (unknowns, knowns)."""
 
     # -- state -----------------------------------------------------------------------------------
 
@@ -130,8 +128,7 @@ class Derived:
 class RealBatch:
     """Real variables of one component that are read or written together, without any copying.
 
-    ``values``: Array of shape (n,), the caller's to read or fill.
-    """
+    ``values``: Array of shape (n,), the caller's to read or fill."""
 
     def __init__(self, component: Component, names: Sequence[str], values: NDArray[np.float64] | None = None) -> None:
         variables = component.description.variables

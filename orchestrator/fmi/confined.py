@@ -31,8 +31,7 @@ class ConfinedProcess:
     ``limits``: What it may take.
     ``windows``: Whether the FMU is for Windows, and Wine's server is needed.
 
-    ``protections``: What keeps it from the rest of the machine; empty until the worker has told.
-    """
+    ``protections``: What keeps it from the rest of the machine; empty until the worker has told."""
 
     def __init__(
         self,

@@ -1,8 +1,7 @@
 """What the process of a foreign FMU may touch: closed once, by itself, before it has a second thread or any library.
 
 Several means of Linux overlap: namespaces (`namespaces`), Landlock, a filter of system calls (`seccomp`), and no
-capabilities. Each is used where the machine has it; `protections` says what they come to.
-"""
+capabilities. Each is used where the machine has it; `protections` says what they come to."""
 
 import os
 import sys

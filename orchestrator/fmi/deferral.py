@@ -2,8 +2,7 @@
 
 Python runs a signal's handler in whatever Python code comes next, which may be a library's that was called from C. An
 exception raised there reaches C that takes it for an error of another kind (Matplotlib's converters of arguments make
-a `TypeError` of it, h5py a `SystemError`), or clears it. So it is raised at the next line of our own code.
-"""
+a `TypeError` of it, h5py a `SystemError`), or clears it. So it is raised at the next line of our own code."""
 
 import _thread
 import os

@@ -76,8 +76,7 @@ class VariableInfo:
 class FmuDescription:
     """A co-simulation FMU on disk. An FMU of FMI 3.0 is described in the words of FMI 2.0.
 
-    ``can_save_state``, ``can_serialize_state``: ``canGetAndSetFMUstate``, ``canSerializeFMUstate``.
-    """
+    ``can_save_state``, ``can_serialize_state``: ``canGetAndSetFMUstate``, ``canSerializeFMUstate``."""
 
     path: Path
     guid: str
@@ -192,8 +191,7 @@ def read_declared(path: Path | str) -> FmuDescription:
 def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
     """The description in a modelDescription.xml.
 
-    Raises a `FmuFileError, UnsupportedFmuError`: As `read_description`, but for the platform.
-    """
+    Raises a `FmuFileError, UnsupportedFmuError`: As `read_description`, but for the platform."""
     root = _root(path, text)
     version = _fmi_version(root)
     if version not in VERSIONS:

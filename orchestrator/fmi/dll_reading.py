@@ -1,7 +1,6 @@
 """The process that reads a vendor's DLL for `vendor_files`: closed off before the DLL is loaded.
 
-A DLL for Windows is loaded by a program under Wine.
-"""
+A DLL for Windows is loaded by a program under Wine."""
 
 import json
 import sys

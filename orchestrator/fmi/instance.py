@@ -18,8 +18,7 @@ from orchestrator.fmi.wine_program import compile_programs
 def is_ours(path: Path) -> bool:
     """Whether an FMU is one that this machine's own toolchain built, or a copy of it to the last byte.
 
-    What a file says of itself does not count, nor does its place: a built file that was changed since is a stranger.
-    """
+    What a file says of itself does not count, nor does its place: a built file that was changed since is a stranger."""
     built = cache_directory("fmus")
     if path.resolve().is_relative_to(built.resolve()):
         return intact(path)
@@ -57,8 +56,7 @@ def open_component(
     ``name``: name of the instance, used in errors and results.
     ``description``: the FMU; a `BoundDescription` gives a component that speaks our port.
     ``directory``: where its archive is extracted; by default a new temporary folder of its own.
-    ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do.
-    """
+    ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do."""
     compile_adapters(description)
     if isinstance(description, BoundDescription):
         return BoundComponent(open_component(name, description.inner, directory, isolated=isolated), description)

@@ -2,8 +2,7 @@
 
 Python raises `KeyboardInterrupt` in whatever Python code runs next. In a call of a Python-backed FMU that is code of
 the FMU, which takes it for a failure of its own, reports ``fmi2Fatal``, and must not be called again. For libraries see
-`deferral`.
-"""
+`deferral`."""
 
 import ctypes
 import os
@@ -23,8 +22,7 @@ class _Calls:
 
     ``taken``, ``terminated``: Whether any signal was taken since the command began, and whether a SIGTERM was.
     ``over``: Whether all is done: then the exit code says how, and no signal changes it any more. It is set, not
-    called, because Python takes signals where a function begins.
-    """
+    called, because Python takes signals where a function begins."""
 
     def __init__(self) -> None:
         self._main = threading.main_thread().ident
@@ -43,8 +41,7 @@ class _Calls:
     def watch(self) -> None:
         """Take Ctrl-C over from Python, where nobody else has; between calls it works as before.
 
-        Where Python would swallow it, as in a weak reference's end, it comes again at the next line of ours.
-        """
+        Where Python would swallow it, as in a weak reference's end, it comes again at the next line of ours."""
         here = threading.current_thread() is threading.main_thread()
         if here and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, self.take)
@@ -60,8 +57,7 @@ class _Calls:
     def terminable(self, ending: bool = False) -> Iterator[None]:
         """Inside, the first SIGTERM does what Ctrl-C does; a second one ends the process at once.
 
-        ``ending``: whether the process ends afterwards. Both signals are ignored then, as where `over` is set.
-        """
+        ``ending``: whether the process ends afterwards. Both signals are ignored then, as where `over` is set."""
         self.taken = self.terminated = self.over = False
         if threading.current_thread() is not threading.main_thread():
             try:

@@ -1,8 +1,7 @@
 """An FMU in a process of its own, called as if it were in this one.
 
 A crash, a hang, an exit or a flood in it becomes one `ComponentError`; what was computed until then stays. Values pass
-through shared memory (`mailbox.c`), one exchange for a communication step.
-"""
+through shared memory (`mailbox.c`), one exchange for a communication step."""
 
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -42,8 +41,7 @@ from orchestrator.fmi.remote_calls import RemoteCalls
 class IsolatedComponent(RemoteCalls, Derived):
     """An instance of an FMU in a process of its own.
 
-    ``limits``: what it may take.
-    """
+    ``limits``: what it may take."""
 
     def __init__(
         self, name: str, description: FmuDescription, directory: Path | None = None, limits: Limits | None = None

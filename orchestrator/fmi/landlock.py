@@ -1,8 +1,7 @@
 """Landlock: from a moment on, a process and all that it starts open nothing but the files that they were granted.
 
 Which rights there are depends on the kernel: files since 5.13, TCP since 6.7, signals and abstract sockets since 6.12.
-It binds the thread that asks and those it starts later, so it comes before there is a second one.
-"""
+It binds the thread that asks and those it starts later, so it comes before there is a second one."""
 
 import contextlib
 import os

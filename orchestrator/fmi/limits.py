@@ -1,8 +1,7 @@
 """What a process that runs a foreign FMU may take; called once, in that process, before the FMU is loaded.
 
 These are the limits that the kernel keeps for each process. Those on all of an FMU's processes together are kept by
-`supervisor`, what they may touch by `confinement`. On Windows, only time and messages are limited.
-"""
+`supervisor`, what they may touch by `confinement`. On Windows, only time and messages are limited."""
 
 import os
 import signal

@@ -1,8 +1,7 @@
 """A linear model that travels inside an FMU, for tools that cannot linearise one.
 
 It lies under ``extra/`` as FMI's layered standards have it: a manifest, the model as JSON, and the same for MATLAB.
-The README of this folder has its form.
-"""
+The README of this folder has its form."""
 
 import io
 import json

@@ -36,8 +36,7 @@ class LoadedComponent(Derived):
     ``directory``: Where its archive is extracted; by default a new temporary folder of its own.
     ``ours``: Whether it is known to be an FMU of this project.
 
-    ``lost``: Whether it said ``fmi2Fatal``: no call is allowed any more.
-    """
+    ``lost``: Whether it said ``fmi2Fatal``: no call is allowed any more."""
 
     def __init__(
         self, name: str, description: FmuDescription, directory: Path | None = None, *, ours: bool = False

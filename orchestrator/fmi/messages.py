@@ -77,8 +77,7 @@ def callbacks_for(messages: Messages) -> Any:
     """Callbacks whose messages end in one component's list.
 
     All components share one logger function, because fmpy's proxy keeps only the last one it was
-    given; the component is told by its environment pointer.
-    """
+    given; the component is told by its environment pointer."""
     environment = next(_next_environment)
     _message_lists[environment] = messages
     callbacks = fmi2CallbackFunctions()

@@ -1,8 +1,7 @@
 """Namespaces of Linux: a process in them sees other processes, other network devices and other mounts than its parent.
 
 An ordinary user makes them together with a user namespace, which some systems and containers forbid. Then there are
-none, and the other protections stand alone.
-"""
+none, and the other protections stand alone."""
 
 import contextlib
 import os
@@ -36,8 +35,7 @@ def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[
 
     ``folder``: where that folder is put, empty.
     ``size``: what it may hold [bytes].
-    ``more``: folders in whose place there is an empty one in memory as well.
-    """
+    ``more``: folders in whose place there is an empty one in memory as well."""
     unshare(NEW_MOUNTS)
     mount(None, "/", None, _PRIVATE | _ALL_BELOW)
     sizes = {folder: size, Path("/dev/shm"): min(size, _SHARED)} | dict.fromkeys(more, min(size, _SHARED))

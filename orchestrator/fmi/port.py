@@ -2,8 +2,7 @@
 
 The port of a device: inputs ``v_re``, ``v_im`` [pu of the bus] and outputs ``i_re``, ``i_im`` [pu, 100 MVA] in the
 network's frame, ``p`` and ``q`` at the bus [pu, S_n]; parameters ``S_n`` [MVA] and the power flow's ``P_0``, ``Q_0``
-[pu, S_n], ``v_0`` [pu], ``theta_0`` [rad].
-"""
+[pu, S_n], ``v_0`` [pu], ``theta_0`` [rad]."""
 
 import re
 from collections.abc import Iterator, Mapping

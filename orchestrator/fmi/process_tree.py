@@ -46,8 +46,7 @@ def usage(processes: list[int], enough: int) -> Usage:
     """What processes have in use together.
 
     Pages that several share are counted for each of them first, and exactly only where that comes to more than
-    ``enough`` bytes.
-    """
+    ``enough`` bytes."""
     memory = tasks = 0
     for process in processes:
         with contextlib.suppress(OSError):
@@ -69,8 +68,7 @@ def _resident(process: int) -> int:
 def _own_share(process: int) -> int:
     """Memory of a process where a page of n processes counts as its nth part [bytes].
 
-    All that it shares counts where the process hides its share, as each process may.
-    """
+    All that it shares counts where the process hides its share, as each process may."""
     with contextlib.suppress(OSError, ValueError):
         for line in (_PROC / str(process) / "smaps_rollup").read_text(encoding="ascii").splitlines():
             if line.startswith("Pss:"):
@@ -82,8 +80,7 @@ def size_of(folder: Path, enough: int) -> int:
     """Size of the files below a folder [bytes], counted until there are more than ``enough``.
 
     It is more than that too where there are more than `MOST_FILES`, or where a folder cannot be listed because its path
-    is too long or its permissions forbid it.
-    """
+    is too long or its permissions forbid it."""
     total, pending, seen = 0, [folder], 0
     while pending and total <= enough:
         try:
@@ -106,8 +103,7 @@ def size_of(folder: Path, enough: int) -> int:
 def size_of_removed(processes: list[int], enough: int) -> int:
     """Size of the files that processes hold open after they were removed [bytes], counted until more than ``enough``.
 
-    Files that the calling process holds open as well are not theirs, and do not count.
-    """
+    Files that the calling process holds open as well are not theirs, and do not count."""
     known = {(found.st_dev, found.st_ino) for found in _removed("self")}
     total = 0
     for process in processes:

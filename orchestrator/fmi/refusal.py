@@ -27,8 +27,7 @@ def refusal(component: Component, said_by: Said, status: int, call: str, time: f
     ``said_by``: the FMU's log since the call.
     ``status``: the call's, as FMI 2.0 numbers them.
     ``call``: by its name in FMI 2.0; the error has the name in the FMU's own version.
-    ``time``: of a step [s].
-    """
+    ``time``: of a step [s]."""
     described = component.description
     name = in_its_words(described, STATUS[status] if status < len(STATUS) else f"status {status}")
     said = "; ".join(said_by(1) or said_by(0))

@@ -1,8 +1,7 @@
 """A filter of system calls: what an FMU has no need of, and what no other protection covers, is refused with EPERM.
 
 The filter is a program for the kernel's own machine (classic BPF), written here instruction by instruction. It knows
-64-bit x86 and ARM.
-"""
+64-bit x86 and ARM."""
 
 import ctypes
 import errno
@@ -120,8 +119,7 @@ def filter_calls(*, attributes: bool, ipc: bool, own_process: int | None, signal
     ``ipc``: whether semaphores of System V and queues by name are refused: where they are not its own.
     ``own_process``: number of the only process whose limits and priority it may change: its own; None where it sees no
     other.
-    ``signals``: whether it may send signals to that process only: where they would reach others.
-    """
+    ``signals``: whether it may send signals to that process only: where they would reach others."""
     program = _program(own_process, signals=signals and own_process is not None, attributes=attributes, ipc=ipc)
     buffer = ctypes.create_string_buffer(program, len(program))
     head = struct.pack("@HP", len(program) // 8, ctypes.addressof(buffer))

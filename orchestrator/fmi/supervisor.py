@@ -4,8 +4,7 @@ Three processes stand in a row. The *supervisor* is what gfor starts; it waits f
 the first process of the FMU's own process namespace, where there is one: with it all others there end, whatever they
 did to hide. The *worker* alone has the FMU's code in it.
 
-No library but Python's own is imported here: the worker closes itself off before numpy brings threads.
-"""
+No library but Python's own is imported here: the worker closes itself off before numpy brings threads."""
 
 import contextlib
 import importlib

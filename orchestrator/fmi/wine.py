@@ -4,8 +4,7 @@ A program under Wine opens files through Wine's server. So the server is closed 
 Landlock and before the filter of system calls, which lets nobody open sockets; the one connection that the program
 needs is made before (`Server`).
 
-No library but Python's own is imported here, as the process that closes itself off needs it.
-"""
+No library but Python's own is imported here, as the process that closes itself off needs it."""
 
 import contextlib
 import os
@@ -157,8 +156,7 @@ class Server:
     """Wine's server for one prefix, with a connection that one program can use.
 
     ``folder``: where `prepare` made the prefix.
-    ``tied``: whether the kernel ends it, and its programs, with the thread that started them.
-    """
+    ``tied``: whether the kernel ends it, and its programs, with the thread that started them."""
 
     def __init__(self, folder: Path, *, tied: bool, programs: int = 1) -> None:
         self.tied = tied

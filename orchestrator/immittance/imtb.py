@@ -1,8 +1,7 @@
 """Scans in the CSV form of Energinet's IMTB: impedances [Ω] in dq, or in αβ at the frequency of the network.
 
 One file may hold a device (Zdut) and a network (Znet). The αβ form has the sequences as rows and columns: the second
-is the mirrored one, two rated frequencies lower.
-"""
+is the mirrored one, two rated frequencies lower."""
 
 import csv
 import math

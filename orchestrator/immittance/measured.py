@@ -34,8 +34,7 @@ def scan_fmu(
 def as_scan(name: str, response: FrequencyResponse, voltage: complex, kilovolt: float = 1.0) -> Scan:
     """The admittance of a measured response in the network's frame, dense where the model fitted to it turns quickly.
 
-    Its bounds hold what two amplitudes differ by and what the model misses of the measured values.
-    """
+    Its bounds hold what two amplitudes differ by and what the model misses of the measured values."""
     model, measured = fit(response), response.frequencies
     at, wide = np.abs(model.poles.imag) / (2 * np.pi), np.abs(model.poles.real) / (2 * np.pi)
     around = [at + k * wide for k in (-4, -2, -1, -0.5, -0.25, 0, 0.25, 0.5, 1, 2, 4)]

@@ -19,8 +19,7 @@ def unstable_poles(frequencies: Numbers, values: Vector) -> tuple[complex, ...]:
     """Poles of positive real part [rad/s] that the values show, one of each pair.
 
     ``frequencies``: [Hz], shape (f,).
-    ``values``: Shape (f, n, n).
-    """
+    ``values``: Shape (f, n, n)."""
     every = -(-len(frequencies) // _ENOUGH)
     frequencies, values = frequencies[::every], values[::every]
     size = np.linalg.norm(values, ord=2, axis=(1, 2))

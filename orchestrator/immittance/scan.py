@@ -1,8 +1,7 @@
 """A scan: the admittance matrix of a device or a network at its ports, over frequency.
 
 Inside, every scan is in one form: currents are counted into what is scanned, rows and columns are d and q of one port
-after the other, and the q axis leads the d axis. What stands in a file in another form is turned as it is read.
-"""
+after the other, and the q axis leads the d axis. What stands in a file in another form is turned as it is read."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

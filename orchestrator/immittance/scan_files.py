@@ -14,8 +14,7 @@ _LARGEST = 200e6
 def read_scan(path: Path, rated_hz: float, *, network: bool = False) -> Scan:
     """A scan from a file of Z-tool's or IMTB's form.
 
-    ``network``: Which part of a file is meant that holds a device and a network.
-    """
+    ``network``: Which part of a file is meant that holds a device and a network."""
     try:
         if path.stat().st_size > _LARGEST:
             raise InputError(f"{path}: a scan of more than 200 MB is not read")

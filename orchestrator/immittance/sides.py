@@ -23,8 +23,7 @@ class Side(Protocol):
 
     ``name``: For sentences.
     ``frequencies``: At which it is known best [Hz].
-    ``is_exact``: Whether it is known at every frequency.
-    """
+    ``is_exact``: Whether it is known at every frequency."""
 
     @property
     def name(self) -> str: ...

@@ -1,8 +1,7 @@
 """Scans in the text form of Z-tool: one line of names, then a frequency and its matrix in each row [S].
 
 Its q axis lags the d axis. Beside a scan may stand the angles of its ports and the power flow, in files that begin
-with the same name.
-"""
+with the same name."""
 
 import re
 from pathlib import Path

@@ -60,8 +60,7 @@ def file_at(place: Place, file: Path, binding: Path | None, values: Mapping[str,
 def _of_place(place: Place, device: FmuDescription | None = None) -> dict[str, Value]:
     """What the power flow reads of the device there: any device with these values gives the same power flow.
 
-    Rated frequency and breaker are left out where the device, if it is not of the catalogue, does not have them.
-    """
+    Rated frequency and breaker are left out where the device, if it is not of the catalogue, does not have them."""
     plan = place.plan
     found: dict[str, Value] = {name: plan.number(name) for name in ("S_n", "P_0")}
     found |= {"Q_0": plan.number("Q_0")} if "Q_0" in plan.parameters else {"v_0": plan.number("v_0")}
@@ -86,8 +85,7 @@ def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:
     """The case with other devices; the same object where nothing is exchanged.
 
     What may name a variable of a device that is gone is left out: names of modes, plots, and events but those of the
-    network, for which its FMU is made.
-    """
+    network, for which its FMU is made."""
     if not exchanged:
         return case
     table = case.table
@@ -116,8 +114,7 @@ def require_same_flow(wanted: Mapping[str, complex], prepared: PreparedScenario)
     """Refuse a system whose power flow is another one.
 
     ``wanted``: voltages of all buses [pu]; empty for a case without a power flow.
-    Raises an `InputError` if a voltage differs by more than `SAME_FLOW`.
-    """
+    Raises an `InputError` if a voltage differs by more than `SAME_FLOW`."""
     found = voltages_of(prepared.power_flow)
     apart = {bus: abs(found.get(bus, 0j) - voltage) for bus, voltage in wanted.items()}
     worst = max(apart, key=lambda bus: apart[bus], default=None)

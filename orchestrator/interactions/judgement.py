@@ -3,8 +3,7 @@
 A mode is one of interaction between two subsystems where both take part in it by more than a threshold: J. Beerten,
 S. D'Arco and J. A. Suul, "Identification and small-signal analysis of interaction modes in VSC MTDC systems", IEEE
 Trans. Power Delivery 31(2), 2016. The participation of a subsystem is the sum of its states' factors, and all of them
-sum to 1.
-"""
+sum to 1."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,8 +37,7 @@ class JudgedSystem:
     """A system with the modes that count for its converters.
 
     A mode of the network or of a machine in which none of them takes part says nothing of them, however little it is
-    damped. A mode that grows counts in any case.
-    """
+    damped. A mode that grows counts in any case."""
 
     name: SystemName
     record: SystemRecord
@@ -177,8 +175,7 @@ class JudgedInteractions:
     def worst_pair(self) -> JudgedPair | None:
         """The known pair that is unstable though each is stable alone, else the one whose damping falls most.
 
-        None where none falls by more than `SAME`.
-        """
+        None where none falls by more than `SAME`."""
         first = next((pair for pair in self.pairs if pair.is_known), None)
         if first is None or first.fall is None:
             return None

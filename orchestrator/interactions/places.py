@@ -27,8 +27,7 @@ class Place:
 def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], grid: str | None) -> dict[str, Place]:
     """The converters of a scenario, by their component.
 
-    A converter's vendor is the ``vendor`` of its table, else the name of its file, else its model.
-    """
+    A converter's vendor is the ``vendor`` of its table, else the name of its file, else its model."""
     found = {}
     for name, (table, plan) in components.items():
         if name == grid or not plan.has_port or (table.vendor is None and plan.kind != "converter"):
@@ -62,8 +61,7 @@ def groups_of(
 def by_group(shares: Mapping[str, float], groups: Mapping[str, str]) -> dict[str, float]:
     """The participation of every group in a mode, largest first; it sums to 1 as the components' does.
 
-    ``groups``: of every component; one that is not there counts to `OTHERS`.
-    """
+    ``groups``: of every component; one that is not there counts to `OTHERS`."""
     found: dict[str, float] = {}
     for name, share in shares.items():
         group = groups.get(name, OTHERS)

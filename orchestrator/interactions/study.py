@@ -85,8 +85,7 @@ def plan_interactions(
     ``step_size``: communication step [s]; the case's where None.
     ``parameters``: parameter files; a later one goes before an earlier one.
     Raises an `InputError` if the scenario, a place or a device is unknown, there are too many systems, or another
-    device gives another power flow.
-    """
+    device gives another power flow."""
     name = _scenario(case, scenario)
     (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
     layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
@@ -113,8 +112,7 @@ def plan_interactions(
 def run_interactions(plan: InteractionsPlan, work: Work) -> InteractionsResult:
     """Compute the systems that are not stored yet; systems of the same devices are computed once.
 
-    ``plan``: A plan that `plan_interactions` has checked.
-    """
+    ``plan``: A plan that `plan_interactions` has checked."""
     tasks = {name: plan.task(exchanged) for name, exchanged in plan.systems.items()}
     wanted = {task.key: task for task in tasks.values()}
     found = dict(zip(wanted, work.all(compute_system, list(wanted.values())), strict=True))
@@ -153,8 +151,7 @@ def _tried(
     systems: Mapping[SystemName, Exchanged],
 ) -> dict[str, list[str]]:
     """Prepare one system for each device that is other than the case's: this finds what cannot stand there, and builds
-    its FMU. What stands for its file in keys, by `_content_name`.
-    """
+    its FMU. What stands for its file in keys, by `_content_name`."""
     voltages, files = voltages_of(prepared.power_flow), dict[str, list[str]]()
     seen: set[tuple[str, str]] = set()
     for name, exchanged in systems.items():

@@ -52,8 +52,7 @@ Exchanged = dict[str, ComponentTable]  # what stands at a place in place of the 
 def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemName, Exchanged]:
     """The case as it is, without any vendor, with each alone and with each pair.
 
-    Raises an `InputError` if there are more than `MOST_VENDORS`.
-    """
+    Raises an `InputError` if there are more than `MOST_VENDORS`."""
     vendors = vendors_of(places)
     if len(vendors) > MOST_VENDORS:
         count = len(vendors)
@@ -76,8 +75,7 @@ def assignments(
     """Each device at each of some places, in all ways.
 
     Raises an `InputError` if there is nothing to swap, two devices have one name, or there are more than
-    `MOST_ASSIGNMENTS`.
-    """
+    `MOST_ASSIGNMENTS`."""
     templates = first_of({name: places[name] for name in at})
     vendors = {place.vendor for place in places.values()}  # those at places that are not swapped as well
     if twice := [device.name for device in given if device.name in vendors]:

@@ -42,8 +42,7 @@ def emulate(
     ``events``: each event happens before the step that starts at the event's time, as with our own schedules. Most
     other masters do not support events.
     ``order``: order in which the components step, for a master that steps them one after the other; by default the
-    order of the system.
-    """
+    order of the system."""
     disturbed = [plan.name for plan in system.wires.values()] + [str(fault) for fault in faults_among(events)]
     if disturbed:
         raise InputError(

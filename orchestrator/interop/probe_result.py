@@ -30,8 +30,7 @@ def read_probe_result(path: Path, named: Mapping[str, str] | None = None) -> Pro
     ``path``: separated by commas, semicolons or tabs; with a decimal comma where a semicolon or a tab separates.
     ``named``: heading of the column for ``time`` or a signal, where the end of the heading does not show it.
     Raises an `InputError` if the file cannot be read, the time is missing, both a.y and b.y are missing, or an entry is
-    not a number.
-    """
+    not a number."""
     heads, lines = _table(path)
     columns = _columns(path, heads, dict(named or {}))
     picked = np.array(

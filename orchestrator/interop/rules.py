@@ -44,8 +44,7 @@ class MasterRules:
         ``components``: names of all components, in the order in which the master was given them.
         ``order``: order in which the components step, if it differs from ``components``; only Gauss-Seidel has one.
         Raises an `InputError` if the master steps all components side by side and an order is given, or the order does
-        not list every component once.
-        """
+        not list every component once."""
         if self.steps == "side by side":
             if order is not None:
                 raise InputError(f"{self.title} steps all components side by side, so that they have no order")

@@ -62,8 +62,7 @@ def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float
 
     ``step_size`` and ``stop_time``: step size and stop time with which the tool was run [s].
     Raises an `InputError` if too few rows are at communication points, or the result shows that the steps had another
-    size.
-    """
+    size."""
     intervals = round(stop_time / step_size)
     if intervals < _LEAST_ROWS or abs(intervals * step_size - stop_time) > _ON_POINT * step_size:
         raise InputError(f"{stop_time:g} s are not a whole number of steps of {step_size:g} s, {_LEAST_ROWS} at least")

@@ -67,8 +67,7 @@ class PointBench:
         """One component at the operating point; equal ones are perturbed once.
 
         A linear model depends on the FMU, its parameters, its states and its inputs; where all these are equal to the
-        last digit, the model that is there is taken.
-        """
+        last digit, the model that is there is taken."""
         master = self._master
         assert master is not None
         component, plan, exchange = master.components[name], master.system.components[name], master.exchanges[name]

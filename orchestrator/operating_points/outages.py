@@ -33,8 +33,7 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
     """The intact network, and the outages that a text names.
 
     ``text``: ``n-1`` (each line, transformer and unit), ``lines``, ``units``, or names with commas between them, where
-    ``line_1_2+sg3`` loses two elements together; None for none.
-    """
+    ``line_1_2+sg3`` loses two elements together; None for none."""
     names: list[str] = []
     for part in (part.strip() for part in (text or "").split(",") if part.strip()):
         names += _of_kind(part.lower(), elements) if part.lower() in _KINDS else [part]

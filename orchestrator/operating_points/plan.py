@@ -48,8 +48,7 @@ def read_operating_points(
     ``outages``: as `read_outages` takes them.
     ``scenario``: its name; the first one where None.
     ``overrides``: values by ``component.variable`` that hold at every point.
-    ``step_size``: communication step [s]; the case's where None.
-    """
+    ``step_size``: communication step [s]; the case's where None."""
     name = scenario or next(iter(case.scenarios))
     (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
     layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))

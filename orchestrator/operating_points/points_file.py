@@ -27,8 +27,7 @@ def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> l
     """The operating points of a file, for one scenario.
 
     Raises an `InputError` with file and line: if a column or a cell has no meaning, a name is missing or repeated, two
-    columns set one value or switch one element, or there is no row.
-    """
+    columns set one value or switch one element, or there is no row."""
     rows = rows_of(path, ())
     if not rows:
         raise InputError(f"{path}: it has no row; give one for each operating point, with a column 'time' or 'name'")

@@ -48,8 +48,7 @@ class ItemPreparation:
     """Prepares a scenario with the values of an operating point and an outage.
 
     ``step_size``: Communication step [s]; the case's where None.
-    ``sharing``: How units share an outage; as the case says where None.
-    """
+    ``sharing``: How units share an outage; as the case says where None."""
 
     def __init__(
         self,
@@ -70,8 +69,7 @@ class ItemPreparation:
     def prepared(self, item: Item) -> PreparedItem:
         """The scenario at an item, without the units that are out of service.
 
-        Raises `CosimError` if it cannot be prepared; `failure` says what that means.
-        """
+        Raises `CosimError` if it cannot be prepared; `failure` says what that means."""
         valued = self._valued(item)
         remains = what_remains(valued, self.elements, item.out)
         if remains.none:

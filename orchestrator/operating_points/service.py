@@ -27,8 +27,7 @@ def switched_off(out: Sequence[str], remains: Remains, prepared: PreparedScenari
 def without_units(prepared: PreparedScenario, out: Sequence[str], elements: Elements) -> PreparedScenario:
     """The scenario without the units that are out of service.
 
-    The grid takes nothing from them, so they would only add modes of machines that run alone.
-    """
+    The grid takes nothing from them, so they would only add modes of machines that run alone."""
     gone = [name for name in out if name in elements.units]
     if not gone:
         return prepared

@@ -4,8 +4,7 @@ Dissipating energy flow: Maslennikov, Wang and Litvinov, "Dissipating energy flo
 sustained oscillations", Int. J. Electrical Power & Energy Systems 88, 2017. Participation in the dynamic mode that is
 fitted to the signals: Schmid, "Dynamic mode decomposition of numerical and experimental data", J. Fluid Mechanics 656,
 2010, with left and right vectors. The Q-V phase: what follows its voltage takes reactive power as it rises; what drives
-it gives more.
-"""
+it gives more."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -107,8 +106,7 @@ def works(places: Sequence[Site], times: Numbers, found: SpectralLine, others: S
     """Dissipating work Re(ΔP* jΔθ + ΔQ* jΔln V)/2 and reactive work Re(Δln V* ΔQ)/2 of each place.
 
     They are those of the mean phasors of several blocks, each turned by the phase that all signals share; errors are
-    the jackknife's.
-    """
+    the jackknife's."""
     step = float(times[1] - times[0])
     settle = 0 if found.begin is None else round(2 / (found.frequency * step))
     used = np.arange(min(found.first + settle, found.last - 4), found.last)

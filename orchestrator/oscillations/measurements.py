@@ -59,8 +59,7 @@ class Measurements:
 def made_ready(label: str, times: Numbers, places: Sequence[Site], remarks: Sequence[str] = ()) -> Measurements:
     """Bring a record into the form in which it is analysed; what was done to it is in the remarks.
 
-    Raises `InputError` if too little is left.
-    """
+    Raises `InputError` if too little is left."""
     said = list(remarks)
     times, places = _without_doubles(times, places, said)
     times, places = _longest_stretch(times, places, said)

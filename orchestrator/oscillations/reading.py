@@ -118,8 +118,7 @@ def read_contest(folder: Path) -> Measurements:
     """A case of the 2021 IEEE-NASPI contest: voltages of buses [pu, deg] and currents of lines at their first bus.
 
     A bus with one measured line is what stands behind it, such as a generator; elsewhere lines to buses that are not
-    measured count.
-    """
+    measured count."""
     times, vm = _table(folder / CONTEST_FILES[0])
     rest = [_table(folder / name) for name in CONTEST_FILES[1:]]
     for name, (other, _) in zip(CONTEST_FILES[1:], rest, strict=True):

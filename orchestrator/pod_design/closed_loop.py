@@ -1,8 +1,7 @@
 """A running system that is linearised with any setting of its POD controllers.
 
 Gain and lead/lag are tunable and the controllers' signals are zero in steady state, so the operating point is the same
-for every setting: only the converters need be linearised again, and the rest of the system is kept.
-"""
+for every setting: only the converters need be linearised again, and the rest of the system is kept."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
@@ -54,8 +53,7 @@ class PodLoop:
     """Gives one controller of several components a common setting, and linearises the system.
 
     ``controller``: ``pod_p`` or ``pod_q``.
-    ``kept``: Figures that an earlier start of the same design has left.
-    """
+    ``kept``: Figures that an earlier start of the same design has left."""
 
     def __init__(
         self, master: Master, components: Sequence[str], controller: str, kept: KeptFigures | None = None
@@ -122,8 +120,7 @@ class PodLoop:
         """Follow the target mode to another gain.
 
         ``start``: A setting with its known mode. It must have the same lead/lag, or a gain of 0.
-        ``filters``: The lead/lag at the new gain; by default that of ``start``.
-        """
+        ``filters``: The lead/lag at the new gain; by default that of ``start``."""
         setting = PodSetting(gain, filters or start.setting.filters)
         if start.setting.gain and start.setting.filters != setting.filters:
             raise ValueError("a mode is followed along the gain; with other lead/lag it starts from a gain of 0")
@@ -158,8 +155,7 @@ def _digest_of(pair: Eigenpair) -> str:
 def check_tunable(name: str, description: FmuDescription, controller: str) -> None:
     """A controller's gain and lead/lag must be tunable.
 
-    ``controller``: ``pod_p`` or ``pod_q``.
-    """
+    ``controller``: ``pod_p`` or ``pod_q``."""
     fixed = [v for v in (f"{controller}.{key}" for key in _TUNED) if description.variables[v].variability != "tunable"]
     if fixed:
         raise InputError(

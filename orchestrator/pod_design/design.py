@@ -97,8 +97,7 @@ class GainSensitivities:
 class PodDesign:
     """A design with every figure on the way.
 
-    ``filters``, ``gain``, ``designed``: By the paper's equations, and the closed loop with them.
-    """
+    ``filters``, ``gain``, ``designed``: By the paper's equations, and the closed loop with them."""
 
     request: DesignRequest
     case: str
@@ -185,8 +184,7 @@ def design_pod(
     """Design a controller and check it on the closed loop.
 
     ``store``: keeps figures on the way as soon as they are there; those that are there already are not computed again.
-    ``search``: gives a refinement settings to try; by default it surveys all itself.
-    """
+    ``search``: gives a refinement settings to try; by default it surveys all itself."""
     report("preparing the case")
     target = find_target(
         case,

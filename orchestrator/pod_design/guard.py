@@ -52,8 +52,7 @@ class Surroundings:
     def counting(self, target: complex) -> complex:
         """The less damped of two modes [rad/s]: the target, and the mode that now has the target's name.
 
-        A strong controller can make two modes trade places. Then the less damped of both counts as the target.
-        """
+        A strong controller can make two modes trade places. Then the less damped of both counts as the target."""
         candidates = [target, *([self.other_named.eigenvalue] if self.other_named else [])]
         return min(candidates, key=damping_ratio)
 
@@ -82,8 +81,7 @@ def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> 
 
 def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
     """The prohibited effect of a design: the system becomes unstable, or a mode falls below the least damping that was
-    above it.
-    """
+    above it."""
     if after.is_unstable and after.growth > (1 + _EQUAL) * before.growth:
         return f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
     worst = after.worst
@@ -100,8 +98,7 @@ def breach(before: Surroundings, after: Surroundings, least: float) -> str | Non
 
 def extremes(model: LinearModel) -> tuple[complex, complex | None]:
     """The least damped eigenvalue from 0.1 to 2 Hz (−1 if no eigenvalue lies there), and the fastest growing one
-    [rad/s].
-    """
+    [rad/s]."""
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
     weakest = min(guarded(values[values.imag >= 0]).tolist(), key=damping_ratio, default=complex(-1))
     return weakest, fastest_growth(values, step_map=model.step_size is not None)

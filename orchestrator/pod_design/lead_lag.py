@@ -1,8 +1,7 @@
 """Equations of the POD design by eigenvalue sensitivity (the paper's section on the design of POD controllers).
 
 Pure functions on complex numbers; their arguments come from linearisations of the coupled system. Eigenvalues are in
-rad/s with a positive imaginary part, gains in pu of the converter's rating.
-"""
+rad/s with a positive imaginary part, gains in pu of the converter's rating."""
 
 import cmath
 import math
@@ -83,8 +82,7 @@ def lead_lag(phase_deg: float, centre: float, stages: int) -> LeadLag:
     ``phase_deg``: angle of the non-compensated sensitivity [°], in (−180, 180].
     ``centre``: ω_0 [rad/s].
     ``stages``: N_S; with 0 there is no compensation.
-    Raises an `AnalysisError` if a stage would have to turn by 90° or more, which is impossible.
-    """
+    Raises an `AnalysisError` if a stage would have to turn by 90° or more, which is impossible."""
     if stages == 0:
         return NO_COMPENSATION
     each = compensation_deg(phase_deg) / stages
@@ -120,6 +118,5 @@ def local_non_compensated(compensated: complex, mode: complex, filters: LeadLag)
     """The sensitivity without the lead/lag, computed from the sensitivity with it.
 
     At a mode s = λ the residue is multiplied by the compensation's transfer function at λ; dividing by it is exact for
-    a gain of 0, and at a present gain tells by how much the compensation is to be turned.
-    """
+    a gain of 0, and at a present gain tells by how much the compensation is to be turned."""
     return compensated / filters.response(mode)

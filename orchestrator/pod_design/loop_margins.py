@@ -2,8 +2,7 @@
 
 The loop is broken where the gain K acts. A state matrix with K in one place is A(K) = A_0 + K·U·Vᵀ, so two models give
 U·Vᵀ, with a column for each place; what goes around the loop is L(s) = −K·Vᵀ·(sI − A_0)⁻¹·U, and its eigenvalues
-turn the closed loop unstable where one of them is −1.
-"""
+turn the closed loop unstable where one of them is −1."""
 
 import math
 from collections.abc import Iterator

@@ -77,8 +77,7 @@ def _of_loop(loop: PodLoop, setting: PodSetting) -> tuple[LoopMargins | None, st
 
 def _edge(lost: Callable[[float], complex | None], stride: float) -> tuple[float | None, complex | None]:
     """The last factor on the gain with which no mode is lost, on the way from 1 to 8, or to 1/8 and then 0; and the
-    eigenvalue that is lost beyond it.
-    """
+    eigenvalue that is lost beyond it."""
     good, bad = 1.0, stride
     while (what := lost(bad)) is None:
         good = bad

@@ -2,8 +2,7 @@
 
 The paper's design stops at a prediction from the sensitivity at a small gain. Here the gain is searched with the mode
 itself, and where the gain alone does not do, the lead/lag is centred anew on the mode where it is, with the
-sensitivity that it has there. Where that does not do either, all settings are surveyed.
-"""
+sensitivity that it has there. Where that does not do either, all settings are surveyed."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,8 +29,7 @@ from orchestrator.pod_design.survey import CENTRES, MOST_STATES, survey
 @dataclass(frozen=True)
 class Judgement:
     """The judgement on a setting: the damping ratio that counts, its prohibited effect on other modes, and the least
-    damping ratio of all modes from 0.1 to 2 Hz.
-    """
+    damping ratio of all modes from 0.1 to 2 Hz."""
 
     damping: float
     broken: str | None
@@ -104,8 +102,7 @@ def refine(
     ``others``: the other modes without the controller [rad/s].
     ``search``: gives settings where nothing near the design meets the requirement; by default a survey does.
     ``evenly``: whether, where no setting meets the requirement, that with the best least damping of all modes is
-    chosen.
-    """
+    chosen."""
     result = Refinement()
     even = -1.0
     near = ((why, candidate, None) for why, candidate in _candidates(loop, result, filters))
@@ -158,8 +155,7 @@ def sweep(
     ``required``: damping ratio of the target.
     ``bounds``: of the gain [pu of the converter's rating].
     ``why``: where the lead/lag comes from, for people.
-    ``special``: A gain within the bounds that the sweep always includes [pu].
-    """
+    ``special``: A gain within the bounds that the sweep always includes [pu]."""
     points: list[Placed] = []
     here = off
     for gain in sorted({*np.linspace(*bounds, _GAINS).tolist(), *([] if special is None else [special])}):
@@ -183,8 +179,7 @@ def sweep(
 
 def _of_all_modes(loop: PodLoop, points: Sequence[Placed]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """The gains with which the system is unstable, and the least damping ratio of all modes from 0.1 to 2 Hz at each;
-    empty for a system with more states than are surveyed.
-    """
+    empty for a system with more states than are surveyed."""
     if len(loop.model(points[0].setting).names) > MOST_STATES:
         return (), ()
     found = [extremes(loop.model(point.setting)) for point in points]
@@ -283,8 +278,7 @@ def _searched(result: Refinement, search: SearchSettings) -> Iterator[tuple[str,
 
 def _turned(base: Placed, turn: float) -> LeadLag | None:
     """The lead/lag of a setting with another angle, centred on the mode of this setting; None if its stages cannot give
-    this angle.
-    """
+    this angle."""
     filters = base.setting.filters
     total = filters.N_S * filters.stage_angle_deg + turn
     if abs(total) >= LARGEST_TURN * filters.N_S or base.eigenvalue.imag <= 0:
@@ -308,8 +302,7 @@ def recentred(loop: PodLoop, here: Placed) -> LeadLag:
 
 def _guarded(loop: PodLoop, found: GainSweep, judge: Judge, notes: list[str]) -> Placed | None:
     """The sweep's choice, or the largest gain below it without prohibited effect on other modes; None if every gain has
-    one.
-    """
+    one."""
     reason = judge(found.chosen).broken
     if reason is None:
         return found.chosen

@@ -2,8 +2,7 @@
 
 With one lead/lag the state matrix is A(K) = A_0 + K·D, so two linearisations of the converters give every gain. The
 best settings of a coarse grid are polished by Nelder and Mead's method. The survey does not identify the target: it
-rates a setting by the least damped mode that the setting moves. The caller follows the target.
-"""
+rates a setting by the least damped mode that the setting moves. The caller follows the target."""
 
 import math
 from collections.abc import Sequence
@@ -45,8 +44,7 @@ def survey(
 
     ``initial`` and ``others``: the target and the other modes without the controller [rad/s].
     ``stages``: N_S of the lead/lag, at least 1.
-    ``bounds``: of the gain [pu].
-    """
+    ``bounds``: of the gain [pu]."""
     ground = _Ground(loop, initial, np.array(others, dtype=complex), stages, bounds)
     turns = np.linspace(-0.95, 0.95, _TURNS).tolist()
     centres = np.linspace(math.log(CENTRES[0]), math.log(CENTRES[1]), _CENTRES).tolist()

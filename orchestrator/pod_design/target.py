@@ -41,8 +41,7 @@ def find_target(
     ``pattern``: name or pattern of the components, such as ``gfor*``; all with the controller where None.
     ``stages``: N_S of the lead/lag; None for the components' own.
     ``overrides``: values by ``component.variable``.
-    ``parameters``: parameter files; ``overrides`` go before them.
-    """
+    ``parameters``: parameter files; ``overrides`` go before them."""
     if scenario is not None and scenario not in case.scenarios:
         raise InputError(f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}")
     names = [scenario] if scenario is not None else list(case.scenarios)

@@ -60,8 +60,7 @@ def numbers_hash(module: str) -> str:
     """Hash of the versions and of what computes the points of a module: it, and all that it imports.
 
     Comments, docstrings and sentences do not count, and no module that is not imported. Where the files are others than
-    those that this process has loaded, it is the hash of what was loaded, to the last comma.
-    """
+    those that this process has loaded, it is the hash of what was loaded, to the last comma."""
     if _hash_of_files() != code_hash():
         return code_hash()
     hasher, files = _of_versions(), _module_files()

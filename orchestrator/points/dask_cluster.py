@@ -2,8 +2,7 @@
 
 Scheduler, workers and client exchange pickled Python objects: each of them can have any program run by the others. TLS
 with certificates of one's own authority keeps strangers out; it does not protect one member of the cluster from
-another.
-"""
+another."""
 
 import asyncio
 import ipaddress
@@ -36,8 +35,7 @@ class DaskCluster:
     ``address``: of the scheduler, such as ``tcp://host:8786`` or ``tls://host:8786``. Its workers need this project, in
     the same version.
     ``tls``: folder with the files of `TLS_FILES`, for an address with ``tls://``; where None, Dask's own configuration
-    says where they are.
-    """
+    says where they are."""
 
     def __init__(self, address: str, tls: Path | None = None) -> None:
         self.address, self._tls = address, tls
@@ -151,8 +149,7 @@ def _event_loop() -> Iterator[Any]:
     """Run the client's event loop in a thread, and end both.
 
     Dask's own gives up where its thread does not run within 10 s, as on a busy machine, and goes on after an address
-    at which nothing answers.
-    """
+    at which nothing answers."""
     from tornado.ioloop import IOLoop  # noqa: PLC0415 - of the extra `cluster`
 
     async def running() -> IOLoop:

@@ -17,8 +17,7 @@ class ClusterWatch:
     """The workers of one run.
 
     ``client``: of `distributed`.
-    ``patience``: seconds without any worker after which the run ends.
-    """
+    ``patience``: seconds without any worker after which the run ends."""
 
     def __init__(self, client: Any, address: str, patience: float) -> None:
         self._client, self._address, self._patience = client, address, patience

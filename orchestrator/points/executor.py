@@ -24,8 +24,7 @@ class Executor(Protocol):
         """Yield the index and the result of each task as soon as the result is there, in any order.
 
         An exception that ``function`` raises ends the run. A worker process that dies does not: its task is
-        computed again, up to `ATTEMPTS` times, and then yields a `WorkerLostError`.
-        """
+        computed again, up to `ATTEMPTS` times, and then yields a `WorkerLostError`."""
         ...
 
     def close(self) -> None:

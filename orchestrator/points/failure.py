@@ -47,8 +47,7 @@ class Failing(Protocol):
 def failure_kept(result: Failing) -> Iterator[None]:
     """Inside, an error ends the computation of one point and becomes part of its result.
 
-    An interrupt goes through: it is to end them all.
-    """
+    An interrupt goes through: it is to end them all."""
     try:
         with as_options():
             yield

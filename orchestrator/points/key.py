@@ -1,6 +1,5 @@
 """A hash over everything that the result of a point depends on, which names the point's file; and the hash by which a
-worker refuses a changed case or changed code.
-"""
+worker refuses a changed case or changed code."""
 
 import hashlib
 import json
@@ -37,8 +36,7 @@ def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:
 
 def component_content(description: FmuDescription) -> list[str]:
     """What a key contains for an FMU: a hash of its file, because a vendor may keep the guid of an older file, and the
-    effect of its binding.
-    """
+    effect of its binding."""
     status = description.path.stat()
     port = repr(description.port) if isinstance(description, BoundDescription) else ""
     return [_file_hash(description.path, status.st_mtime_ns, status.st_size), port]
@@ -46,8 +44,7 @@ def component_content(description: FmuDescription) -> list[str]:
 
 def fingerprint(case: CaseDefinition) -> str:
     """Two hashes: of this package's code and the libraries' versions, and of the texts of the case and its parameter
-    files.
-    """
+    files."""
     files = [f"{name}\0{file if isinstance(file, str) else file.text}" for name, file in case.parameter_files.items()]
     texts = "\0".join([case.text, *files])
     return f"{code_hash()[:32]}-{hashlib.sha256(texts.encode()).hexdigest()[:32]}"
@@ -63,8 +60,7 @@ def reference_to(case: CaseDefinition) -> str:
 def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
     """The case of a task, as a worker sees it.
 
-    ``reference`` and ``wanted``: name or path of the case, and its fingerprint.
-    """
+    ``reference`` and ``wanted``: name or path of the case, and its fingerprint."""
     case = load_case(reference, trust_fmus=trust_fmus)
     here = fingerprint(case)
     if here.partition("-")[0] != wanted.partition("-")[0]:

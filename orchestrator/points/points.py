@@ -41,8 +41,7 @@ class Work:
     ) -> Iterator[tuple[int, Point]]:
         """Yield, in any order, the index of each task and its record.
 
-        ``sizes``: as how many points each task counts; as one where None.
-        """
+        ``sizes``: as how many points each task counts; as one where None."""
         counts = sizes or [1] * len(tasks)
         total, missing = self.computed + self.stored + sum(counts), list[int]()
         for index, task in enumerate(tasks):

@@ -36,8 +36,7 @@ class Processes:
     """Runs tasks in ``workers`` fresh Python processes, which are replaced where they die.
 
     ``imports``: modules that the tasks need. Where the system allows it, one process imports them in the background,
-    once for all workers. Importing takes seconds, and the caller can prepare the tasks meanwhile.
-    """
+    once for all workers. Importing takes seconds, and the caller can prepare the tasks meanwhile."""
 
     def __init__(self, workers: int, imports: Sequence[str] = ()) -> None:
         self.workers = workers
@@ -128,8 +127,7 @@ def _context(imports: Sequence[str]) -> BaseContext:
     """How workers start; on Linux as copies of a process that has done the imports and nothing else.
 
     A copy of this process itself would not be safe to use: it may have loaded FMUs and started threads. Elsewhere
-    system libraries object to copies, and every worker does its imports itself.
-    """
+    system libraries object to copies, and every worker does its imports itself."""
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
@@ -178,8 +176,7 @@ class _Work:
 def _end_workers(pool: ProcessPoolExecutor) -> None:
     """Have the workers leave what they are at; their FMUs end, and their temporary folders are removed.
 
-    The workers themselves stay until the pool lets them go: one that dies under way can hold the pool up for ever.
-    """
+    The workers themselves stay until the pool lets them go: one that dies under way can hold the pool up for ever."""
     for process in list((pool._processes or {}).values()):
         process.terminate()
 

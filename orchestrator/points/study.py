@@ -31,8 +31,7 @@ def choose_executor(
 
     ``workers``: number of processes on this machine; one for each core where None. ``scheduler``: address of a Dask
     cluster, such as ``tcp://host:8786``; this machine where None. ``imports``: modules that each
-    worker imports before its first point. ``tls``: as `DaskCluster` takes it.
-    """
+    worker imports before its first point. ``tls``: as `DaskCluster` takes it."""
     if scheduler is not None:
         if workers not in (None, 1):
             raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
@@ -64,7 +63,6 @@ class PointStudy(Generic[Plan, Result, Shown]):
         """Compute a plan, and close the executor.
 
         ``folder``: its subfolder ``points`` keeps the points; without a folder they are forgotten. ``more``: further
-        arguments of the study.
-        """
+        arguments of the study."""
         with TemporaryDirectory() as passing, closing(executor):
             return self.shown(self.run(planned, Work.into(Path(folder or passing), executor, report), *more))

@@ -1,8 +1,7 @@
 """One point of a study: its task, which can be sent to another process or machine, and the record that is kept of it.
 
 A study has, in a module of its own, a subclass of `Task` with the fields in which its points differ, and a dataclass
-with `Kept` for what comes out. The key of a task is made of all its fields, and of the code of that module.
-"""
+with `Kept` for what comes out. The key of a task is made of all its fields, and of the code of that module."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -44,8 +43,7 @@ class StudyCase:
         """The case of a scenario as it is without what differs between the points.
 
         ``text``: what stands for the case's own in keys. ``besides``: what the results depend on as well [JSON's
-        types].
-        """
+        types]."""
         case = prepared.case
         content = {
             "case": case.text if text is None else text,

@@ -19,8 +19,7 @@ Cell = str | Text  # of a table: text that is shown to the letter, or text with 
 class PlainTable(Table):
     """A table that shows its cells as they are: rich would take "[kV]" of a foreign text for a style.
 
-    Such a word would be left out, and "[/s]" would end the program.
-    """
+    Such a word would be left out, and "[/s]" would end the program."""
 
     def add_row(self, *cells: Any, **options: Any) -> None:
         """Add a row; text in it is shown to the letter."""
@@ -29,8 +28,7 @@ class PlainTable(Table):
 
 def make_table(title: str, *columns: str, left: int = 1, rows: Iterable[Sequence[Cell]] = ()) -> PlainTable:
     """A table whose title, headings and cells are shown as they are; columns after the ``left`` first ones are of
-    figures.
-    """
+    figures."""
     table = PlainTable(title=escape(title), title_justify="left", title_style="bold", header_style="bold")
     for index, column in enumerate(columns):
         table.add_column(escape(column), justify="left" if index < left else "right", overflow="fold")

@@ -52,8 +52,7 @@ def dataset_of(
     """Columns that are read when they are used, over the time.
 
     ``pieces``: files with the rows, in their order.
-    ``units``: attributes of columns, by name; those of ``time`` as well.
-    """
+    ``units``: attributes of columns, by name; those of ``time`` as well."""
     data = {
         name: ("time", xr.core.indexing.LazilyIndexedArray(_Column(pieces, name)), about)
         for name, about in units.items()

@@ -21,8 +21,7 @@ LOCK = ".lock"  # the file's name; it holds the number of the process that has i
 def held(folder: Path) -> Iterator[None]:
     """Hold a folder, which is made where it is missing; the lock ends with the process, whatever ends that.
 
-    Windows, and network drives without locks, have no such lock: there nobody is refused.
-    """
+    Windows, and network drives without locks, have no such lock: there nobody is refused."""
     made_folder(folder)
     if fcntl is None:
         yield

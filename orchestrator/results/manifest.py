@@ -40,8 +40,7 @@ class Manifest:
     def check(self, names: Iterable[str]) -> None:
         """Compare files with what was written.
 
-        ``names``: of the files; those that are not listed, and were written by nobody, are not looked at.
-        """
+        ``names``: of the files; those that are not listed, and were written by nobody, are not looked at."""
         for name in names:
             if name in self.files:
                 self._check(self.folder / name, self.files[name])
@@ -79,8 +78,7 @@ def write_manifest(
 
     ``scenarios``: folders beside them that are of the same run.
     ``before``: what an earlier command said of the files' place: its files that are not written anew stay listed.
-    ``about``: of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so.
-    """
+    ``about``: of a scenario's folder: its ``scenario``, and ``ended_early`` with the reason where its run did so."""
     paths = {name: folder / name for name in sorted(names)}
     files = {name: WrittenFile(run, sha256_of(path), path.stat().st_size) for name, path in paths.items()}
     listed = {**(before.files if before else {}), **files}

@@ -1,8 +1,7 @@
 """NetCDF-4 files of columns over the time, in chunks that are compressed; HDF5 itself never writes to the disk.
 
 When the disk is full, HDF5 ends the whole process. So its files are made in memory, or in a file whose place on the
-disk was reserved before.
-"""
+disk was reserved before."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -44,8 +43,7 @@ def netcdf_image(
 
     ``times``: [s], shape (n,).
     ``values``: shape (n, number of names).
-    ``units``: attributes of columns, by name; those of ``time`` as well.
-    """
+    ``units``: attributes of columns, by name; those of ``time`` as well."""
     import h5py  # noqa: PLC0415 - a tenth of a second that only recordings need
 
     with h5py.File("image", "w", driver="core", backing_store=False, track_order=True) as file:
@@ -80,8 +78,7 @@ def create_columns(
 class ReservedFile(RawIOBase):
     """A file of a size that is reserved, for HDF5 to write into: no write can fail for want of room.
 
-    Should one fail all the same, `error` keeps it and the rest is not written.
-    """
+    Should one fail all the same, `error` keeps it and the rest is not written."""
 
     def __init__(self, file: BinaryIO, size: int) -> None:
         super().__init__()

@@ -45,8 +45,7 @@ def open_recording(folder: Path) -> xr.Dataset:
 def open_whole(path: Path) -> xr.Dataset:
     """A finished recording: in memory if it is of moderate size, else with signals that are read when they are used.
 
-    Other NetCDF files, such as a sweep's, are read as well.
-    """
+    Other NetCDF files, such as a sweep's, are read as well."""
     found = _of_ours(path)
     if found is None:
         stored = xr.open_dataset(path, cache=False)

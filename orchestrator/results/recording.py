@@ -33,8 +33,7 @@ class RecordingFolder:
     """Rows of a run in files ``000000000000.nc``, named by the number of their first row.
 
     Each is a NetCDF-4 file, written at once; the last one is replaced as it grows. So every moment leaves a recording
-    that can be read, whatever ends the process.
-    """
+    that can be read, whatever ends the process."""
 
     def __init__(self, folder: Path, prepared: PreparedScenario, further: Attributes | None = None) -> None:
         import h5py  # noqa: F401, PLC0415 - here rather than in the first step, whose time is measured
@@ -80,8 +79,7 @@ class RecordingFolder:
 
         ``further``: more attributes of it, such as `ENDED_EARLY`.
         Raises a `ResultsError` if it cannot be written, or the parts are not those that the run has written; the parts
-        stay.
-        """
+        stay."""
         parts = parts_of(self.folder)
         found = rows_in(parts)
         if self._rows is not None and found != self._rows:

@@ -14,8 +14,7 @@ _AT_ONCE = 1_000_000  # rows of a long signal that are read at once
 def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
     """``"a.b"``, ``"a.b - c.d"`` or ``"|a.i|"`` from a recorded dataset; None if a variable was not recorded.
 
-    The name of a measured channel may hold `` - `` itself.
-    """
+    The name of a measured channel may hold `` - `` itself."""
     if expression in dataset:
         return dataset[expression]
     parts = expression.split(" - ")
@@ -33,8 +32,7 @@ def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
 def outline(dataset: xr.Dataset, expression: str, most: int = MOST_DRAWN) -> xr.DataArray | None:
     """A signal to be drawn: all of it, or of a long one the least and the largest value in each of many short spans.
 
-    A long one is read piece by piece.
-    """
+    A long one is read piece by piece."""
     rows = dataset.sizes["time"]
     if rows <= most:
         return signal(dataset, expression)

@@ -27,8 +27,7 @@ class ScenarioFolder:
     """The folder of one scenario's results, filled as ``<scenario>.part-<run id>`` beside its place.
 
     ``path``: Where files go until `publish`.
-    ``place``: Where they are afterwards.
-    """
+    ``place``: Where they are afterwards."""
 
     def __init__(self, folder: Path, scenario: str, run: str) -> None:
         self.run = run
@@ -47,8 +46,7 @@ class ScenarioFolder:
     def publish(self, ended_early: str | None = None) -> Path:
         """Put the folder in its place, whole; results of an earlier run that are there go.
 
-        ``ended_early``: why the run ended before its stop time; None where it reached that.
-        """
+        ``ended_early``: why the run ended before its stop time; None where it reached that."""
         try:
             about = {"scenario": self.place.name} | ({} if ended_early is None else {ENDED_EARLY: ended_early})
             write_manifest(self.path, self.run, _files(self.path), about=about)
@@ -87,8 +85,7 @@ def _has_rows(folder: Path) -> bool:
 
 def mend(folder: Path) -> None:
     """Bring back what a process that was killed had just put aside for its own results, and remove what it had done
-    with, or begun without recording anything.
-    """
+    with, or begun without recording anything."""
     for begun in unfinished(folder):
         if not _has_rows(begun):
             rmtree(begun, ignore_errors=True)

@@ -86,8 +86,7 @@ def find_modes_here(
     ``neighbour``: modes of a similar operating point; None searches from scratch.
     ``count``: whether all growing eigenvalues are counted, at any frequency. Small systems always are.
     Raises an `AnalysisError` if neither the search nor the growth that is counted comes to an end, and the system is
-    too large for all of its eigenvalues.
-    """
+    too large for all of its eigenvalues."""
     if len(model.names) <= DENSE:
         return _whole(model, wanted)
     equations = ShiftedEquations(model)
@@ -192,7 +191,6 @@ def _radians(wanted: CriticalRegion) -> tuple[float, float]:
 def residue(modes: ModeSet, entry: Vector, exit: Vector) -> NDArray[np.complex128]:
     """Residue of each mode in the transfer from an entry to an exit, shape (m,) [rad/s, by the units of both].
 
-    ``entry`` and ``exit``: column of B and row of C for the whole system, shape (n,).
-    """
+    ``entry`` and ``exit``: column of B and row of C for the whole system, shape (n,)."""
     norms = np.einsum("ij,ij->i", modes.left.conj(), modes.right)
     return np.asarray((modes.left.conj() @ entry) * (modes.right @ exit) / norms, dtype=complex)

@@ -1,8 +1,7 @@
 """A stretch of a screening: some operating points with their outages, computed one after the other.
 
 A stretch starts from scratch, so its result does not
-depend on where and when it is computed.
-"""
+depend on where and when it is computed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -73,8 +73,7 @@ def plan_screening(
     ``wanted``: which modes are critical; from 0.1 to 2 Hz with less than 20 % damping where None.
     ``whole``: whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of
     stretches.
-    ``sharing``: how units share an outage; as the case says where None.
-    """
+    ``sharing``: how units share an outage; as the case says where None."""
     read = read_operating_points(case, points, outages, scenario, overrides, step_size, parameters)
     asked = wanted or CriticalRegion(0.1, 2.0, 0.2)
     study = StudyCase.of(read.prepared, read.layers, step_size)
@@ -116,8 +115,7 @@ def run_screening(plan: ScreeningPlan, work: Work, shard: Shard | None = None) -
     """Compute the stretches that are not stored yet, and follow the modes over all of them.
 
     ``plan``: as `plan_screening` gives it.
-    ``shard``: the part to compute; all where None.
-    """
+    ``shard``: the part to compute; all where None."""
     part = shard or Shard()
     tasks = {k: task for k, task in enumerate(plan.tasks) if part.has(k)}
     sizes = [len(task.items) for task in tasks.values()]

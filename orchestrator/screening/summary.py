@@ -50,8 +50,7 @@ class ModeAt:
 
         Returns name, and residues from its active and its reactive power reference to its frequency [rad/s by pu on its
         rating]. Their size is the shift of the eigenvalue by unit gain of a controller whose phase is right, as long as
-        the gain is small.
-        """
+        the gain is small."""
         found = [
             (name, complex(values[0, self.place]), complex(values[1, self.place]))
             for name, values in self.item.record.residues.items()
@@ -101,8 +100,7 @@ class Summary:
     @property
     def slowest(self) -> float:
         """Growth [1/s] from which it was counted at all frequencies, wherever it was; slower growth outside of the
-        range was sought near 0 only. 0 where all eigenvalues are known everywhere.
-        """
+        range was sought near 0 only. 0 where all eigenvalues are known everywhere."""
         return max((item.record.slowest for item in self.result.items), default=0.0)
 
     def failures(self) -> Iterator[ScreenedItem]:
@@ -131,8 +129,7 @@ def _joined(groups: list[list[ModeAt]], items: Sequence[ScreenedItem]) -> list[l
     """Trajectories as modes: one that ends where another begins is the same mode, where frequency and shares agree.
 
     After an outage those who take part in a mode may change so much that it was not followed. Two trajectories with one
-    item in common are two modes, however alike.
-    """
+    item in common are two modes, however alike."""
     found: list[tuple[list[ModeAt], set[int]]] = []
     for group in sorted(groups, key=len, reverse=True):
         own = {id(one.item) for one in group}
@@ -164,8 +161,7 @@ def _likeness(known: Sequence[ModeAt], other: Sequence[ModeAt]) -> float:
 def duration(mode: ScreenedMode, *, outages: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A damping-duration curve: for how long the damping is at most so much.
 
-    Returns hours and damping ratios [%], both rising.
-    """
+    Returns hours and damping ratios [%], both rising."""
     least: dict[str, tuple[float, float]] = {}
     for one in mode.at:
         if outages or not one.item.outage.elements:

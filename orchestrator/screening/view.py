@@ -171,8 +171,7 @@ def _cell(item: ScreenedItem | None) -> str | Marked:
 def modes_table(summary: Summary, most: int = 12, *, whole: bool = False) -> ColumnTable[ScreenedMode]:
     """Each mode where it is damped least, and the converter whose damping controller moves it most there.
 
-    ``whole``: with eigenvalue and participation, for which a terminal is too narrow.
-    """
+    ``whole``: with eigenvalue and participation, for which a terminal is too narrow."""
     more: list[Column[ScreenedMode]] = [
         Column("λ [rad/s]", lambda mode: mode.worst.value, eigenvalue_text),
         Column("Participation", lambda mode: ", ".join(f"{name} {x:.2f}" for name, x in mode.worst.participation(4))),

@@ -24,8 +24,7 @@ _SLOWEST = 0.5  # |λ| that the floor is at least related to [rad/s]
 class Shift:
     """How far a changed parameter moves an eigenvalue [rad/s]: in the step map, and without a communication step.
 
-    ``edges`` are the components that stand at the edge of a limit with the changed value.
-    """
+    ``edges`` are the components that stand at the edge of a limit with the changed value."""
 
     step: complex
     continuous: complex | None

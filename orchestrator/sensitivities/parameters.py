@@ -44,8 +44,7 @@ def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool =
 
     ``patterns``: names ``component.variable``, also with ``*``; fixed parameters that fit are taken too. Without
     patterns all tunable ones are taken.
-    ``fixed``: without patterns, take the fixed ones as well.
-    """
+    ``fixed``: without patterns, take the fixed ones as well."""
     descriptions = {name: running.description for name, running in master.components.items()}
     return parameters_in(
         descriptions, lambda name, variable: master.components[name].get([variable])[variable], patterns, fixed=fixed
@@ -61,8 +60,7 @@ def parameters_in(
 ) -> list[Parameter]:
     """As `parameters_of`, of components that need not run.
 
-    ``value_of``: value of a component's variable, in its unit; asked for the chosen ones only.
-    """
+    ``value_of``: value of a component's variable, in its unit; asked for the chosen ones only."""
     everything = {
         f"{component}.{info.name}": (component, info)
         for component, description in descriptions.items()

@@ -2,8 +2,7 @@
 
 Two ways lead to the total derivative, in which the operating point moves with the parameter. A tunable parameter that
 leaves the running system where it stands is changed in its running FMU, and this FMU alone is linearised again. With
-any other one the case is started anew, from the power flow on, as `gfor modes --set` starts it.
-"""
+any other one the case is started anew, from the power flow on, as `gfor modes --set` starts it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -133,8 +132,7 @@ def find_sensitivities(
     first named one, else the critical one.
     ``held``: hold the operating point, which leaves the tunable parameters alone.
     ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation.
-    ``frequency_range``: in which the mode is [Hz].
-    """
+    ``frequency_range``: in which the mode is [Hz]."""
     with running(prepared) as master:
         point = find_operating_point(master)
         blocks = Blocks(master, derivatives=True, directional=directional)
@@ -229,8 +227,7 @@ def _shift(model: LinearModel, varied: LinearModel, pair: Eigenpair) -> complex:
 
 def _stays(master: Master, parameter: Parameter, period: int) -> bool:
     """Whether the system is where it was, with another value of a parameter: its component now and a step later, or all
-    of it a period [communication steps] later where sampled controllers make the steps differ.
-    """
+    of it a period [communication steps] later where sampled controllers make the steps differ."""
     change = _TRIED * parameter.scale
 
     def answer() -> Numbers:

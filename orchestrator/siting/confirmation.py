@@ -77,8 +77,7 @@ def confirmed(
     """Compare a mode's predicted shift with that of the coupled FMUs.
 
     ``prepared``: With the device at the bus.
-    ``controller``: ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is.
-    """
+    ``controller``: ``pod_p`` or ``pod_q``, of at most a gain [pu of the rating]; None for a device as it is."""
     try:
         with running(prepared) as master:
             if controller is None:
@@ -137,8 +136,7 @@ def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: Se
 
 def _tuned(loop: PodLoop, by_gain: complex, eigenvalue: complex, most: float) -> PodSetting:
     """The setting with the best least damping: around the angle that the residue asks for, with gains up to the most;
-    of equally good ones that with the smallest gain.
-    """
+    of equally good ones that with the smallest gain."""
     angle = math.degrees(cmath.phase(-1 / by_gain))
     settings = [
         PodSetting(part * most, lead_lag_turning(angle + turn, eigenvalue.imag, STAGES))

@@ -14,8 +14,7 @@ STAGES = 3  # lead/lag stages of a POD that is put somewhere: together they turn
 
 def converter(prepared: PreparedScenario, rating: float, controller: str | None) -> ComponentTable:
     """The catalogue's grid-forming converter of a rating [MVA], of the kind that the network takes; one of its PODs is
-    going to be tuned.
-    """
+    going to be tuned."""
     grid = prepared.case.table.power_flow
     taken = prepared.system.components[grid.grid].description.inputs if grid else ()
     model = "gfor_phasor" if any(name.endswith(".e_re") for name in taken) else "gfor"

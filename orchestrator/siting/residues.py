@@ -21,8 +21,7 @@ from orchestrator.study.modes import ModesResult, modes_from, running
 @dataclass(frozen=True)
 class SeenMode:
     """A mode, and by bus: what a current into it does to the eigenvalue [rad/s per pu], the voltage in the mode's shape
-    [pu], both by real and imaginary part, and how a current there moves the voltage through all other modes [pu].
-    """
+    [pu], both by real and imaginary part, and how a current there moves the voltage through all other modes [pu]."""
 
     label: str
     mode: Mode
@@ -32,8 +31,7 @@ class SeenMode:
 
     def shift(self, bus: str, response: Vector) -> complex:
         """Δλ [rad/s] by a device whose current [pu, 100 MVA] answers the bus voltage [pu] so at the mode, as long as it
-        moves the mode little; what it does to its own bus is taken in.
-        """
+        moves the mode little; what it does to its own bus is taken in."""
         at_mode = np.linalg.solve(np.eye(2) - response @ self.impedance[bus], response)
         return complex(self.drive[bus] @ at_mode @ self.shown[bus])
 
@@ -88,8 +86,7 @@ def _early(blocks: Blocks, model: LinearModel) -> Matrix:
 def _seen(label: str, mode: Mode, space: StateSpace, early: Matrix, buses: Sequence[str]) -> SeenMode:
     """The residues of one mode between the current and the voltage of each bus, and what is left without it.
 
-    A device's current at a step's beginning is that of the step before, which an input's is not.
-    """
+    A device's current at a step's beginning is that of the step before, which an input's is not."""
     assert space.step_size is not None
     z, n = cmath.exp(mode.eigenvalue * space.step_size), len(space.A)
     left, right = (np.array([vector[name] for name in space.states]) for vector in (mode.left, mode.shape))

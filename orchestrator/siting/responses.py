@@ -15,8 +15,7 @@ ACTIVE, REACTIVE = "P", "Q"
 
 def ideal_support(kind: str, voltage: complex, eigenvalue: complex) -> Vector:
     """1 MW less, or 1 Mvar more, for each Hz that the bus's frequency is high, which is λ/2π times its angle. A power S
-    is the current conj(S/v).
-    """
+    is the current conj(S/v)."""
     power = {ACTIVE: -1.0 + 0j, REACTIVE: 1j}[kind] / SYSTEM_BASE_MVA
     current = (power / voltage).conjugate()
     angle = np.array([-voltage.imag, voltage.real]) / abs(voltage) ** 2
@@ -27,8 +26,7 @@ def ideal_support(kind: str, voltage: complex, eigenvalue: complex) -> Vector:
 def response_of(master: Master, model: ComponentLinearization, eigenvalue: complex) -> Vector:
     """Of a running component's current [pu, 100 MVA] to the voltage of its bus at λ [rad/s], shape (2, 2).
 
-    The component answers the voltage at a step's beginning. A phasor network takes its admittance at the step's end.
-    """
+    The component answers the voltage at a step's beginning. A phasor network takes its admittance at the step's end."""
     z = cmath.exp(eigenvalue * master.clock.step_size)
     voltage = [model.inputs.index(part) for part in ("v_re", "v_im")]
     states = np.linalg.solve(z * np.eye(len(model.A)) - model.A, model.B[:, voltage])

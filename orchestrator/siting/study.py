@@ -63,8 +63,7 @@ class SiteRequest:
 @dataclass(frozen=True)
 class SupportShift:
     """Δλ [rad/s] by a device, or by 1 MW/Hz or 1 Mvar/Hz without a phase shift; the change of the damping ratio
-    [points], with the phase that a tuned POD gives or by the device as it is; and its part of the best bus's.
-    """
+    [points], with the phase that a tuned POD gives or by the device as it is; and its part of the best bus's."""
 
     change: complex
     damping: float
@@ -83,8 +82,7 @@ Response = Callable[[Situation, str, SeenMode], Vector]
 @dataclass(frozen=True)
 class SiteResult:
     """Shifts of `DEVICE`, of 1 MW/Hz (`ACTIVE`) and of 1 Mvar/Hz (`REACTIVE`), by name of the situation, label of the
-    mode, and bus; all buses, best first; and the outages without modes, with the reason.
-    """
+    mode, and bus; all buses, best first; and the outages without modes, with the reason."""
 
     case: Case
     request: SiteRequest

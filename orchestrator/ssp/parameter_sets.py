@@ -50,8 +50,7 @@ def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[
 
     ``parent``: takes the group of units as its last element.
     ``name``: name of the group of units, with its namespace.
-    ``known``: attributes of ``BaseUnit`` by unit; a unit that is missing here gets no attributes.
-    """
+    ``known``: attributes of ``BaseUnit`` by unit; a unit that is missing here gets no attributes."""
     units = [(unit, known.get(unit, {})) for unit in used]
     if units:
         group = SubElement(parent, name)

@@ -77,8 +77,7 @@ def _times(description: Element) -> dict[str, float]:
 
 def _component_names(structure: Structure) -> dict[Owner, str]:
     """A name for every component that is valid in a case file; the name of a nested component begins with its system's
-    name.
-    """
+    name."""
     names: dict[Owner, str] = {}
     for owner in structure.sources:
         names[owner] = plain_name("_".join(owner), names.values())
@@ -87,8 +86,7 @@ def _component_names(structure: Structure) -> dict[Owner, str]:
 
 def _description(fmu: Path) -> FmuDescription | None:
     """The FMU's description; None if it cannot be used. The preparation of the case then reports the reason with all
-    other problems.
-    """
+    other problems."""
     try:
         return read_description(fmu)
     except InputError:
@@ -99,8 +97,7 @@ def _values(structure: Structure, owner: Owner, fmu: FmuDescription | None) -> d
     """Values of a component by the rules of SSP.
 
     Names that the FMU does not have are ignored. An input without connection keeps its start value. The start value of
-    a connected input is left out.
-    """
+    a connected input is left out."""
     given = structure.values[owner]
     if fmu is None:
         return {}

@@ -1,8 +1,7 @@
 """An FMU's own test inside the FMU: a smoke test with parameters, stimuli, reference results and the first state.
 
 The files stand in the folder of FMI's layered standard LS-REF (Modelica Association, fmi-ls-ref), which says what each
-is for. The experiment has the form of ma-hs-experiments, the parameters that of SSP. Both are drafts.
-"""
+is for. The experiment has the form of ma-hs-experiments, the parameters that of SSP. Both are drafts."""
 
 import csv
 import hashlib
@@ -31,8 +30,7 @@ def reference_members(path: Path) -> dict[str, bytes]:
     """Run a smoke test of an FMU for this machine, and return its files by their path in the archive.
 
     ``path``: the FMU, which starts from its own start values. 5 ms later its first continuous input is 1 % (of 1 at
-    least) higher.
-    """
+    least) higher."""
     description = read_description(path)
     stimuli, references, state = _run(description)
     platform = platform_of(description.fmi_version)

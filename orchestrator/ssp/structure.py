@@ -89,8 +89,7 @@ class _Reader:
 
     def _source(self, component: Element, owner: Owner) -> str:
         """The component's member of the archive. If this is not an FMU, the problem is noted and the result is
-        empty.
-        """
+        empty."""
         kind, implementation = component.get("type", FMU_TYPE), component.get("implementation", "any")
         if kind != FMU_TYPE:
             self._refuse(owner, f"it is of type {kind!r}; only FMUs ({FMU_TYPE}) and systems written out are supported")
@@ -126,15 +125,13 @@ class _Reader:
     @staticmethod
     def _end(connection: Element, end: str, owner: Owner) -> Node:
         """The connector at an end of a connection: of the named element, or of the system itself if no element is
-        named.
-        """
+        named."""
         element = connection.get(f"{end}Element")
         return (*owner, element) if element else owner, connection.get(f"{end}Connector", "")
 
     def _sends(self, node: Node, system: Owner) -> bool:
         """Whether data flow from a connector into a connection of the system. The kind of the connector decides,
-        because SSP allows start and end in either order.
-        """
+        because SSP allows start and end in either order."""
         return self._kinds.get(node) in (_SENDING_INSIDE if node[0] == system else _SENDING_OUTSIDE)
 
     def _connect(self, sink: Node) -> None:
@@ -192,8 +189,7 @@ class _Reader:
 
     def _find(self, owner: Owner, name: str) -> Node | None:
         """The node that a hierarchical name means, seen from a component or system; None if there is no such node,
-        which SSP allows.
-        """
+        which SSP allows."""
         if owner in self._structure.sources or (owner, name) in self._kinds:
             return owner, name
         inner = [e for e in self._elements.get(owner, []) if name.startswith(f"{e}.")]

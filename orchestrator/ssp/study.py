@@ -1,7 +1,6 @@
 """The parts of a scenario that SSP itself cannot hold: step, schedule, events, analysis and plots.
 
-It travels as an annotation, which other tools ignore. The step is written in libcosim's form as well.
-"""
+It travels as an annotation, which other tools ignore. The step is written in libcosim's form as well."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,8 +41,7 @@ def study_of(
     ``step_size``: communication step [s].
     ``schedule``: the order in which the components are stepped.
     ``events``: events of the scenario, whose order is kept.
-    ``tables``: tables of the case file that only this project knows.
-    """
+    ``tables``: tables of the case file that only this project knows."""
     if faults := faults_among(events):
         raise InputError(f"an SSP cannot hold faults ({faults[0]}); remove them from the scenario to export it")
     settings = tuple(
@@ -81,8 +79,7 @@ def write_osp_step(annotations: Element, step_size: float) -> None:
 def read_study(description: Element) -> SspStudy | None:
     """Read our annotation from a system structure description; None if it has no such annotation.
 
-    Raises an `InputError` if the annotation has another form than `write_study` gives it.
-    """
+    Raises an `InputError` if the annotation has another form than `write_study` gives it."""
     for annotation in children(description, "ssd:Annotations/ssc:Annotation"):
         if annotation.get("type") == STUDY_TYPE:
             try:

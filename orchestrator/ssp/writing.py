@@ -21,8 +21,7 @@ def ssp_members(name: str, title: str, system: System, stop_time: float, study: 
     ``stop_time``: stop time of the default experiment [s].
     ``study``: the parts of the scenario that SSP cannot express.
     Raises an `InputError` if a value is of a type that cannot be written, or a connection does more than carry its
-    value.
-    """
+    value."""
     if disturbed := described(system.wires):
         raise InputError(
             f"an SSP cannot hold what a connection does to its value ({disturbed[0]}); remove the imperfections from "
@@ -99,8 +98,7 @@ def _component(
     """A component with connectors for its outputs and the inputs that something feeds.
 
     An input that is constant has its value from the parameter set and no connector: some tools take every input
-    connector for a connected one.
-    """
+    connector for a connected one."""
     component = SubElement(
         elements, tag("ssd:Component"), name=name, type=FMU_TYPE, source=source, implementation="CoSimulation"
     )

@@ -1,8 +1,7 @@
 """The modes of several scenarios, one after the other, with both cores at work.
 
 The eigenvalues of a large system take seconds in linear algebra, which lets Python run. Meanwhile the FMUs of the next
-scenario are initialised and linearised, which is Python's work. All calls of FMUs stay in the calling thread.
-"""
+scenario are initialised and linearised, which is Python's work. All calls of FMUs stay in the calling thread."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -26,8 +25,7 @@ def compute_all_modes(
 
     FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file.
 
-    Raises a `CosimError`: As `compute_modes`, of the first scenario that cannot be computed.
-    """
+    Raises a `CosimError`: As `compute_modes`, of the first scenario that cannot be computed."""
     if len(scenarios) < 2 or not all(_all_ours(prepared) for prepared in scenarios):
         return [compute_modes(one, frequency_range, critical, directional=directional) for one in scenarios]
     results: list[ModesResult] = []

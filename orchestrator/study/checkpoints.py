@@ -30,8 +30,7 @@ _SHORT = 10.0  # A scenario that was done in less wall-clock time [s] is run aga
 
 def not_kept(prepared: PreparedScenario) -> dict[str, str]:
     """Components whose state cannot be kept, each with the reason; under ``newton`` and with a tolerance one stands for
-    all.
-    """
+    all."""
     if prepared.schedule.tolerance is not None:
         first = next(iter(prepared.system.components))
         return {first: "with a tolerance nothing is kept, as the length of the next step is not"}
@@ -47,8 +46,7 @@ class Checkpoints:
 
     ``every``: wall-clock time between two of them [s].
     ``resume``: go on from the newest that is there, instead of beginning anew.
-    ``say``: told, in one line each, what a user should know.
-    """
+    ``say``: told, in one line each, what a user should know."""
 
     def __init__(
         self, prepared: PreparedScenario, folder: Path, every: float, *, resume: bool, say: Callable[[str], None]

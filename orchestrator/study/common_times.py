@@ -23,8 +23,7 @@ class CommonTimes:
         """Values at the common times, shape (n,).
 
         ``run``: 0 for the first run, 1 for the second.
-        ``signal``: all values that this run has recorded, shape (times of the run,).
-        """
+        ``signal``: all values that this run has recorded, shape (times of the run,)."""
         rows = self._rows[run]
         found = signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)
         return np.asarray(found, dtype=float)
@@ -34,8 +33,7 @@ def common_times(a: Numbers, b: Numbers, labels: tuple[str, str]) -> CommonTimes
     """Times at which two runs are compared: those of the run with the longer interval.
 
     The other run's values are those that it recorded at these times. Where it lacks one of these times, its values are
-    interpolated: between two times of the shorter interval, and never between two of the longer one.
-    """
+    interpolated: between two times of the shorter interval, and never between two of the longer one."""
     both = (np.asarray(a, dtype=float), np.asarray(b, dtype=float))
     noise = _NOISE * min(map(_interval, both))
     begin, end = max(t[0] for t in both) - noise, min(t[-1] for t in both) + noise

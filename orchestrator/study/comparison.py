@@ -124,8 +124,7 @@ def strongest_modes(curve: xr.DataArray, start: float, stop: float | None = None
     """What a signal rings with between two times [s], strongest first; see `identify_modes`.
 
     What has less than a thousandth of the strongest's amplitude is left out, whatever the trend that an oscillation is
-    on. Each mode has its doubts.
-    """
+    on. Each mode has its doubts."""
     window = curve.sel(time=slice(start, stop))
     found = _modes_of(window)
     begin, end = float(window["time"][0]), float(window["time"][-1])
@@ -163,8 +162,7 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
 
     ``expression``: the signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
     ``start``: oscillations are looked for from this time on [s].
-    ``labels``: names of the two runs for tables and errors.
-    """
+    ``labels``: names of the two runs for tables and errors."""
     first, second = (recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True))
     for curve, label in zip((first, second), labels, strict=True):
         require_numbers(curve, expression, label)
@@ -194,8 +192,7 @@ def most_different(
 ) -> list[str]:
     """Signals that both runs have, those first whose difference is largest beside their own deviation.
 
-    ``a`` and ``b``: trajectories of the two runs, compared at the times of `common_times`.
-    """
+    ``a`` and ``b``: trajectories of the two runs, compared at the times of `common_times`."""
     times = common_times(a["time"].values, b["time"].values, labels)
 
     def share(name: str) -> float:

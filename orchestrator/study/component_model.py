@@ -14,8 +14,7 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
     """The continuous linear model of one component at the scenario's steady state.
 
     It is made of the FMU's own directional derivatives where it gives them, else by perturbation. Its inputs and
-    outputs are all that the FMU has of type Real.
-    """
+    outputs are all that the FMU has of type Real."""
     plan = prepared.system.components[name]
     info = plan.description.variables
     inputs, outputs = (

@@ -22,8 +22,7 @@ def run_like(
 
     The operating point is not improved before and no modes are computed: another master does neither.
 
-    ``prepared``: the scenario; its own schedule is not used.
-    """
+    ``prepared``: the scenario; its own schedule is not used."""
     emulation = emulate(
         prepared.system, rules, prepared.step_size, prepared.stop_time, prepared.record, prepared.record_every,
         prepared.events, order, observers,

@@ -59,8 +59,7 @@ def linear_model(
     The verdict on the continuous model is its own; beside it stands what is to be said of the step map.
 
     ``inputs`` and ``outputs``: names ``component.variable``.
-    ``as_continuous``: A model in continuous time instead of the map over one communication step.
-    """
+    ``as_continuous``: A model in continuous time instead of the map over one communication step."""
     with running(prepared) as master:
         point = find_operating_point(master)
         blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)

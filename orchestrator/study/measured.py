@@ -31,8 +31,7 @@ def measured_modes(window: xr.DataArray, coarser: float = 1.0) -> list[Identifie
     """The modes of a measured signal.
 
     Where samples are dense they are averaged before they are thinned out, so that a faster oscillation does not appear
-    as a slower one. An average over equal times leaves the eigenvalues of a free response as they are.
-    """
+    as a slower one. An average over equal times leaves the eigenvalues of a free response as they are."""
     times, values = window["time"].values, np.asarray(window.values, dtype=float)
     _check(times, values, float(window.coords[LINE_FREQUENCY]))
     deviation = values - float(values.mean())
@@ -57,8 +56,7 @@ def _noise(values: Numbers) -> float:
     median, for a matrix with half as many columns as rows.
 
     Gavish and Donoho, "The optimal hard threshold for singular values is 4/sqrt(3)", IEEE Trans. Information Theory
-    60(8), 2014, equation 5.
-    """
+    60(8), 2014, equation 5."""
     if len(values) < 6:
         return _LEAST_NOISE
     hankel = np.lib.stride_tricks.sliding_window_view(values, len(values) // 3 + 1)

@@ -5,8 +5,7 @@ is clear: the same system without its damping controllers, another scenario of t
 file. Where the operating point stays, the linear models of both are mixed on the way; where only gains differ, that is
 the way of the gains. Else the values that differ go from one side to the other, and each system on the way is started.
 
-A clear shape is not believed where a damping controller, or a value of somebody else's FMU, may have made it.
-"""
+A clear shape is not believed where a damping controller, or a value of somebody else's FMU, may have made it."""
 
 import fnmatch
 import math
@@ -70,8 +69,7 @@ def settled(
 
     ``known``: scenarios that are settled already, by name, with the values that hold for all.
     ``undamped``: gives it with other gains, where it still runs.
-    ``far``: whether to look beyond earlier scenarios where no mode would get a name.
-    """
+    ``far``: whether to look beyond earlier scenarios where no mode would get a name."""
     others = _Others(system, computed, known, undamped)
     for name in dict.fromkeys((*system.naming.contested, *system.naming.named)):
         contested = name in system.naming.contested
@@ -166,8 +164,7 @@ class _Others:
     """Where else a scenario's names may be clear; each is computed once at most.
 
     ``checked``: Whether even a clear name is to be followed: something acts that may have made the shape.
-    ``lost``: Where the name last looked for is borne by a mode from which no way leads here; empty if nowhere.
-    """
+    ``lost``: Where the name last looked for is borne by a mode from which no way leads here; empty if nowhere."""
 
     def __init__(
         self,
@@ -258,8 +255,7 @@ class _Others:
 
     def _systems(self, *, contested: bool, tied: bool, far: bool) -> Iterator[tuple[str, NamedSystem, bool]]:
         """Earlier scenarios with the names that they have got; of all others those names that are clear by shape.
-        Behind each, whether a clear shape here is not believed where the mode from there has another.
-        """
+        Behind each, whether a clear shape here is not believed where the mode from there has another."""
         doubted = tied or self.checked
         for name in self._earlier if contested or doubted else self._earlier[-1:]:
             if contested or doubted or (self._small and name in self._known):
@@ -336,8 +332,7 @@ def _as(other: PreparedScenario | None, prepared: PreparedScenario) -> PreparedS
 
 def _differing(a: PreparedScenario, b: PreparedScenario) -> dict[str, tuple[float, float]] | None:
     """The values in which two scenarios of a case differ because somebody gave them, with both sides; None where the
-    difference is none of numbers. A damping controller that is off counts as one with gain 0.
-    """
+    difference is none of numbers. A damping controller that is off counts as one with gain 0."""
     found: dict[str, tuple[float, float]] = {}
     for key in dict.fromkeys((*a.given, *b.given)):
         pattern, _, variable = key.partition(".")

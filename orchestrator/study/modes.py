@@ -118,8 +118,7 @@ def compute_modes(
 
     ``critical``: damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The
     search knows too little to give modes their names.
-    ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation.
-    """
+    ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation."""
     with running(prepared) as master:
         return modes_of(prepared, master, frequency_range, critical, directional=directional)
 
@@ -185,8 +184,7 @@ def _computed(system: "Linearised") -> ModesResult:
 class Linearised:
     """A linearised scenario, whose eigenvalues other threads compute meanwhile.
 
-    ``said`` are earlier warnings, behind those of ``misfits``, which are as `misfits_of` gives them.
-    """
+    ``said`` are earlier warnings, behind those of ``misfits``, which are as `misfits_of` gives them."""
 
     def __init__(
         self,
@@ -318,8 +316,7 @@ def identified(
 
     ``at_gains``: the linear model with other gains of damping controllers, where the scenario still runs.
     ``directional``: as `modes_of`, for scenarios that have to be computed.
-    ``black_boxes``: identifies components of such a scenario that hide their states.
-    """
+    ``black_boxes``: identifies components of such a scenario that hide their states."""
     first, last = _named_range(frequency_range)
 
     def named(other: PreparedScenario, at: OperatingPoint, linear: LinearModel) -> NamedSystem:

@@ -100,8 +100,7 @@ class RunResult:
     @property
     def stable_in_simulation(self) -> bool | None:
         """None where a part was not judged or not reached, or a limit would act that the model lacks, and nothing else
-        was wrong.
-        """
+        was wrong."""
         if self.went_unstable:
             return False
         if self.before_its_events:
@@ -130,8 +129,7 @@ def run_scenario(
     ``observers``: what else looks on at every step, such as a recorder.
     ``linear``: compute the linear model's response as well.
     ``recording``: where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
-    ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates.
-    """
+    ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates."""
     if federates is not None:
         if federates.announce is not None:
             observers = [*observers, Pace(federates.announce)]

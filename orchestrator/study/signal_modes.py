@@ -64,8 +64,7 @@ class SignalModes:
     def remarks(self) -> list[str]:
         """Sentences on the highest frequency that the samples can show, on the modes near it, on a window that is too
         short, on a trend that may hide modes, on a window
-        without oscillations, and on each mode in doubt.
-        """
+        without oscillations, and on each mode in doubt."""
         highest = 0.5 / self.interval
         texts = [
             f"The samples used, every {self.interval:g} s, show nothing above {highest:.4g} Hz: "

@@ -16,8 +16,7 @@ from orchestrator.study.run import RunResult
 def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> bool:
     """Draw one figure of a case file, all scenarios in each panel; False if nothing of it was recorded.
 
-    A panel whose signal no scenario recorded says so.
-    """
+    A panel whose signal no scenario recorded says so."""
     if all(signal(r.dataset.isel(time=slice(1)), panel.signal) is None for panel in table.panels for r in results):
         return False
     with mpl.rc_context(STYLE):
@@ -60,8 +59,7 @@ def draw_signal(
     ``axis``: Matplotlib Axes.
     ``expression``: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
     ``first``: Index of the first run's colour: the number of runs that the Axes show already.
-    ``label``: Of the curves; each run's own by default.
-    """
+    ``label``: Of the curves; each run's own by default."""
     for index, result in enumerate(results, start=first):
         data = outline(result.dataset, expression)
         if data is not None:

@@ -112,8 +112,7 @@ def choose_step(
     ``frequency_range``: of the critical modes [Hz].
     Raises an `AnalysisError` if a component gives no derivatives, so that there is no continuous system to compare
     with; if no mode is in range; or if the system is too large for all its eigenvalues.
-    Raises an `InputError` if no step fits the case's events.
-    """
+    Raises an `InputError` if no step fits the case's events."""
     lengths, left_out = _fitting(prepared, steps)
     with running(prepared.rescheduled("gauss-seidel")) as master:
         find_operating_point(master)
@@ -236,8 +235,7 @@ def keeps_stability(rate: float, growth: float, seen: NDArray[np.complex128], cr
 
     ``rate`` and ``growth``: largest growth rates [1/s] of the step map and of the continuous system; 0 where nothing
     grows.
-    ``seen`` and ``critical``: the critical modes in both [rad/s].
-    """
+    ``seen`` and ``critical``: the critical modes in both [rad/s]."""
     grown = rate > (_COUPLING_FACTOR * growth + _COUPLING_RATE if growth else 0.0)
     crossed = bool(np.any((seen.real > 0) != (critical.real > 0)))
     return not grown and not crossed

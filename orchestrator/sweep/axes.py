@@ -67,8 +67,7 @@ def parse_vary(text: str) -> Vary:
     """Read ``component.parameter=START:STOP:COUNT``, ``=log:START:STOP:COUNT`` or ``=0.1,0.2,0.5``; for a search
     ``=START:STOP`` is enough.
 
-    Raises `ValueError` if the text has another form; the message says what is wrong and how to write it.
-    """
+    Raises `ValueError` if the text has another form; the message says what is wrong and how to write it."""
     key, equals, given = (part.strip() for part in text.partition("="))
     named = re.fullmatch(_KEYS, key) or (":" in key and all(part.strip() for part in key.split(":")))
     if not equals or not named or not given:
@@ -93,8 +92,7 @@ def parse_vary(text: str) -> Vary:
 def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     """Find the variable that is varied, and its values in the variable's unit.
 
-    Raises `InputError` if there is no such variable, or if a value does not fit its type, unit or range.
-    """
+    Raises `InputError` if there is no such variable, or if a value does not fit its type, unit or range."""
     if vary.limits is not None and not vary.count:
         raise InputError(f"--vary {vary.key}: COUNT is missing; write {_FORMS}, or search for a limit with --until")
     if ":" in vary.key:
@@ -175,8 +173,7 @@ def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
 
 def _scr_axis(vary: Vary, bus: str, scenarios: Sequence[PreparedScenario]) -> Axis:
     """The short-circuit ratio at a bus, or its short-circuit power: R, X and X_C of all branches that end there are
-    multiplied.
-    """
+    multiplied."""
     one = scenarios[0]
     try:
         found = ShortCircuit.of(one)

@@ -1,8 +1,7 @@
 """How far a parameter may go: the first value at which a scenario is unstable, or damped less than wanted.
 
 The range is tried on a coarse grid first; between the last value that holds and the next one, the limit is bisected.
-Every value is one of the coupled FMUs, perturbed at their own operating point.
-"""
+Every value is one of the coupled FMUs, perturbed at their own operating point."""
 
 import fnmatch
 from collections.abc import Callable, Sequence
@@ -71,8 +70,7 @@ def search(
 
     ``kinds``: At the places 0, 1, … of the coarse grid.
     ``at``: What another place comes to.
-    ``between``: Whether there is a value between two places.
-    """
+    ``between``: Whether there is a value between two places."""
     first = next((k for k, kind in enumerate(kinds) if kind is not Ending.HOLDS), None)
     if first is None:
         return float(len(kinds) - 1), None, []
@@ -89,8 +87,7 @@ def search(
 class ParameterLimit:
     """How far a parameter may go in one scenario.
 
-    ``key``, ``unit``, ``title``: The parameter, and the scenario's title.
-    """
+    ``key``, ``unit``, ``title``: The parameter, and the scenario's title."""
 
     key: str
     unit: str

@@ -135,8 +135,7 @@ def plan_sweep(
     ``step_size``: Communication step [s]; the case's where None.
     ``frequency_range``: Modes of these frequencies are followed [Hz].
     ``parameters``: Parameter files whose values hold at every point; a later one goes before an earlier one.
-    ``until``: Search for the limit along the range of the only parameter.
-    """
+    ``until``: Search for the limit along the range of the only parameter."""
     vary = vary if until is None else [_searched(vary)]
     prepared = case.prepare(scenarios, overrides, step_size, None, parameters)
     layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
@@ -162,8 +161,7 @@ def _searched(vary: Sequence[Vary]) -> Vary:
 
 def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
     """Prepare one point of every scenario at an end of the grid. This finds parameters that cannot be varied, and those
-    that cannot act, and builds FMUs that only this end needs.
-    """
+    that cannot act, and builds FMUs that only this end needs."""
     marks = {f"--set {key}": f"--vary {key}" for key in varied}
     found: dict[Problem, list[str]] = {}
     idle: list[Idle] = []
@@ -189,8 +187,7 @@ def run_sweep(plan: SweepPlan, work: Work) -> SweepResult:
     """Compute the points that are not stored yet, then follow the modes. Further points are added where a mode is not
     recognised.
 
-    ``plan``: A plan that `plan_sweep` has checked.
-    """
+    ``plan``: A plan that `plan_sweep` has checked."""
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
     wanted: list[tuple[ScenarioSweep, GridPlace]] = [(sweep, place) for sweep in result.scenarios for place in grid]
@@ -260,8 +257,7 @@ def _margin(record: PointRecord) -> float:
 
 def _gaps(plan: SweepPlan, sweep: ScenarioSweep, width: float) -> Iterator[GridPlace]:
     """Middles between two neighbours along the last axis, ``width`` apart, where a mode of the first is not recognised
-    in the second, and where there is a value in between: 1 and 2 of a whole number have none.
-    """
+    in the second, and where there is a value in between: 1 and 2 of a whole number have none."""
     axis = plan.axes[-1]
     if any(isinstance(value, bool) for value in axis.values):
         return

@@ -21,8 +21,7 @@ _FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 def trajectories(samples: Samples) -> Table:
     """The ends of each trajectory, its least and its most damping, and its least similarity from point to point.
 
-    The table shows the trajectories with a name, or all trajectories if the case names no mode.
-    """
+    The table shows the trajectories with a name, or all trajectories if the case names no mode."""
     title = f"Trajectories over {', '.join(axis_label(axis) for axis in samples.axes)}"
     table = make_table(title, "Mode", "f [Hz]", "Damping [%]", "Least [%]", "Most [%]", "Points", "Similarity")
     anything = any(t.carries for s in samples.result.scenarios for t in s.trajectories)
@@ -138,8 +137,7 @@ def remarks(samples: Samples) -> list[str]:
 
 def _warnings(samples: Samples) -> list[str]:
     """Each kind of warning once, with the number of points that have it. Two warnings that differ only in their figures
-    are of one kind.
-    """
+    are of one kind."""
     asked = {str(question) for sweep in samples.result.scenarios for question in sweep.prepared.questions}
     kinds: dict[str, tuple[str, set[tuple[str, GridPlace]]]] = {}
     for sweep in samples.result.scenarios:

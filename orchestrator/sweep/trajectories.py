@@ -50,8 +50,7 @@ def find_trajectories(
 
     ``points``: points by place; failed points are skipped.
     ``names``: names of the modes that the case looks for, most important first.
-    ``frequency_range``: [Hz]
-    """
+    ``frequency_range``: [Hz]"""
     modes = {place: record.modes for place, record in points.items() if record.modes is not None}
     route = list(_route(modes))
     followed = number_trajectories(modes, route)
@@ -74,8 +73,7 @@ def _on_grid(place: GridPlace) -> bool:
 
 def _route(modes: Iterable[GridPlace]) -> Iterator[tuple[GridPlace, list[GridPlace]]]:
     """Places row by row. Each place comes with the previous place of its row and the same place of the previous row,
-    where these have modes.
-    """
+    where these have modes."""
     seen: set[GridPlace] = set()
     before: GridPlace | None = None
     for place in sorted(modes):
@@ -122,8 +120,7 @@ def _with_names(
     trajectories: list[Trajectory], points: Mapping[GridPlace, PointRecord], names: Sequence[str]
 ) -> list[Trajectory]:
     """Trajectories sorted: first those with a name in the order in which they first carry it, then the others by
-    frequency.
-    """
+    frequency."""
     carriers: dict[str, list[Trajectory]] = {name: [] for name in names}
     for place in sorted(p for p, record in points.items() if record.modes is not None and _on_grid(p)):
         for name, i in points[place].named.items():

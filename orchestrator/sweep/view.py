@@ -81,8 +81,7 @@ class ParameterSweep:
     def table(self) -> pd.DataFrame:
         """One row for every mode at every point: eigenvalue [1/s, rad/s], frequency, damping ratio, the mode's name.
 
-        ``named`` says whether the case's name falls on the mode there.
-        """
+        ``named`` says whether the case's name falls on the mode there."""
         rows = [
             {"scenario": sweep.prepared.name, **self.samples.setting(place), "mode": trajectory.name}
             | eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"])

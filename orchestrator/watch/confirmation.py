@@ -2,8 +2,7 @@
 
 Over a few periods two decaying oscillations that beat, or the harmonics that a large swing has in magnitudes of
 voltages and currents, look like one that grows. An eigenvalue belongs to the system: a true growth has one rate in
-every part of the response, while that of a beat changes from part to part.
-"""
+every part of the response, while that of a beat changes from part to part."""
 
 from itertools import pairwise
 

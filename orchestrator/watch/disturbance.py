@@ -35,8 +35,7 @@ def disturbances(system: System, events: Sequence[Event], end: float) -> list[Un
     """When noise or quantisation is in force on each connection.
 
     ``events``: Those of the run; some begin or end an imperfection.
-    ``end``: Of the run [s].
-    """
+    ``end``: Of the run [s]."""
     found: list[Unrest] = []
     since: dict[tuple[str, str], float] = {}
     permanent = set[tuple[str, str]]()

@@ -10,8 +10,7 @@ BYPASS_TIME = 0.01
 @dataclass(frozen=True)
 class Lead:
     """The limited quantity, reconstructed as signal + T/gain·(d state/dt) from the state of a block or of a control's
-    integrator.
-    """
+    integrator."""
 
     state: str
     # time, gain: parameters with T [s] and the gain; None stands for 1

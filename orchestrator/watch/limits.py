@@ -68,8 +68,7 @@ def limit_signals(system: System) -> list[str]:
 
 def active_limits(seen: Seen, system: System, settings: Settings) -> Iterator[Finding]:
     """Limits that act for longer than `LEAST_DURATION` in all, or still act at the end, while their component is on the
-    grid: what a tripped one limits concerns nobody. An upper and a lower limit of one signal are one finding.
-    """
+    grid: what a tripped one limits concerns nobody. An upper and a lower limit of one signal are one finding."""
     for name, plan in system.components.items():
         limits = list(limits_of(plan))
         if not limits:

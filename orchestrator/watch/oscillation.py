@@ -31,8 +31,7 @@ class Oscillation:
 
 def strongest_oscillation(times: Numbers, signal: Numbers, least_periods: float = LEAST_PERIODS) -> Oscillation | None:
     """Find the strongest oscillation by the matrix pencil; None if no oscillation lasts `LEAST_PERIODS`, or if it is
-    too fast for the samples.
-    """
+    too fast for the samples."""
     if too_fast(times, signal):
         return None
     crossing = crossings_hz(times, signal)

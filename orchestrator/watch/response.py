@@ -74,8 +74,7 @@ def unsettled_response(
 
     If an oscillation is faster than the looks, only such oscillations are reported, because the looks would show it as
     a slower one. In a stretch with unnoticed events, only oscillations that continue over all of these events are
-    reported.
-    """
+    reported."""
     seen = seen.until(stretch.end)
     first = int(np.searchsorted(seen.times, stretch.begin))
     if not enough_looks(seen, stretch):
@@ -119,8 +118,7 @@ def _told(
     swings: Sequence[Swing], system: System, stretch: Stretch, *, irregular_as_well: bool, clean: bool = False
 ) -> list[Finding]:
     """The first finding of each kind; a swing without a frequency only where there is none with one, and a remark on a
-    swing in doubt only where there is no finding.
-    """
+    swing in doubt only where there is no finding."""
     told: dict[Kind, Finding] = {}
     irregular, doubtful = list[Finding](), list[Finding]()
     for swing in swings:
@@ -224,8 +222,7 @@ def _is_clean(swing: Swing, oscillation: Oscillation) -> bool:
 
 def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None:
     """The swing of an output between the looks. Its signal is the extent of the swing, without the way of its
-    middle.
-    """
+    middle."""
     turns, last = seen.turns[name][first + 1 :], seen.last[name][first:]
     often = float(np.array_split(turns, 4)[3].mean())
     if often < _FAST:
@@ -267,8 +264,7 @@ def _is_irregular(swing: Swing) -> bool:
 
 def _single(swing: Swing) -> Oscillation | None:
     """The oscillation that makes the swing; None if there is no such oscillation, or if the second half of the stretch
-    does not show it.
-    """
+    does not show it."""
     half = len(swing.times) // 2
     whole = strongest_oscillation(swing.times, swing.signal)
     late = strongest_oscillation(swing.times[half:], swing.signal[half:], least_periods=1)

@@ -61,8 +61,7 @@ _RATE_TIME = 1.0  # the reported rate is the mean over this time at the end [s]
 @dataclass(frozen=True)
 class _Course:
     """A signal that should come to rest after an event. ``on`` marks the looks that count; ``least`` is the smallest
-    drift [unit of the signal].
-    """
+    drift [unit of the signal]."""
 
     name: str
     what: str
@@ -74,8 +73,7 @@ class _Course:
 @dataclass(frozen=True)
 class _Drift:
     """How a signal moves in the second half of a stretch: its rates in the third and the last quarter [unit/s], the
-    time between the middles of these [s], and its value at the end.
-    """
+    time between the middles of these [s], and its value at the end."""
 
     third: float
     fourth: float
@@ -101,8 +99,7 @@ class _Drift:
     @property
     def near(self) -> bool:
         """Whether less of its way lies before it than it made in the second half of the stretch: else its rest is a
-        guess.
-        """
+        guess."""
         return abs(self.rest - self.value) < abs(self.third + self.fourth) * self.apart
 
 
@@ -117,8 +114,7 @@ def run_away(
     """At most one speed outside of its band or drifting, and one drifting voltage: those that go farthest.
 
     ``slipped``: whether units lost synchronism. In this case a speed must be outside of `BAND` at the end to be
-    reported.
-    """
+    reported."""
     speeds = list(_speeds(seen, system, settings))
     yield from _farthest(seen.times, speeds, stretches, system, allowed=np.inf if slipped else OUTSIDE)
     yield from _farthest(seen.times, list(_voltages(seen)), stretches, system, allowed=None)
@@ -189,8 +185,7 @@ def still_moving_away(
     Nothing is remarked if its last rates lead to a near rest inside of `ALLOWED`, or, where governors of `HELD` of the
     ratings are at their limits, within `LEAST_AWAY`.
 
-    ``limits``: the findings on limits; those of governors that act at the end count.
-    """
+    ``limits``: the findings on limits; those of governors that act at the end count."""
     speeds = list(_speeds(seen, system, settings))
     if not speeds or last.end - last.begin < SHORTEST:
         return []

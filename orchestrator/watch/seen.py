@@ -1,6 +1,5 @@
 """The data of a run that the watch judges: signals at regular looks, and the extremes of the coupled outputs between
-two looks.
-"""
+two looks."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -58,8 +57,7 @@ def rescaled(seen: Seen, misfits: Mapping[str, Sequence[Misfit]]) -> Seen:
     """With a frequency that was scaled for another one as the device has it, in pu of its own: it is 1 at rest. While a
     meter settles that begins far from there, it is 1 as well.
 
-    A device that slips from the start stays as it is: its current moves, and at rest it does not.
-    """
+    A device that slips from the start stays as it is: its current moves, and at rest it does not."""
     values = dict(seen.values)
     for name in (signal.removesuffix(".omega") for signal in seen.values if signal.endswith(".omega")):
         rest = next((m.figures["omega"] for m in misfits.get(name, ()) if "omega" in m.figures), 1.0)
@@ -91,8 +89,7 @@ def unit(name: str, system: System) -> str:
 
 def look_every(step_size: float, record_every: int, stop_time: float) -> int:
     """Number of communication steps between two looks. It is a multiple of the steps between two records if the records
-    are close enough.
-    """
+    are close enough."""
     target = max(1, round(LOOK_INTERVAL / step_size), int(stop_time / step_size / MOST_LOOKS))
     return record_every * (target // record_every) if record_every <= target else target
 
@@ -101,8 +98,7 @@ class Watcher:
     """An observer that collects the data for the watch.
 
     ``names``: Signals ``component.variable`` that are read at every look.
-    ``every``: Communication steps between two looks.
-    """
+    ``every``: Communication steps between two looks."""
 
     def __init__(self, names: Sequence[str], every: int) -> None:
         self.every = every

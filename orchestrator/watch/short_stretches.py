@@ -50,8 +50,7 @@ def too_short(stretches: Sequence[Stretch]) -> list[Finding]:
 def still_departing(seen: Seen, system: System, stretches: Sequence[Stretch]) -> list[Finding]:
     """One remark on the first stretch at whose end a signal moves more than before, whatever its motion is.
 
-    A growth that shows fewer than two periods, or none, has no frequency, so that no other check tells it.
-    """
+    A growth that shows fewer than two periods, or none, has no frequency, so that no other check tells it."""
     for stretch in stretches:
         if not stretch.last and stretch.end - stretch.begin < SHORTEST_BETWEEN:
             continue
@@ -80,8 +79,7 @@ def still_departing(seen: Seen, system: System, stretches: Sequence[Stretch]) ->
 def _departure(signal: Numbers) -> float:
     """How far a signal moves in its last quarter, if that is more than in each quarter before; else 0.
 
-    The first look is that before the event, and what moves at once is no departure.
-    """
+    The first look is that before the event, and what moves at once is no departure."""
     *before, last = (float(np.ptp(part)) for part in np.array_split(signal, 4))
     large = last > max(LEAST_DEPARTURE * max(1.0, abs(float(signal[0]))), LEAST_SHARE * float(np.ptp(signal)))
     return last if large and last > MORE * max(before) else 0.0

@@ -39,8 +39,7 @@ class Stretch:
 def stretches(seen: Seen, signals: Mapping[str, Numbers], times: Sequence[float]) -> list[Stretch]:
     """The stretch after each noticed event.
 
-    ``times``: of the events [s].
-    """
+    ``times``: of the events [s]."""
     if not times:
         return []
     found, begin, breaks = [], times[0], list[float]()

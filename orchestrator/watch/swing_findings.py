@@ -54,8 +54,7 @@ def sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretc
 def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: Stretch) -> Finding:
     """A remark on an oscillation that may decay, with the reason of the doubt.
 
-    ``why``: the reason; see `confirmation.doubt`.
-    """
+    ``why``: the reason; see `confirmation.doubt`."""
     seems = "grow" if change(swing, oscillation.rate) > STEADY else "last"
     message = (
         f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {_shown(swing.name)} swings at "
@@ -87,8 +86,7 @@ def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
 def doubtful_irregular_swing(swing: Swing, why: str, unit: str, stretch: Stretch) -> Finding:
     """A remark on a swing at no single frequency that may decay, with the reason of the doubt.
 
-    ``why``: the reason; see `confirmation.irregular_doubt`.
-    """
+    ``why``: the reason; see `confirmation.irregular_doubt`."""
     amplitude = _irregular_amplitude(swing)
     message = (
         f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {_shown(swing.name)} swings by "

@@ -41,8 +41,7 @@ def lost_synchronism(seen: Seen, system: System, settings: Settings) -> Iterator
 
     The units on the grid are sorted by angle. Where two neighbours are more than half a turn apart, the system has
     fallen apart there. Units that are never parted belong to one group. Of two groups, the one with the smaller rating
-    counts as the one that lost synchronism.
-    """
+    counts as the one that lost synchronism."""
     names = [name for name in system.components if _angle_variable(system, name) is not None]
     if len(names) < 2:
         return
@@ -96,8 +95,7 @@ class _Pair:
 
 def _sides(angles: Numbers, on: NDArray[np.bool_]) -> NDArray[np.int_]:
     """Number of the part of the system that holds each unit, counted by angle; −1 for a unit off the grid. Shape
-    (units, n).
-    """
+    (units, n)."""
     order = np.argsort(np.where(on, angles, np.inf), axis=0)
     in_order = np.take_along_axis(angles, order, axis=0)
     part = np.zeros(angles.shape, dtype=np.int_)

@@ -25,8 +25,7 @@ _AGREE = 0.2  # largest relative difference between two measurements of a growth
 def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Finding]:
     """How the state moves before the first event, if it does.
 
-    ``until``: time of the first event, or the end [s].
-    """
+    ``until``: time of the first event, or the end [s]."""
     count = int(np.searchsorted(seen.times, until * (1 + 1e-12), side="right"))
     motions = _motions(seen, system, count) if count >= FEWEST_LOOKS else {}
     if not motions:
@@ -55,8 +54,7 @@ def undisturbed_motion(seen: Seen, system: System, until: float) -> Iterator[Fin
 
 def _motions(seen: Seen, system: System, count: int) -> dict[str, Numbers]:
     """Largest distance of every signal except angles from its start up to each look, as a part of 1 or of the start.
-    Shape (count,); it never falls.
-    """
+    Shape (count,); it never falls."""
     found = {}
     for name, signal in {**seen.values, **seen.last}.items():
         if is_derivative(name) or is_inner(name, system) or unit(name, system) == "rad":
@@ -88,8 +86,7 @@ def _growth(seen: Seen, motions: Mapping[str, Numbers]) -> Oscillation:
     turn.
 
     The rate follows from the extent over every communication step, and the frequency from the turns. If the looks are
-    close enough for the frequency, the matrix pencil gives both more exactly.
-    """
+    close enough for the frequency, the matrix pencil gives both more exactly."""
     coupled = {name: m for name, m in motions.items() if name in seen.turns and _is_growth(m)} or motions
     size = min(_LARGE, 0.3 * max(float(m[-1]) for m in coupled.values()))
     row = min(int(np.argmax(m >= size)) for m in coupled.values() if m[-1] >= size)

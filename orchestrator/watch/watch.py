@@ -34,8 +34,7 @@ class Watch:
     """Watches one run of a scenario.
 
     Coupled outputs are watched at every communication step: whether they are finite, their extremes and their turns.
-    Recorded signals, limits and angles are watched at looks, some milliseconds apart.
-    """
+    Recorded signals, limits and angles are watched at looks, some milliseconds apart."""
 
     def __init__(self, prepared: PreparedScenario, sink: RowSink | None = None) -> None:
         self._prepared = prepared
@@ -67,8 +66,7 @@ class Watch:
     ) -> list[Finding]:
         """The findings, in the order of their beginning; available after the run, even after one that failed.
 
-        ``misfits``: Of devices and their bindings, by component.
-        """
+        ``misfits``: Of devices and their bindings, by component."""
         seen = rescaled(self._watcher.seen(self.recorder if self._looks_at_records else None), misfits)
         whole = failure is None
         system = self._prepared.system
@@ -80,8 +78,7 @@ class Watch:
 def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool = True) -> list[Finding]:
     """All findings from the signals.
 
-    ``whole``: Whether the run came to its end; of one that did not, nobody asks whether it settles.
-    """
+    ``whole``: Whether the run came to its end; of one that did not, nobody asks whether it settles."""
     settings = Settings(system, events, seen.times)
     end = float(seen.times[-1])
     happened = [time for time in settings.effective_times() if time < end]

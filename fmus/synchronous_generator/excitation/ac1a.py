@@ -2,8 +2,7 @@
 
 V_ref + V_S − v_m − V_F → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A), held within V_AMIN and V_AMAX → V_RMIN ≤ V_R ≤ V_RMAX
 T_E·dV_E/dt = V_R − V_FE,  V_E ≥ 0,  V_FE = (K_E + S_E(V_E))·V_E + K_D·I_FD
-E_fd = V_E·F_EX(K_C·I_FD/V_E),  V_F = s·K_F/(1+sT_F)·V_FE
-"""
+E_fd = V_E·F_EX(K_C·I_FD/V_E),  V_F = s·K_F/(1+sT_F)·V_FE"""
 
 import casadi as ca
 

@@ -1,8 +1,7 @@
 """AC4A: an alternator with a controlled rectifier.
 
 V_IMIN ≤ V_ref + V_S − v_m ≤ V_IMAX → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A) = E_fd,
-held within V_RMIN and V_RMAX − K_C·I_FD
-"""
+held within V_RMIN and V_RMAX − K_C·I_FD"""
 
 import casadi as ca
 

@@ -1,7 +1,6 @@
 """Parts that excitation systems share: parameters, the measured voltage, a rate feedback, rectifier and saturation.
 
-Signals of a regulator are per unit of the terminal voltage (base S_n) before the gain and of E_fd after it.
-"""
+Signals of a regulator are per unit of the terminal voltage (base S_n) before the gain and of E_fd after it."""
 
 from collections.abc import Callable
 from functools import partial
@@ -44,8 +43,7 @@ class Measurement:
     """The measured terminal voltage, 1/(1 + s·T_R), and the reference that it is compared with.
 
     ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
-    field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly.
-    """
+    field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly."""
 
     def __init__(self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> None:
         self._m, self._v_t, self._start = m, terminal_voltage, start
@@ -76,8 +74,7 @@ def lead_lag_stage(m: ModelBuilder, u: ca.SX, initial: Scalar, mark: str = "", l
     """(1 + s·T_C)/(1 + s·T_B), passed through where T_B = 0, which needs T_C = 0.
 
     ``u``, ``initial``: what goes in, and its value in steady state; ``mark``: follows C and B in the parameters' names;
-    ``lead``: default of T_C [s]; T_B is ten seconds then, otherwise 0.
-    """
+    ``lead``: default of T_C [s]; T_B is ten seconds then, otherwise 0."""
     T_C = time(m, f"T_C{mark}", lead, f"Lead T_C{mark}")
     T_B = time(m, f"T_B{mark}", 10.0 if lead else 0.0, f"Lag T_B{mark}; 0 leaves the stage out")
     m.require(

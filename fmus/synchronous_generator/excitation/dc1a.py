@@ -4,8 +4,7 @@
     T_E·dE_fd/dt = V_R − K_E·E_fd − S_E(E_fd)·E_fd
     V_F = s·K_F/(1+sT_F)·E_fd
 
-IEEET1 has no stage (1+sT_C)/(1+sT_B).
-"""
+IEEET1 has no stage (1+sT_C)/(1+sT_B)."""
 
 from functools import partial
 
@@ -37,8 +36,7 @@ def dc1a(
 ) -> tuple[ca.SX, ca.SX]:
     """Declare it and return (E_fd, |v_t|) [pu].
 
-    ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B).
-    """
+    ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B)."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 20.0, "Gain", 1e-3), time(m, "T_A", 0.2, "Amplifier; 0 leaves the lag out")
         high, low = gain(m, "V_RMAX", 5.0, "Upper limit of V_R"), gain(m, "V_RMIN", -5.0, "Lower limit of V_R")

@@ -1,7 +1,6 @@
 """An exciter outside: the field voltage is an input, and what a regulator measures is shown.
 
-v_t, I_fd, v_s ──► exciter of another component ──► exciter.E_fd
-"""
+v_t, I_fd, v_s ──► exciter of another component ──► exciter.E_fd"""
 
 import casadi as ca
 

@@ -1,7 +1,6 @@
 """No regulator: a constant field voltage, as in manual excitation.
 
-E_fd = E_fd,0 + delta_E_fd
-"""
+E_fd = E_fd,0 + delta_E_fd"""
 
 import casadi as ca
 

@@ -4,8 +4,7 @@
     → K_A/(1+sT_A) = V_A, held within V_AMIN and V_AMAX → V_A − K_LR·(I_FD − I_LR), only above I_LR = E_fd,
     v_t·V_RMIN ≤ E_fd ≤ v_t·V_RMAX − K_C·I_FD,   V_F = s·K_F/(1+sT_F)·E_fd
 
-The ceilings take v_t from two fixed-point passes, because v_t, behind the transformer, depends weakly on E_fd.
-"""
+The ceilings take v_t from two fixed-point passes, because v_t, behind the transformer, depends weakly on E_fd."""
 
 import casadi as ca
 

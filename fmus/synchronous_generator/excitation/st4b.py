@@ -5,8 +5,7 @@
     E_fd = V_M·V_B,  V_B = min(V_E·F_EX(K_C·I_FD/V_E), V_BMAX),  V_E = K_P·v_t
 
 The standard's source from the stator current (K_I, X_L, θ_P) is left out. An integrator stops while its output is at a
-limit. Two fixed-point passes close the loop through v_t.
-"""
+limit. Two fixed-point passes close the loop through v_t."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,8 +1,7 @@
 """Excitation systems AC4A, ST1 and ST4B without ceilings (IEEE 421.5 structures), those of the case studies.
 
 Each takes the machine's terminal voltage as a function of its own E_fd, because the transformer in
-series makes |v_t| depend, weakly, on E_fd itself; returned are E_fd and the |v_t| that belongs to it.
-"""
+series makes |v_t| depend, weakly, on E_fd itself; returned are E_fd and the |v_t| that belongs to it."""
 
 import casadi as ca
 
@@ -23,8 +22,7 @@ def ac4a(
 
     ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
     field current; 1 pu gives 1 pu of voltage on open circuit. Of the three exciters ST4B alone needs it; ``v_s``: a
-    stabiliser's signal, added to the voltage reference [pu, S_n].
-    """
+    stabiliser's signal, added to the voltage reference [pu, S_n]."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=PAPER)
         T_A = m.parameter("T_A", 0.015, "s", "Amplifier", minimum=1e-3, source=PAPER)

@@ -1,7 +1,6 @@
 """Declarations of all machines of `synchronous_generator`: their base, motion and the transformer in series.
 
-Data sheets give reactances, H and D on ratings of their own; networks on 100 MVA. ``machine.S_data`` says on which.
-"""
+Data sheets give reactances, H and D on ratings of their own; networks on 100 MVA. ``machine.S_data`` says on which."""
 
 from dataclasses import dataclass
 
@@ -29,8 +28,7 @@ class Common:
 def declare_common(m: ModelBuilder, S_n: ca.SX, H: float = 6.5) -> Common:
     """Declare transformer, base, resistance and motion; in steady state speed is 1.
 
-    ``S_n``: rating [MVA]; ``H``: default of the inertia constant [s].
-    """
+    ``S_n``: rating [MVA]; ``H``: default of the inertia constant [s]."""
     with m.scope("transformer"):
         R_t = m.parameter("R_t", 0.0, "pu", "Resistance", base=SN, minimum=0)
         X_t = m.parameter("X_t", 0.0, "pu", "Reactance; 0 where the network has the transformer", base=SN, minimum=0)

@@ -3,8 +3,7 @@
           X'_d
     E' ──⏦⏦⏦⏦──●── v        2H·ẇ = P_m/w − T_e − D·(w − 1),  δ̇ = ω_b·(w − 1)
 
-The emf's angle is the rotor's. There is no field winding, so no exciter can act.
-"""
+The emf's angle is the rotor's. There is no field winding, so no exciter can act."""
 
 import casadi as ca
 
@@ -20,8 +19,7 @@ def classical(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDe
     """Declare the machine.
 
     ``port``: gives the operating point; ``S_n``: rating [MVA]; ``stator_flux``: declares the stator's fluxes: as
-    states, or as signals that a model without stator transients closes.
-    """
+    states, or as signals that a model without stator transients closes."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
         X_1 = common.scale * reactance(m, "X_d1", 0.3, "Transient reactance X'_d")

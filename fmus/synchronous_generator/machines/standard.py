@@ -7,8 +7,7 @@
 
 Their stator is that of `machine`: with stator transients EMT-type, algebraic in the phasor model. As in stability
 programs' models of these names X''_q = X''_d, and saturation is that of `windings`. X'_q = X_q (genrou, two_axis) says
-that the slow winding of the q axis is missing.
-"""
+that the slow winding of the q axis is missing."""
 
 from dataclasses import replace
 
@@ -62,8 +61,7 @@ def genrou(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDecla
     """Declare the machine of sixth order, one with a round rotor. Its subtransient flux saturates both axes.
 
     ``port``: gives the operating point; ``S_n``: rating [MVA]; ``stator_flux``: declares the stator's fluxes: as
-    states, or as signals that a model without stator transients closes.
-    """
+    states, or as signals that a model without stator transients closes."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
         X_l, X_2, d = _d_axis(m, common)

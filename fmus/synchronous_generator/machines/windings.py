@@ -3,8 +3,7 @@
 Stator, motion and frame are those of `machine`, the windings the classical ones of `conversion`. Saturation adds a
 current of the iron, S·ψ/X_md, beside the slowest winding of an axis:
 
-    ψ̇_f/ω_b = (R_f/X_md)·(E_fd − X_md·i_f − S·ψ_d)        ψ̇_1q/ω_b = −R_1q·(i_1q + S·ψ_q/X_md)
-"""
+    ψ̇_f/ω_b = (R_f/X_md)·(E_fd − X_md·i_f − S·ψ_d)        ψ̇_1q/ω_b = −R_1q·(i_1q + S·ψ_q/X_md)"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -25,8 +24,7 @@ from fmus.toolchain.port import DevicePort
 class WoundAxis:
     """Standard data of an axis on S_n, and (name, description) of its windings' fluxes from slow to fast.
 
-    With one winding its reactance X' and time constant T'_0 stand in ``X1`` and ``T10``, and ``X2`` is X' too.
-    """
+    With one winding its reactance X' and time constant T'_0 stand in ``X1`` and ``T10``, and ``X2`` is X' too."""
 
     data: AxisData
     fluxes: tuple[tuple[str, str], ...]
@@ -37,8 +35,7 @@ class Saturation:
     """S(x)·x as a function of x [pu].
 
     ``both_axes``: of the subtransient flux, on both axes by its parts (GENROU); otherwise of E'_q on the d axis
-    (GENSAL).
-    """
+    (GENSAL)."""
 
     part: Callable[[ca.SX], ca.SX]
     both_axes: bool
@@ -69,8 +66,7 @@ def declare_wound_machine(
 
     ``port``: gives the operating point; ``common``: transformer, stator resistance and motion; ``d``, ``q``: data of
     the axes. With saturation of both axes X''_d = X''_q; ``saturation``: of the iron; None for none; ``salient``:
-    whether the last reactances of the axes, X'' or X', may differ.
-    """
+    whether the last reactances of the axes, X'' or X', may differ."""
     with m.scope("machine"):
         circuits = {name: _circuit(m, port, name, axis, common.X_t) for name, axis in (("d", d), ("q", q))}
         dc, qc = circuits["d"], circuits["q"]

@@ -23,8 +23,7 @@ def stage(m: ModelBuilder, u: ca.SX, number: int, names: tuple[str, str], values
     """(1 + s·T_lead)/(1 + s·T_lag), passed through where T_lag = 0, which needs T_lead = 0.
 
     ``u``: what goes in; 0 in steady state; ``number``: of the stage; ``names``, ``values``: of lead and lag, and their
-    defaults [s].
-    """
+    defaults [s]."""
     T_lead, T_lag = (
         time(m, names[0], values[0], f"Lead of stage {number}"),
         time(m, names[1], values[1], f"Lag of stage {number}; 0 leaves the stage out"),

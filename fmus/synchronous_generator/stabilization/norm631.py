@@ -7,8 +7,7 @@
          └───────┘  └───────┘  └──────┘     │      └────────────────┘    │            └────────┘  └────────┘
   P_e ─► s·T_w3/(1 + s·T_w3) ─► s·T_w4/(1 + s·T_w4) ─► K_s2/(1 + s·T_7) ─┴─┘
 
-A washout or lag whose time constant is 0 is left out.
-"""
+A washout or lag whose time constant is 0 is left out."""
 
 import casadi as ca
 
@@ -24,8 +23,7 @@ def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX) -> ca.S
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
     ``delta_omega``: w − 1 [pu]; ``P_e``, ``P_e_0``: electrical power at the terminal [pu, S_n], and at the operating
-    point.
-    """
+    point."""
     with m.scope("pss"):
         enabled = m.switch("enabled", True, "Adds the stabiliser's signal to the voltage reference", tunable=True)
 

@@ -1,8 +1,7 @@
 """PSS1A with speed as its input; STAB1, and IEEEST with a speed signal and a filter of second order.
 
 w − 1 → 1/(1+sT_6) → K_S·s·T_5/(1+sT_5) → 1/(1 + A_1·s + A_2·s²)
-→ (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → V_STMIN ≤ V_S ≤ V_STMAX
-"""
+→ (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → V_STMIN ≤ V_S ≤ V_STMAX"""
 
 import casadi as ca
 

@@ -6,8 +6,7 @@
     → (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → (1+sT_10)/(1+sT_11) → V_STMIN ≤ V_S ≤ V_STMAX
 
 The limits of the inputs, V_SI1MIN … V_SI2MAX, and the third stage are PSS2B's. The power's limits hold for its change
-from the operating point. A block whose time constant is 0 is left out. M = 5 and N = 1 of the ramp-tracking filter.
-"""
+from the operating point. A block whose time constant is 0 is left out. M = 5 and N = 1 of the ramp-tracking filter."""
 
 from functools import partial
 
@@ -22,8 +21,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX, *, newer: bool = False) -> ca.SX:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
-    ``newer``: whether it has what PSS2B has beyond PSS2A.
-    """
+    ``newer``: whether it has what PSS2B has beyond PSS2A."""
     with m.scope("pss"):
         speed, power = delta_omega, P_e - P_e_0
         if newer:

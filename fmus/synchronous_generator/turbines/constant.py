@@ -3,8 +3,7 @@
     constant_power   P_m = P_ref, so the torque falls with speed, T_m = P_m/w
     constant_torque  T_m = P_ref, so P_m = T_m·w
 
-Between them lies a damping of P_0 per unit of speed: 1/(4H)·P_0 of the swing's decay.
-"""
+Between them lies a damping of P_0 per unit of speed: 1/(4H)·P_0 of the swing's decay."""
 
 import casadi as ca
 

@@ -2,8 +2,7 @@
 
 low value of P_ref − (w − 1)/R and A_T + K_T·(A_T − T_exh)
 → 1/(1+sT_1), held within V_MIN and V_MAX → 1/(1+sT_2) → fuel
-P_m = fuel − D_turb·(w − 1),   T_exh = fuel/(1+sT_3)
-"""
+P_m = fuel − D_turb·(w − 1),   T_exh = fuel/(1+sT_3)"""
 
 import casadi as ca
 

@@ -4,8 +4,7 @@
     T_g·dg/dt = c − g, at most VELM per second
     h = (q/g)²,  T_W·dq/dt = 1 − h,  P_m = A_t·h·(q − q_NL) − D_turb·g·(w − 1)
 
-In steady state h = 1 and g = q = P_m/A_t + q_NL.
-"""
+In steady state h = 1 and g = q = P_m/A_t + q_NL."""
 
 import casadi as ca
 

@@ -3,8 +3,7 @@
     (w − 1) → K·(1+sT_2)/(1+sT_1) → P_ref − … − P_GV → 1/T_3, U_c ≤ rate ≤ U_o → 1/s = P_GV within P_MIN and P_MAX
     P_GV → 1/(1+sT_4) → 1/(1+sT_5) → 1/(1+sT_6) → 1/(1+sT_7), tapped after each with K_1+K_2, K_3+K_4, K_5+K_6, K_7+K_8
 
-Both shafts of a cross-compound unit drive this one machine: the fractions of a pair add up.
-"""
+Both shafts of a cross-compound unit drive this one machine: the fractions of a pair add up."""
 
 import casadi as ca
 

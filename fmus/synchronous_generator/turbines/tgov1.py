@@ -16,8 +16,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 def tgov1(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
     """Declare governor and turbine and return the mechanical power [pu, S_n].
 
-    ``w``: rotor speed [pu, f_n]; ``P_m_0``: mechanical power at the operating point [pu, S_n].
-    """
+    ``w``: rotor speed [pu, f_n]; ``P_m_0``: mechanical power at the operating point [pu, S_n]."""
     with m.scope("governor"):
         R = power(m, "R", 0.05, "Droop", 1e-4)
         T_1 = time(m, "T_1", 0.5, "Valve; 0 leaves the lag out")

@@ -14,8 +14,7 @@ def ieeeg1(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX, data: GovernorData) -> ca.SX
     → 1/(1+sT_7), tapped after T_4, T_5, T_6 and T_7 with K_1+K_2, K_3+K_4, K_5+K_6 and K_7+K_8.
 
     ``w``: rotor speed [pu, f_n]; ``P_m_0``: mechanical power at the operating point [pu, S_n]; ``data``: defaults of
-    the parameters.
-    """
+    the parameters."""
     with m.scope("governor"):
         enabled = m.switch("enabled", True, "Governor in service; otherwise the mechanical power is constant")
         gain = m.parameter("inverse_R", data.inverse_droop, "pu", "1/R", base="S_n", minimum=0, source=data.source)

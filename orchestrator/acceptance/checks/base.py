@@ -96,8 +96,7 @@ def failed(name: str, fault: str, evidence: str, **figures: Any) -> CheckResult:
     """A check that found a fault of the FMU.
 
     ``fault``: A key of `REMEDIES`, which has the remedy for it.
-    ``figures``: what was measured, for the report: plain values by name.
-    """
+    ``figures``: what was measured, for the report: plain values by name."""
     return CheckResult(name, Verdict.FAIL, evidence, fault, REMEDIES[fault], figures, Whose.FMU)
 
 

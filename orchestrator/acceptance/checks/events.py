@@ -47,8 +47,7 @@ def in_words(voltage: complex) -> str:
 def scale(subject: Subject, seconds: float) -> float:
     """By what the durations of so many seconds of events are multiplied: less than 1 where it computes slowly or ends.
 
-    An experiment that is declared to be shorter is no bound: limits and signs are looked at for longer as well.
-    """
+    An experiment that is declared to be shorter is no bound: limits and signs are looked at for longer as well."""
     steps = seconds / subject.step_size
     fit = max(200.0, _SPENT / subject.memory.get("seconds_per_step", 1e-6))
     ends = [subject.memory.get(end, seconds) / seconds for end in ("ended_at", "stops_at")]
@@ -62,8 +61,7 @@ def rows(
 
     ``segments``: what the voltage is multiplied by, one after another.
     ``purpose``: for what; each purpose has other random steps.
-    ``point``: where it starts; the subject's own point where None.
-    """
+    ``point``: where it starts; the subject's own point where None."""
     counts = [max(1, round(times * lasts / subject.step_size)) for _, lasts in segments]
     total, wide = sum(counts), len(subject.inputs)
     heights = subject.random(purpose).uniform(-1, 1, (total // _HOLD + 1, wide)) * _WIGGLE * subject.amplitudes

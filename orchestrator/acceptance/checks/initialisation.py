@@ -19,8 +19,7 @@ _ELSEWHERE = POINTS[1]  # another operating point: at its own, an FMU may start 
 def initial_outputs(subject: Subject) -> CheckResult:
     """Read them in initialisation mode, end it with the inputs as they are, and read them again.
 
-    A master reads outputs in initialisation mode, to find inputs and outputs of all components that agree.
-    """
+    A master reads outputs in initialisation mode, to find inputs and outputs of all components that agree."""
     if not subject.outputs:
         return not_applicable("initial_outputs", "because the FMU has no Real outputs")
     worst, seen = 0.0, ""

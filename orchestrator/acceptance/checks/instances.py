@@ -22,8 +22,7 @@ IN_EVENTS, NOT_IN_EVENTS = ", in dips and jumps as well", "; not judged in dips 
 def _in_events(subject: Subject, runs: Callable[[], tuple[Numbers, Numbers]], usual: float) -> tuple[float, str]:
     """How far two runs with dips and jumps are apart, and the output that shows it.
 
-    Where they are equal, 0 and what to add to the evidence; an FMU may refuse such inputs with an error.
-    """
+    Where they are equal, 0 and what to add to the evidence; an FMU may refuse such inputs with an error."""
     try:
         with subject.while_doing("in dips and jumps"):
             apart, place = difference(*runs())
@@ -45,8 +44,7 @@ def _first_fault(subject: Subject, look: Callable[[Subject, Setting], CheckResul
     """The first fault that is found with some parameters set, or else the result with the parameters as they are.
 
     Raises a `ComponentError` with the parameters as they are; a setting with which the FMU does not work is passed
-    over.
-    """
+    over."""
     results = []
     for found, said in with_each_setting(subject, lambda setting: look(subject, setting)):
         if found.fault:
@@ -83,8 +81,7 @@ def _independent(subject: Subject, setting: Setting) -> CheckResult:
 
 def _among_others(subject: Subject, rows: Numbers, setting: Setting) -> tuple[Numbers, Numbers]:
     """A run alone, and one in turns with an instance that has dips and jumps of its own; equal ones where two runs
-    alone differ, which is for 'repeatability' to tell.
-    """
+    alone differ, which is for 'repeatability' to tell."""
     alone, again = (subject.through(rows, parameters=setting) for _ in range(2))
     if difference(alone, again)[0] > 0:
         return alone, alone

@@ -73,8 +73,7 @@ def memory(subject: Subject) -> CheckResult:
 def _growth(subject: Subject, block: Callable[[], None], count: int) -> float | _Unknown:
     """Bytes kept by every repetition: the lower median of the later blocks.
 
-    What fills within some blocks, and what something else takes or frees in one of them, does not count.
-    """
+    What fills within some blocks, and what something else takes or frees in one of them, does not count."""
     sizes = []
     for _ in range(_BLOCKS):
         block()

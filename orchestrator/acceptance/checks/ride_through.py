@@ -78,8 +78,7 @@ class Answer:
 def _runs(draw: np.random.Generator) -> Iterator[list[Disturbance]]:
     """Every kind of event at every time, one at each time of a run; the first run has the most telling ones.
 
-    Depths, angles and times are drawn, so that no device knows them; a bolted fault has no voltage at all.
-    """
+    Depths, angles and times are drawn, so that no device knows them; a bolted fault has no voltage at all."""
 
     def dip(least: float, most: float) -> tuple[str, complex]:
         to = round(draw.uniform(least, most), 3)

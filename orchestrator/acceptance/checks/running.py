@@ -73,8 +73,7 @@ def runs(subject: Subject) -> CheckResult:
 def spent_since() -> Callable[[], float]:
     """What a run has taken since now [s]: what it computed, so that other programs on the machine take none of it.
 
-    What waits rather than computes is counted as well, by a part of the time that passes.
-    """
+    What waits rather than computes is counted as well, by a part of the time that passes."""
     wall, own = perf_counter(), process_time()
 
     def spent() -> float:

@@ -72,8 +72,7 @@ def _changes(subject: Subject, steps: int, step_size: float) -> NDArray[np.bool_
     """For each step whether it moved each output, shape (steps, outputs).
 
     Where an output follows an input at once, that would hide that nothing else moves: there it is read before the step
-    as well, after the inputs were set.
-    """
+    as well, after the inputs were set."""
     stimulus = subject.motion(step_size)
     with subject.running() as running:
         if not any(subject.memory.get("feedthrough", {"": True}).values()):

@@ -326,8 +326,7 @@ def _wrong_droop(
 ) -> tuple[tuple[str, str] | None, str]:
     """Look closer where lower voltage brings more reactive power in the end than in the first cycle.
 
-    A fault and what shows it, and why the droop of the reactive power could not be judged.
-    """
+    A fault and what shows it, and why the droop of the reactive power could not be judged."""
     not_judged = f"{_DROOP_OF_Q} was not judged: "
     if voltage.power.imag < _MORE * voltage.early_power.imag:
         return None, ""

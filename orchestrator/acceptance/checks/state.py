@@ -91,8 +91,7 @@ def _which(subject: Subject) -> str:
 def _in_events(subject: Subject, setting: Setting) -> tuple[float, str]:
     """The same with a state saved within a dip and one saved after it, restored after other dips and jumps.
 
-    How far the runs are apart, and that in words, or what to add to the evidence.
-    """
+    How far the runs are apart, and that in words, or what to add to the evidence."""
     draw = subject.random("state")
 
     def segments(*parts: tuple[str, float]) -> list[Segment]:
@@ -189,8 +188,7 @@ def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[s
     """What reads otherwise after it was restored; the largest difference of two runs, and the output's place.
 
     Parameters are moved before the state is saved, and back before it is restored: they belong to it. A second state
-    is saved and kept meanwhile.
-    """
+    is saved and kept meanwhile."""
     steps, h = affordable(subject, _STEPS), subject.step_size
     stimulus = subject.steps(hold=15 * h)
     worst, place = 0.0, 0

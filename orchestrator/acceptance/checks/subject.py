@@ -55,8 +55,7 @@ class Subject:
     ``step_size``: Communication step of the tests [s].
     ``step_is_given``: Whether the file declares it or the user asks for it.
     ``memory``: Results that several checks share.
-    ``start_time``: At which its instances begin [s].
-    """
+    ``start_time``: At which its instances begin [s]."""
 
     # gives the process in which it runs, a new one after its end; whoever runs checks sets it.
     process: Callable[[], FmuProcess]
@@ -117,8 +116,7 @@ class Subject:
     ) -> None:
         """Give a new instance what it is given before initialisation.
 
-        ``point``: operating point that it starts from; the one of use where None.
-        """
+        ``point``: operating point that it starts from; the one of use where None."""
         component.setup(self.start_time, None)
         if self.starts:
             at = point or self.point
@@ -197,8 +195,7 @@ class Subject:
         """Outputs at each communication point of a new instance, shape (steps + 1, number of outputs).
 
         ``step_size``: their length [s].
-        ``stimulus``: gives the deviations of the inputs from where they start, at a time [s].
-        """
+        ``stimulus``: gives the deviations of the inputs from where they start, at a time [s]."""
         with self.running(**options) as running:
             return running.record(steps, step_size, stimulus)
 
@@ -252,8 +249,7 @@ class Running:
     def hold(self, deviations: Numbers, steps: int, step_size: float) -> Numbers:
         """Step many times at once, shape (steps, n): what was read after each.
 
-        ``deviations``: of the inputs before the first steps, one row each; after the last row they stay.
-        """
+        ``deviations``: of the inputs before the first steps, one row each; after the last row they stay."""
         begin = self.time
         if not steps:
             return np.empty((0, len(self._out.names)))

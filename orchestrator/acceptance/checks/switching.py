@@ -2,8 +2,7 @@
 
 A relay that is looked at once a step switches up to a step late, and a level that it controls turns around that much
 later: of a signal with two values this makes a difference of its whole range, although nothing is wrong. So runs are
-compared from switching to switching: the same values in the same order, each for as long, and all else alike there.
-"""
+compared from switching to switching: the same values in the same order, each for as long, and all else alike there."""
 
 from collections.abc import Sequence
 

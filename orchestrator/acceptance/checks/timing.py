@@ -110,8 +110,7 @@ def _at_step_sizes(subject: Subject) -> tuple[Numbers, Numbers, Numbers] | str:
     """The response to one step of all inputs, with one, two and four times a step size.
 
     That is the FMU's own, or a quarter of it where four times as much leads nowhere: not every FMU that is good at its
-    own step is so beyond.
-    """
+    own step is so beyond."""
     if "step sizes" not in subject.memory:
         for base in (subject.step_size, subject.step_size / 4):
             subject.memory["base step"] = base
@@ -141,8 +140,7 @@ def _stays(runs: tuple[Numbers, Numbers, Numbers]) -> bool:
 def _shift(fine: Numbers, coarse: Numbers, many: int) -> int:
     """By how many communication steps an output of the coarse run is late, and of the fine run as well; else 0.
 
-    Late by ``count`` steps of any size, it lags ``count·(many − 1)`` fine steps more in the coarse run.
-    """
+    Late by ``count`` steps of any size, it lags ``count·(many − 1)`` fine steps more in the coarse run."""
     size, at = scales(fine, coarse), np.arange(1, len(coarse)) * many
     for column in range(fine.shape[1]):
         a, b = fine[:, column] / size[column], coarse[:, column] / size[column]
@@ -260,8 +258,7 @@ def _switching(name: str, signals: list[str], seen: str, **figures: float) -> Ch
 def _typical(a: Numbers, b: Numbers) -> float:
     """The difference that most samples have, relative to the range, of the output that differs most.
 
-    One sample beside an event, such as a bounce, says nothing.
-    """
+    One sample beside an event, such as a bounce, says nothing."""
     count = min(len(a), len(b))
     apart = np.abs(a[:count] - b[:count]) / scales(a, b)
     return float(np.nan_to_num(np.percentile(apart, 70, axis=0), nan=np.inf).max(initial=0.0))

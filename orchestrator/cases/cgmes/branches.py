@@ -2,8 +2,7 @@
 
 pypowsybl's branch has an ideal ratio ρ·e^{jα} = V'/V at its first side; what lies behind it, in ohm, is a π section. In
 pu of the second side's nominal voltage the ratio of MATPOWER's convention, v' = v/t, is t = (Vn2/Vn1)/(ρ·e^{jα}). A
-line is the same with ρ = 1. A transformer of three windings is three such branches to a star bus at its rated_u0.
-"""
+line is the same with ρ = 1. A transformer of three windings is three such branches to a star bus at its rated_u0."""
 
 import math
 from collections.abc import Iterator
@@ -34,8 +33,7 @@ def branch(
     ``name`` and ``ends``: its name, and the buses' ids.
     ``nominal``: nominal voltages of the buses [kV].
     ``z`` and ``to_earth``: behind the ratio [ohm, S].
-    ``rho`` and ``alpha``: the ratio V'/V [kV/kV], and its angle [degrees].
-    """
+    ``rho`` and ``alpha``: the ratio V'/V [kV/kV], and its angle [degrees]."""
     first, second = nominal
     base = second**2 / BASE_MVA
     return Branch(
@@ -47,8 +45,7 @@ def lines(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
     """Lines that are closed at both ends.
 
     ``network``: pypowsybl's.
-    ``nominal``: bus → nominal voltage [kV]; a branch that ends at another bus is out of service.
-    """
+    ``nominal``: bus → nominal voltage [kV]; a branch that ends at another bus is out of service."""
     for row in network.get_lines(all_attributes=True).itertuples():
         ends = row.bus1_id, row.bus2_id
         if row.connected1 and row.connected2 and all(end in nominal for end in ends):
@@ -58,8 +55,7 @@ def lines(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
 
 def _shorter(line: Branch) -> Branch:
     """A line between two nominal voltages has a ratio in pu. Where the same two-port without a ratio has smaller
-    admittances to earth, the line stands for a transformer in pu, and that is what it is.
-    """
+    admittances to earth, the line stands for a transformer in pu, and that is what it is."""
     if line.tap == 1.0 or not line.z:
         return line
     y, t = 1 / line.z, line.tap

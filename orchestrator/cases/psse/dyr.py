@@ -24,8 +24,7 @@ class MachineModel:
 
     ``partial``: a record of it was left out, and the case says what stands for it. ``doubts`` are texts with the
     parameter and the place that they are about; ``replaced`` are lines of records that an approximation stands for,
-    with what it leaves out; ``lines`` are the records' by parameter.
-    """
+    with what it leaves out; ``lines`` are the records' by parameter."""
 
     parts: Mapping[str, str]
     parameters: Mapping[str, float]
@@ -53,8 +52,7 @@ def machine_models(
     ``approximate``: whether WECC's grid-following converters become `gfl_phasor`, which leaves a part of them out; else
     they are refused.
     Raises an `InputError` with every machine that has no machine record, every record of a machine that is not there,
-    every model that is unknown, and every value that our part cannot have.
-    """
+    every model that is unknown, and every value that our part cannot have."""
     at = {(machine.bus, machine.name.strip()): machine for machine in machines}
     problems: list[str] = []
     parts: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}

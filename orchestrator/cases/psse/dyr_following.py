@@ -41,8 +41,7 @@ def followed(
 ) -> tuple[Mapping[str, float], list[tuple[int, str]]]:
     """The approximation of a grid-following converter by its records.
 
-    Returns parameters of the model, and what it leaves out, with the lines that say it.
-    """
+    Returns parameters of the model, and what it leaves out, with the lines that say it."""
     own = [record for record in records if record.name in FIELDS and record.name not in left]
     values: dict[str, dict[str, float]] = {}
     for record in own:

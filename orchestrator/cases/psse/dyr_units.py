@@ -47,8 +47,7 @@ def with_records(
     ``leaving_out``: models whose records may be left out.
     ``without``: labels of units that are converters of the case alone, and need no record.
     ``idle``: bus and identifier of the machines that are out of service.
-    ``approximate``: whether grid-following converters become `gfl_phasor`.
-    """
+    ``approximate``: whether grid-following converters become `gfl_phasor`."""
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
     models = machine_models(read_dyr(path), machines, leaving_out, replaced, idle, approximate=approximate)

@@ -1,7 +1,6 @@
 """Transformers of a RAW file as branches: units of data (CW, CZ, CM) to pu of the system, three windings to a star.
 
-Sources: the descriptions of the data format that PowerWorld, MATPOWER (``psse2mpc``) and PowSyBl publish.
-"""
+Sources: the descriptions of the data format that PowerWorld, MATPOWER (``psse2mpc``) and PowSyBl publish."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,8 +39,7 @@ class Transformer:
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
     """The transformers of a file.
 
-    ``voltages``: bus → base voltage [kV]; 0 where the file leaves it open.
-    """
+    ``voltages``: bus → base voltage [kV]; 0 where the file leaves it open."""
     lines = iter(raw.of("transformer"))
     for first in lines:
         count = 3 if first.whole(2, "K", 0) else 2

@@ -1,8 +1,7 @@
 """Criteria of the codes: each reads a response and says whether what is asked is met.
 
 A number of a code stands in the code's table. A number that no code gives is one of this module's constants, and the
-finding says that it is this program's reading.
-"""
+finding says that it is this program's reading."""
 
 import numpy as np
 
@@ -53,8 +52,7 @@ def _number(value: float) -> float | None:
 def holds_together() -> Judge:
     """Neither a loss of synchronism, nor growth, nor a lasting oscillation, as `gfor run` watches for them, nor a trip.
 
-    What the watch could not tell is said; whether the response settles is a criterion of its own.
-    """
+    What the watch could not tell is said; whether the response settles is a criterion of its own."""
 
     def judge(row: MeasuredRow) -> RowFinding:
         faults = row.faults
@@ -90,8 +88,7 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
 
     ``within``: Time after the event in which it has to be back for good [s]; None for the end of its hold.
     ``tolerance``: Largest distance [pu of the rating].
-    ``events``: Numbers of the events; all of them where empty.
-    """
+    ``events``: Numbers of the events; all of them where empty."""
 
     def judge(row: MeasuredRow) -> RowFinding:
         asked, worst, at = row.before(row.events[0]), 0.0, row.times[0]
@@ -119,8 +116,7 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
 def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -> Judge:
     """The power, averaged over a period, moves against the jump by at least so much.
 
-    ``sign``: +1 where the power has to rise: the source's angle falls.
-    """
+    ``sign``: +1 where the power has to rise: the source's angle falls."""
 
     def judge(row: MeasuredRow) -> RowFinding:
         time = row.events[event]
@@ -148,8 +144,7 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
     """The power reaches a share of its first change in a time. A median takes the filter's spikes away.
 
     ``sign``: +1 where the power has to rise.
-    ``share``: Of the largest change in the first swing.
-    """
+    ``share``: Of the largest change in the first swing."""
 
     def judge(row: MeasuredRow) -> RowFinding:
         time = row.events[event]
@@ -253,8 +248,7 @@ def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
     H = f_n·ΔE/(2·|rate|·lasts), where ΔE is the energy beyond that of the power before [pu·s].
 
     ``rate``, ``lasts``: Of the ramp [Hz/s, s]; the power has to rise where the rate is negative.
-    ``least``: Least inertia constant [s].
-    """
+    ``least``: Least inertia constant [s]."""
 
     def judge(row: MeasuredRow) -> RowFinding:
         time = row.events[event]

@@ -11,8 +11,7 @@ power before the event, in the direction in which the ideal plant moves: what is
 
 Source: RTE's programme DyCoV (dynawo/dyn-grid-compliance-verification, ``src/dycov/gfm`` and the curves under
 ``docs/GFM_envelopes_curves``), that computes them for the sheet "grid-forming" of its technical documentation. Its
-revisions differ in margins; those of the published curves are taken, which these functions give to their last digit.
-"""
+revisions differ in margins; those of the published curves are taken, which these functions give to their last digit."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -91,8 +90,7 @@ class Swinging:
     def dying_of_source(self, t: Numbers) -> Numbers:
         """As `dying`; where ζ ≤ 1 as DyCoV has it, e^(−σt)·(cos ω_d·t − (σ − 1)/ω_d·sin ω_d·t).
 
-        That is no solution of the swing equation, for which +σ stands in place of −(σ − 1). It falls earlier.
-        """
+        That is no solution of the swing equation, for which +σ stands in place of −(σ − 1). It falls earlier."""
         if self.ratio > 1:
             return self.dying(t)
         phase = self.swing * t
@@ -107,8 +105,7 @@ class Swinging:
         """Size of `ramping` by which the tunnel is measured [pu·s].
 
         Where ζ < 1 DyCoV adds the amplitude of the oscillation to the final value with its sign, so that the tunnel of
-        a falling frequency is the narrower one.
-        """
+        a falling frequency is the narrower one."""
         final = 2 * self.H + self.D * LAG
         if self.ratio >= 1:
             return final
@@ -162,8 +159,7 @@ def strength_bounds(plant: Swinging, change: float) -> Callable[[Numbers], Bound
     """Bounds of the active power after a step of the short-circuit ratio (IGFM3).
 
     ``plant``: As declared, with the grid after the step.
-    ``change``: Size of the power's first change [pu]: |P_0|·|1/SCR_after − 1/SCR_before|/X.
-    """
+    ``change``: Size of the power's first change [pu]: |P_0|·|1/SCR_after − 1/SCR_before|/X."""
     tunnel, spread, margin = _tunnel(change), (1.0, 0.8, 1.2), 0.2
     plants = [plant.varied(ratio) for ratio in spread]
 
@@ -184,8 +180,7 @@ def ramp_bounds(plant: Swinging, rate: float, lasts: float) -> Callable[[Numbers
     """Bounds of the active power during and after a ramp of the grid's frequency (IGFM4).
 
     ``rate``: Rate of the frequency [pu/s]; its sign chooses the margins.
-    ``lasts``: Duration of the ramp [s].
-    """
+    ``lasts``: Duration of the ramp [s]."""
     size, tunnel = abs(rate), _tunnel(abs(rate) * plant.ramp_peak(rising=rate > 0))
     less, more = (0.3, 0.5) if rate > 0 else (0.5, 0.3)
     plants = [plant.varied(ratio) for ratio in (1.0, 0.8, 1.2)]

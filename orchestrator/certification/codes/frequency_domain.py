@@ -66,8 +66,7 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
     A stiffness K at the terminals and that of the grid, K_g = X/|Z|², lie in series: a jump Δθ of the source moves the
     power by Δθ/(1/K + 1/K_g), which is to be `OPPOSED` or more. The power is a mean over a period T, so that K has to
     last as long: an angle that follows the bus with the time constant T has its corner at 1/(2π·T). And 90 % of the
-    change within `LONGEST` is what a lag of `LONGEST`/ln 10 reaches, whose corner is the upper end of the band.
-    """
+    change within `LONGEST` is what a lag of `LONGEST`/ln 10 reaches, whose corner is the upper end of the band."""
     Z = jumps(SCR, POWER, ()).impedance
     asked = 1 / (JUMP / OPPOSED - abs(Z) ** 2 / Z.imag)
     band = (f_n / (2 * np.pi), float(np.log(10) / (2 * np.pi * LONGEST)))

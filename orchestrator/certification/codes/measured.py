@@ -108,8 +108,7 @@ class MeasuredRow:
 
         It has stopped where its apparent power is below `NOTHING` for `GONE` in all, also in many short parts. Of a
         plant that feeds in less than `FED_IN` before the first event this cannot be told, nor of one that leaves a
-        small current while its power may be 0 by a droop.
-        """
+        small current while its power may be 0 by a droop."""
         if "q" not in self.signals or not self._begun or abs(self.before(self.events[0])) < FED_IN:
             return None
         steady = np.full(self.times.shape, True)
@@ -129,8 +128,7 @@ class MeasuredRow:
         The voltage v + jX·i inside of the plant, with `INSIDE` for X, is looked at in the end of each hold, and from
         one such end to the next: there it may be `HALF_TURN` beyond where it stood at both, as while it swings. Before
         the first event it may be so far from where it stands at it. An X that is larger than the plant's own counts
-        the same turns, also those of a limited current: the voltage then encloses the origin all the more.
-        """
+        the same turns, also those of a limited current: the voltage then encloses the origin all the more."""
         needed = {"p", "q", "v_re", "v_im"}
         if self.source_angle is None or not needed <= set(self.signals) or not self.finite or not self._begun:
             return None

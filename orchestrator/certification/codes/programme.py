@@ -105,8 +105,7 @@ def weakening(start: float, power: float, ratios: tuple[float, ...], conductance
 
     ``conductance``: Of the fault, in parts of the source's admittance before it, so that its depth is the same each
     time.
-    ``hold``: Time between two clearances [s].
-    """
+    ``hold``: Time between two clearances [s]."""
     changes, before = [], start
     for k, ratio in enumerate(ratios):
         cleared = FIRST + k * hold
@@ -127,7 +126,6 @@ def last_machine(plant: float, duplicate: float, load: float, factor: float = 0.
     """The source is disconnected; the plant and a duplicate of half its rating are left with the load.
 
     ``plant``, ``duplicate``: Active power of each at the start [pu of its own rating].
-    ``load``: Active power of the load [pu of the plant's rating].
-    """
+    ``load``: Active power of the load [pu of the plant's rating]."""
     return BenchProgramme(10.0, plant, (BenchChange(FIRST, "source.connected", False),), 11.0,
                           load=(load, factor), duplicate=duplicate)  # fmt: skip

@@ -37,8 +37,7 @@ class Band:
 
     ``label``: the quantity, with its unit; ``quantity``: the response of a row → the quantity over its times, shape
     (n,); ``times``: at which the limits hold [s], shape (m,); ``low``, ``high``: limits in the quantity's unit, shape
-    (m,); None where there is none; ``alone``: whether it gets a picture of its own, which shows its times alone.
-    """
+    (m,); None where there is none; ``alone``: whether it gets a picture of its own, which shows its times alone."""
 
     criterion: str
     label: str
@@ -65,8 +64,7 @@ class CodeRow:
     """One row of a code's table: a stimulus, and what is asked of the response.
 
     ``name``: short, for files: letters, digits and underscores; ``programme``: what the bench does, for a rated
-    frequency [Hz]; ``shown_only``: whether the code gives no verdict on it.
-    """
+    frequency [Hz]; ``shown_only``: whether the code gives no verdict on it."""
 
     name: str
     title: str
@@ -83,8 +81,7 @@ class GridCode:
     ``title``, ``source``, ``date``: what it is, where its numbers were read, and of when it is; ``f_n``: rated
     frequency of the system [Hz]; ``left_out``: what the code asks and this table does not test, with the reason;
     ``readings``: where the code leaves something open, how it was read; ``declared``: what the applicant declares of
-    the converter, where the rows depend on it.
-    """
+    the converter, where the rows depend on it."""
 
     key: str
     title: str

@@ -49,8 +49,7 @@ def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
     """Apply a row's criteria to its response.
 
     A converter that does not hold together answers nothing else: what its other criteria meet is not judged, and what
-    they miss stays missed.
-    """
+    they miss stays missed."""
     if result.failure:
         return RowVerdict(row, unknown=str(result.failure))
     programme = row.programme(f_n)

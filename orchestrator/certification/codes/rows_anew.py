@@ -33,8 +33,7 @@ def chosen_rows(content: dict[str, Any], wanted: Sequence[str] = (), *, every: b
     """Names of the rows that are computed anew.
 
     ``wanted``: Names that were asked for; where empty, the row with the narrowest margin that is met, and `DRAWN`
-    others that chance draws, so that nobody knows them beforehand.
-    """
+    others that chance draws, so that nobody knows them beforehand."""
     known = [stated["row"] for stated in content["rows"] if not stated["unknown"]]
     if unknown := [name for name in wanted if name not in known]:
         raise InputError(f"--rows: the certificate has no row {unknown[0]!r}; it has: {', '.join(known)}")

@@ -88,8 +88,7 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
 
     ``made``: The envelope for a rated frequency [Hz].
     ``quantity``: What is compared [pu].
-    ``skipped``: How many events later its time ends: 2 for a ramp, whose own end is an event.
-    """
+    ``skipped``: How many events later its time ends: 2 for a ramp, whose own end is an event."""
 
     def bounds(row: MeasuredRow, values: Numbers) -> tuple[slice, Numbers, Numbers]:
         begin = row.events[event]

@@ -49,8 +49,7 @@ class MarginSensitivity:
         """Where the straight line meets the limit, and `RESERVE` further, as a relative change of at most `MOST`.
 
         None where there is no trusted slope, or the declared bounds leave no room. It is a change to be tried: a
-        straight line through two runs near each other promises nothing.
-        """
+        straight line through two runs near each other promises nothing."""
         if self.margin is None or not self.slope or self.doubts:
             return None
         wanted = max(-MOST, min(MOST, -RESERVE * self.margin / self.slope))
@@ -67,8 +66,7 @@ def sensitivity_of(
     """The effect of one parameter, from the row as it is and as it is on either side.
 
     ``sides``: The changed rows by −1 and +1; a side that the declared bounds do not allow is missing.
-    ``change``: Relative to `Parameter.scale`.
-    """
+    ``change``: Relative to `Parameter.scale`."""
     if not sides:
         return MarginSensitivity(parameter, criterion.margin, reason="its declared bounds leave no room on either side")
     doubts, margins, met = [], {}, {}

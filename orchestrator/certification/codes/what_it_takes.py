@@ -1,8 +1,7 @@
 """What a failed criterion would take: each parameter of the converter is changed to either side, and the row run again.
 
 Only rows that fail are run. What comes out is a slope at the present values; the change that a straight line asks for
-is only told where it was run.
-"""
+is only told where it was run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -86,8 +85,7 @@ def plan_changes(
     """Find what is to be run; nothing is run yet.
 
     ``patterns``: Names of the converter's parameters, also with ``*``; fixed ones that fit are taken too. Without
-    patterns all tunable ones are taken.
-    """
+    patterns all tunable ones are taken."""
     rows = [v for v in certificate.verdicts if v.judged and not v.accepted]
     if not rows:
         return ChangePlan(certificate, folder, (), (), {}, change, {})
@@ -153,8 +151,7 @@ def confirm_changes(
     """Run for each failed criterion the change of one parameter that the straight line asks for.
 
     Taken is the parameter whose line reaches the limit, or comes nearest to it, and of several the one that has to
-    move least.
-    """
+    move least."""
     wanted: dict[int, tuple[MarginSensitivity, float]] = {}
     tasks: dict[int, ChangeTask] = {}
     for k, need in enumerate(needs):

@@ -1,6 +1,5 @@
 """Results of any study as a chapter of a report: its question, its answer in plain words, how sure it is, what was not
-judged, and its figures.
-"""
+judged, and its figures."""
 
 import json
 import re
@@ -29,8 +28,7 @@ _STABLE: Mapping[bool | None, str] = {True: "stable", False: "UNSTABLE", None: "
 @dataclass(frozen=True)
 class Chapter:
     """What one result says; ``page`` is the name of its own page, whose sections are the chapter, in the place of
-    ``content``; ``title`` is its heading, in the place of the question.
-    """
+    ``content``; ``title`` is its heading, in the place of the question."""
 
     source: Path
     question: str

@@ -91,8 +91,7 @@ def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurv
     """Curves over one axis; the pointer shows all values at its x.
 
     ``curves``: at least one, with a point at least.
-    ``height``: of the picture [px].
-    """
+    ``height``: of the picture [px]."""
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
     frame = Frame(_span(x_all, 0.0), _span(y_all, 0.06), x_label, y_label, height)
@@ -120,8 +119,7 @@ def complex_plane(
 
     ``marks``: eigenvalues: x [1/s], y [Hz].
     ``trajectories``: lines in the same units, beneath the marks.
-    ``highest_hz``: the axis ends a little above this frequency [Hz]; above the highest mark or line where None.
-    """
+    ``highest_hz``: the axis ends a little above this frequency [Hz]; above the highest mark or line where None."""
     xs = [m.x for m in marks] + [v for t in trajectories for v in t.x.tolist()]
     ys = [m.y for m in marks] + [v for t in trajectories for v in t.y.tolist()]
     top = 1.08 * (highest_hz or max(ys, default=1.0))

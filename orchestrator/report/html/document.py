@@ -18,8 +18,7 @@ def document(
     ``kind``: what sort of report it is, for the line below the title.
     ``findings``: HTML of what a reader in a hurry should take away.
     ``content``: heading and HTML of every section.
-    ``moment``: when it was made (UTC); now where None.
-    """
+    ``moment``: when it was made (UTC); now where None."""
     links = "".join(f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content))
     body = "".join(
         f'<section id="section-{k}"><h2>{escape(name)}</h2>{text}</section>' for k, (name, text) in enumerate(content)

@@ -18,8 +18,7 @@ def network_map(
     name: str, branches: Sequence[tuple[str, str]], heat: Mapping[str, float], texts: Mapping[str, str]
 ) -> str:
     """The picture as SVG: branches by their two buses; by bus its heat from 0 (pale) to 1 (red), and what the pointer
-    shows.
-    """
+    shows."""
     buses = list(heat)
     at = dict(zip(buses, places(buses, branches).tolist(), strict=True))
     parts = [

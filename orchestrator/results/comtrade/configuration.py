@@ -1,6 +1,5 @@
 """The configuration of a COMTRADE recording (``.cfg``): channels, sampling rates and times, as IEEE C37.111 of 1991,
-1999 and 2013 writes them.
-"""
+1999 and 2013 writes them."""
 
 import math
 import re
@@ -96,8 +95,7 @@ def read_configuration(text: str, place: str) -> Configuration:
     """Read the text of a ``.cfg``.
 
     Raises an `InputError` if a line is missing or holds something else than the standard says; file, line and field are
-    named.
-    """
+    named."""
     lines = _Lines(text, place)
     station, device, revision = (*lines.next("the station's name"), "", "", "")[:3]
     revision = revision or "1991"

@@ -28,8 +28,7 @@ def read_samples(content: bytes, configuration: Configuration, place: str) -> tu
     """Time stamps and values of all channels.
 
     Returns time stamps [s], shape (n,), NaN where missing; values, shape (n, channels), the analog ones first and
-    scaled, NaN where missing.
-    """
+    scaled, NaN where missing."""
     read = _text if configuration.form == "ASCII" else _binary
     numbers, stamps, values = read(content, configuration, place)
     _check_numbers(numbers, configuration, place)

@@ -33,8 +33,7 @@ def write_comtrade(
     ``dataset``: evenly recorded signals over the time [s].
     ``path``: of the ``.cfg``; the ``.dat`` gets the same stem.
     ``form``: one of `FORMS`.
-    ``frequency``: rated frequency [Hz].
-    """
+    ``frequency``: rated frequency [Hz]."""
     if form not in FORMS:
         raise InputError(f"the form {form!r} is unknown; choose one of {', '.join(FORMS)}")
     times = np.asarray(dataset["time"].values, dtype=float)
