@@ -84,7 +84,7 @@ Is the network stable, and which swing is damped least?
   gfor run two_area --stop 5                          after a fault or a step: signals and plots
   gfor report results/two_area                        all that as one page for a browser
 What makes it better or worse?
-  gfor explore two_area                               in the browser: drag a value, see the modes move
+  gfor explore two_area                               in the browser: drag a value, see modes move
   gfor sensitivities two_area --scenario pod_p        which parameter moves the mode, and how far
   gfor sweep two_area --vary grid.X_L=0.1:0.5:9       modes along a parameter (or --until unstable)
   gfor screen ieee39 --points year.csv --outages n-1  hour by hour, outage by outage

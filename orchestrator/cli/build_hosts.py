@@ -11,7 +11,7 @@ ENDINGS: dict[Port, str] = {"dq": "", "abc": "_abc", "phasor": "_phasor"}  # of 
 
 
 @dataclass(frozen=True)
-class Host:
+class Tool:
     """What to build for a host.
 
     ``why``: the reason for the kind, the version and the port.
@@ -32,23 +32,23 @@ class Host:
 _DESKTOPS = ("linux64", "win64", "darwin64")
 _NO_MAC = ("linux64", "win64")
 
-HOSTS: dict[str, Host] = {
-    "cofmupy": Host(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
-    "dymola": Host(True, "2.0", "dq", _NO_MAC, "its FMI 2.0 has been there since Dymola 2015 FD01, on both systems",
+HOSTS: dict[str, Tool] = {
+    "cofmupy": Tool(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
+    "dymola": Tool(True, "2.0", "dq", _NO_MAC, "its FMI 2.0 has been there since Dymola 2015 FD01, on both systems",
                    "https://www.3ds.com/products-services/catia/products/dymola/fmi/"),
-    "ecos": Host(True, "2.0", "dq", _NO_MAC, "its command line is a program in C++, which has no Python", "here"),
-    "fmpy": Host(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
-    "fmucontainer": Host(True, "2.0", "dq", _NO_MAC, "the container's master is in C, and may go to any host", "here"),
-    "libcosim": Host(True, "2.0", "dq", _NO_MAC, "it is a library in C++, which has no Python", "here"),
-    "mosaik": Host(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
-    "openmodelica": Host(True, "2.0", "dq", _DESKTOPS, "OMSimulator takes FMI 2.0 for co-simulation, without Python",
+    "ecos": Tool(True, "2.0", "dq", _NO_MAC, "its command line is a program in C++, which has no Python", "here"),
+    "fmpy": Tool(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
+    "fmucontainer": Tool(True, "2.0", "dq", _NO_MAC, "the container's master is in C, and may go to any host", "here"),
+    "libcosim": Tool(True, "2.0", "dq", _NO_MAC, "it is a library in C++, which has no Python", "here"),
+    "mosaik": Tool(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
+    "openmodelica": Tool(True, "2.0", "dq", _DESKTOPS, "OMSimulator takes FMI 2.0 for co-simulation, without Python",
                          "https://openmodelica.org/doc/OMSimulator/master/html/"),
-    "pathsim": Host(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
-    "plecs": Host(True, "2.0", "abc", _DESKTOPS, "it takes FMI 2.0 and 3.0, and its circuits have phases",
+    "pathsim": Tool(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
+    "plecs": Tool(True, "2.0", "abc", _DESKTOPS, "it takes FMI 2.0 and 3.0, and its circuits have phases",
                   "https://docs.plexim.com/plecs/5.0/functional-mockup-interface"),
-    "powerfactory": Host(True, "2.0", "phasor", ("win64",), "a program for Windows; for its EMT name the model with "
+    "powerfactory": Tool(True, "2.0", "phasor", ("win64",), "a program for Windows; for its EMT name the model with "
                          "the ending _abc", "https://doi.org/10.1109/ISGTEurope.2019.8905616"),
-    "simulink": Host(True, "2.0", "abc", _DESKTOPS, "Python-backed FMUs were seen to end MATLAB, and its circuits have "
+    "simulink": Tool(True, "2.0", "abc", _DESKTOPS, "Python-backed FMUs were seen to end MATLAB, and its circuits have "
                      "phases", "https://github.com/NTNU-IHB/PythonFMU/issues/222"),
 }  # fmt: skip
 """By the name that ``--for`` takes."""

@@ -20,6 +20,7 @@ from orchestrator.explore.diagram import diagram
 from orchestrator.explore.responses import linear, plotted, simulated
 from orchestrator.explore.slopes import slopes
 from orchestrator.fmi.interrupts import calls
+from orchestrator.spelling import as_options
 
 Say = Callable[[dict[str, Any]], None]
 
@@ -124,7 +125,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    with calls.terminable(ending=True):
+    with calls.terminable(ending=True), as_options():
         try:
             main()
         except (KeyboardInterrupt, BrokenPipeError):

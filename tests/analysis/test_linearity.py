@@ -147,9 +147,10 @@ def test_modes_at_a_limit_s_edge_are_shown_with_a_warning(gfor):
 )
 def test_no_command_calls_stable_what_stands_at_a_limit_s_edge(gfor, tmp_path, command):
     """A disturbance of 1e-5 of the load ends there in lost synchronism."""
-    name, *options = command
+    words, options = (command[:2], command[2:]) if command[0] == "export" else (command[:1], command[1:])
+    name = words[0]
     out = () if name == "modes" else ("--out", str(tmp_path / ("x.toml" if name == "design" else "x")))
-    code, shown, _ = gfor(name, "two_area", "--scenario", "gfor", *EDGE, *options, *out, "--fail-unstable")
+    code, shown, _ = gfor(*words, "two_area", "--scenario", "gfor", *EDGE, *options, *out, "--fail-unstable")
     assert code == 1
     first = " ".join(shown.splitlines()[:4])  # of the table with a line a scenario, or of the sentence
     assert "not known" in first

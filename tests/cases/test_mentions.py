@@ -36,7 +36,7 @@ PANEL = '{ signal = "gfor.omega"'
         ('area_2 = ["sg2"]', 'area_2 = ["sg3"]', "'sg3': no scenario has such a component or bus"),
         (RING, RING.replace("sg1.omega", "sg1.omga"), "no scenario has an output 'sg1.omga'; did you mean sg1.omega"),
         (RING, RING.replace(" - ", " + "), "no scenario has an output 'sg1.omega + sg2.omega'"),
-        (RING, RING.replace(" - sg2", " - sg1.p - sg2"), "write 'component.variable' or"),
+        (RING, RING.replace(" - sg2", " - sg1.p - sg2"), "write 'component.variable', 'component"),
         (PANEL, PANEL.replace("omega", "omga"), "no scenario has an output 'gfor.omga'"),
     ],
 )

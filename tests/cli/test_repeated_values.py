@@ -7,7 +7,9 @@ from argparse import Namespace
 import pytest
 
 from orchestrator.cli import screen
+from orchestrator.cli.arguments import asked_by
 from orchestrator.cli.case_arguments import values_set
+from orchestrator.screening.request import ScreeningRequest
 
 
 @pytest.mark.parametrize(
@@ -52,4 +54,4 @@ def test_kinds_of_outages_that_are_given_apart_are_all_taken():
     screen.add_arguments(parser)
     assert parser.parse_args(["case"]).outages is None
     both = parser.parse_args(["case", "--outages", "lines", "--outages", "units,load_3"])
-    assert both.outages == "lines,units,load_3"
+    assert asked_by(both, ScreeningRequest)["outages"] == "lines,units,load_3"

@@ -158,7 +158,13 @@ def test_a_malformed_start_value(rewritten, variable, start, rule):
 
 def start_of(variable, start, text):
     """The description with another start value of a variable."""
-    return re.sub(rf'(name="{re.escape(variable)}".*?start=")[^"]*', rf"\g<1>{start}", text, count=1, flags=re.DOTALL)
+    return re.sub(
+        rf'(<ScalarVariable name="{re.escape(variable)}".*?start=")[^"]*',
+        rf"\g<1>{start}",
+        text,
+        count=1,
+        flags=re.DOTALL,
+    )
 
 
 # -- a good one --------------------------------------------------------------------------------

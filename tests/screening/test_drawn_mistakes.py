@@ -4,13 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from orchestrator.screening.tables import _at_worst
 
+from orchestrator.operating_points.item import Status
 from orchestrator.report.html.elements import Figures
-from orchestrator.screening import report
+from orchestrator.screening import point, view
 from orchestrator.screening.point import _Worker
-from orchestrator.screening.record import Status
-from orchestrator.screening.stress import OutageRow
 from orchestrator.screening.summary import ModeAt
 
 
@@ -20,9 +18,10 @@ def item(**record):
 
 
 def test_an_outage_without_any_verdict_is_told_by_its_first_point():
+    plan = SimpleNamespace(wanted=SimpleNamespace(damping=0.2), points=("p07",))
     lost = item(status=Status.POWER_FLOW)
-    name, point, who, _, count = _at_worst(OutageRow("sg2", None, None, (lost,), 1))
-    assert (name, point, who, count) == ("sg2", "p07", "", "1 of 1")
+    table = view.overview(SimpleNamespace(result=SimpleNamespace(plan=plan, items=(lost,))))
+    assert [column.cell(table.rows[0]) for column in table.columns] == ["sg2", "p07", "", "–", "1 of 1"]
 
 
 @pytest.mark.parametrize(
@@ -43,7 +42,8 @@ def test_components_are_named_by_their_shares():
     assert at.participation(2) == [("b", 0.7), ("a", 0.2)]
 
 
-def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_item():
+def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_item(monkeypatch):
+    monkeypatch.setattr(point, "_as_kept", lambda modes: modes)
     results = [SimpleNamespace(found=SimpleNamespace(modes=name), record=name) for name in ("anchor", "one", "out")]
     items = [SimpleNamespace(intact=intact) for intact in (True, True, False)]
     own = SimpleNamespace(_task=SimpleNamespace(anchor=items[0], items=items[1:]),
@@ -55,5 +55,5 @@ def test_a_stretch_is_joined_by_the_modes_of_its_anchor_and_of_its_last_intact_i
 
 def test_the_page_shows_the_figure_not_its_name():
     mode = ModeAt(item(eigenvalues=[-0.2 + 5j]), 0)
-    drawn = report._plane(SimpleNamespace(modes=[SimpleNamespace(at=[mode])]), Figures())
+    drawn = view._plane(SimpleNamespace(modes=[SimpleNamespace(at=[mode])]), Figures())
     assert drawn.startswith('<figure id="figure-1">')
