@@ -38,7 +38,9 @@ def check_plausibility(draft: Draft) -> None:
 
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     """Add questions to the draft's, without those that the case answers; equal ones become one."""
-    draft.found.questions += _merged([d for d in doubts if not _is_meant(draft, d.name)])
+    open_ones = [d for d in doubts if not _is_meant(draft, d.name)]
+    known = {doubt.place for doubt in open_ones}  # one question about a value is enough, and a range says more
+    draft.found.questions = [one for one in draft.found.questions if one.place not in known] + _merged(open_ones)
 
 
 def _check_meant(draft: Draft) -> None:

@@ -195,10 +195,10 @@ class Federation:
         self._asked += 1
         text = json.dumps({"number": self._asked, "command": command, "arguments": arguments})
         self._hub.send(frames.COMMAND, json.dumps({"component": name, "text": text}).encode())
-        answer = json.loads(self._receive(frames.COMMAND, self._choice.patience + _GRACE))
-        if "error" in answer:
-            raise ComponentError(name, f"the command {command!r}", "an error", answer["error"])
-        return answer["result"]
+        reply = json.loads(self._receive(frames.COMMAND, self._choice.patience + _GRACE))
+        if "error" in reply:
+            raise ComponentError(name, f"the command {command!r}", "an error", reply["error"])
+        return reply["result"]
 
     def begin_step(self, name: str, time: float, inputs: Sequence[float]) -> None:
         if self._under_way is not None:

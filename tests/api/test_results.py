@@ -112,10 +112,10 @@ def test_a_comparison_and_its_modes_are_those_of_the_commands(gfor, tmp_path, ru
     code, _, _ = gfor("run", "infinite_bus", "--scenario", "dip", "--stop", 1.2, "--out", tmp_path)
     assert code == 0
     folder = tmp_path / "dip"
-    code, out, _ = gfor("compare", folder, folder, "--signal", "gfor.omega", "--start", 0.2, "--json")
+    code, out, _ = gfor("signal", "compare", folder, folder, "--signal", "gfor.omega", "--start", 0.2, "--json")
     compared = face.compare(folder, folder, ["gfor.omega"], start=0.2)
     assert (code, json.loads(out)) == (0, json.loads(json.dumps(compared.as_json())))
-    code, out, err = gfor("identify", folder, "gfor.omega", "--start", 0.2, "--json")
+    code, out, err = gfor("signal", "identify", folder, "gfor.omega", "--start", 0.2, "--json")
     modes = face.identify(run, "gfor.omega", start=0.2)
     assert (code, json.loads(out)) == (0, modes.as_json())
     assert err.splitlines() == modes.remarks
@@ -375,7 +375,7 @@ def test_an_fmu_is_checked_as_a_case_uses_it(fmu_path, gfor, tmp_path):
     assert "component 'grid' in scenario 'load_step'" in report.as_json()["used_as"]
     assert "steps of 0.0002 s" in report.table().loc["runs", "evidence"]
     words = [word for name, value in options.items() for word in (f"--{name}", value)]
-    code, out, _ = gfor("check", fmu, *words, "--only", "runs", "--step", 2e-4, "--json")
+    code, out, _ = gfor("fmu", "check", fmu, *words, "--only", "runs", "--step", 2e-4, "--json")
     assert code == 0
     assert json.loads(out)["used_as"] == report.as_json()["used_as"]
     assert report.save_junit(tmp_path / "junit.xml").read_text(encoding="utf-8").count("<testcase") == 2

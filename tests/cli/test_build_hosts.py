@@ -22,7 +22,7 @@ def built(gfor, monkeypatch, tmp_path):
     def tried(*words):
         made = []
         monkeypatch.setattr(command, "build", lambda model, *_, **how: made.append((model.name, how)) or "built")
-        code, _, error = gfor("build", *words, "--dest", tmp_path)
+        code, _, error = gfor("fmu", "build", *words, "--dest", tmp_path)
         return code, made, " ".join(error.split())
 
     return tried
@@ -56,19 +56,19 @@ def test_what_the_table_chooses_cannot_be_given_too(words, built):
 
 
 def test_the_default_ends_with_what_its_host_needs(gfor, tmp_path):
-    code, out, error = gfor("build", "infinite_bus", "--dest", tmp_path)
+    code, out, error = gfor("fmu", "build", "infinite_bus", "--dest", tmp_path)
     assert code == 0
     assert out == f"{tmp_path / 'infinite_bus.fmu'}\n"
     last = error.strip().splitlines()[-1]
     assert last.startswith("A Python-backed FMU needs a host that is a program in Python")
     assert "--native" in last
-    code, _, error = gfor("build", "infinite_bus", "--for", "fmpy", "--dest", tmp_path)
+    code, _, error = gfor("fmu", "build", "infinite_bus", "--for", "fmpy", "--dest", tmp_path)
     assert (code, "--native" in error) == (0, False)
 
 
 @pytest.mark.slow
 def test_an_fmu_for_a_host_is_what_was_said(gfor, tmp_path):
-    code, _, error = gfor("build", "gfor", "--for", "libcosim", "--dest", tmp_path)
+    code, _, error = gfor("fmu", "build", "gfor", "--for", "libcosim", "--dest", tmp_path)
     assert code == 0, error
     with zipfile.ZipFile(tmp_path / "gfor.fmu") as archive:
         names = archive.namelist()

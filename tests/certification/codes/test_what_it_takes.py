@@ -76,7 +76,7 @@ def test_the_duplicate_is_changed_with_its_plant(converter, tmp_path):
     """Both are the same device: a change of one of them alone would be another plant's."""
     certificate = certified(converter, tmp_path, {}, CODES["miso"], "llsm_limit")
     plan = w.plan_changes(certificate, tmp_path, ["droop.R_f"])
-    changes = plan.tasks["llsm_limit", "converter.droop.R_f", 1].bench.changes
+    changes = plan.tasks["llsm_limit", "converter.droop.R_f", 1].changes
     assert changes == (("converter.droop.R_f", pytest.approx(0.0525)), ("duplicate.droop.R_f", pytest.approx(0.0525)))
     below, above = (plan.tasks["llsm_limit", "converter.droop.R_f", sign].key for sign in (-1, 1))
     assert below != above
