@@ -15,7 +15,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.cases.names import variables_of
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.report.html.charts import thinned
-from orchestrator.results.signals import signal
+from orchestrator.results.signals import combined, signal
 from orchestrator.results.staging import new_run_id
 
 _POINTS = 1000  # of a streamed curve
@@ -75,14 +75,10 @@ class Streamed:
     def _flush(self) -> None:
         if self._rows:
             columns = dict(zip(["time", *self._needed], np.array(self._rows).T, strict=True))
-            seen = {one: _value(columns, variables_of(one)).tolist() for one in self._names}
+            seen = {one: combined(one, [columns[name] for name in variables_of(one)]).tolist() for one in self._names}
             self._say({"time": columns["time"].tolist(), "signals": seen, "until": self._stop})
             self._rows = []
         self._said = time.monotonic()
-
-
-def _value(columns: dict[str, Numbers], names: Sequence[str]) -> Numbers:
-    return columns[names[0]] - columns[names[1]] if len(names) > 1 else columns[names[0]]
 
 
 def linear(scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
 from orchestrator.cases.names import variables_of
@@ -23,10 +26,18 @@ def signal(dataset: xr.Dataset, expression: str) -> xr.DataArray | None:
         if first.strip() in dataset and second.strip() in dataset:
             return dataset[first.strip()] - dataset[second.strip()]
     names = variables_of(expression)
-    if expression.strip().startswith("|") and all(name in dataset for name in names):
-        re, im = (dataset[name] for name in names)
-        return ((re**2 + im**2) ** 0.5).assign_attrs(re.attrs)
+    if len(names) > 1 and all(name in dataset for name in names):
+        found: xr.DataArray = combined(expression, [dataset[name] for name in names])
+        return found.assign_attrs(dataset[names[0]].attrs)
     return None
+
+
+def combined(expression: str, values: Sequence[Any]) -> Any:
+    """A signal from the values of its `variables_of`, in their order: one of them, a magnitude or a difference."""
+    if len(values) == 1:
+        return values[0]
+    first, second = values
+    return (first**2 + second**2) ** 0.5 if expression.strip().startswith("|") else first - second
 
 
 def outline(dataset: xr.Dataset, expression: str, most: int = MOST_DRAWN) -> xr.DataArray | None:
