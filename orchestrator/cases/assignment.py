@@ -8,7 +8,6 @@ from orchestrator.cases.imperfection_tables import sets_imperfection
 from orchestrator.cases.names import close_names, whose
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import TWICE, check_system_base, convert, flatten, given_twice
-from orchestrator.errors import Problem
 from orchestrator.fmi.description import VariableInfo
 
 _THOUSANDS = (1e-6, 1e-3, 1e3, 1e6)  # between a value and another one of the same digits, in another unit
@@ -116,6 +115,6 @@ def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) ->
         before = plan.number(variable) if isinstance(value, str) and isinstance(converted, float) else 0.0
         if before and round(converted / before, 9) in _THOUSANDS:
             text = f"{value} is {converted / before:g} times what it is in the files; is the unit meant?"
-            draft.found.questions.append(Problem(where, text))
+            draft.found.thousandfold[f"{name}.{variable}"] = text
         target[variable] = converted
         draft.places[f"{name}.{variable}"] = where

@@ -56,6 +56,8 @@ class Findings:
 
     problems: list[Problem] = field(default_factory=list)
     questions: list[Problem] = field(default_factory=list)
+    # what is asked about values, by ``component.variable``, of the digits that the files have, in another unit.
+    thousandfold: dict[str, str] = field(default_factory=dict)
     not_reached: list[float] = field(default_factory=list)
     # components whose form the network cannot take, each with its model; what follows from that is not noted.
     misfits: dict[str, str] = field(default_factory=dict)

@@ -33,14 +33,15 @@ def check_plausibility(draft: Draft) -> None:
             _check_rule(draft, name, plan, rule)
     _check_frequencies(draft)
     _check_meant(draft)
-    question(draft, _doubts(draft))
+    doubts = list(_doubts(draft))
+    ranges = {doubt.name for doubt in doubts}  # one question about a value is enough, and a range says more
+    thousands = [(name, text) for name, text in draft.found.thousandfold.items() if name not in ranges]
+    question(draft, [*doubts, *(UnusualValue(name, draft.places[name], text) for name, text in thousands)])
 
 
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     """Add questions to the draft's, without those that the case answers; equal ones become one."""
-    open_ones = [d for d in doubts if not _is_meant(draft, d.name)]
-    known = {doubt.place for doubt in open_ones}  # one question about a value is enough, and a range says more
-    draft.found.questions = [one for one in draft.found.questions if one.place not in known] + _merged(open_ones)
+    draft.found.questions += _merged([d for d in doubts if not _is_meant(draft, d.name)])
 
 
 def _check_meant(draft: Draft) -> None:

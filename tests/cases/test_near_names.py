@@ -76,3 +76,4 @@ def test_a_value_of_the_same_digits_in_another_unit_is_asked_about(gfor):
     asked = "is 0.001 times what it is in the files; is the unit meant?"
     found = [gfor("modes", "wscc9", "--set", f"grid.load_5.P={value}")[2] for value in ("125 kW", "125 MW", "130")]
     assert [asked in error for error in found] == [True, False, False]
+    assert 'meant = ["grid.load_5.P"]' in " ".join(found[0].split())

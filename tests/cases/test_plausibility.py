@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,6 +19,8 @@ from fmus.toolchain.variables import Usual
 from gfor_fmu.usual import FORMING
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.data_rules import RULES
+from orchestrator.cases.plausibility import question
+from orchestrator.cases.plausible_values import UnusualValue
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import CaseError
 from orchestrator.fmi.description import parse_description, read_description
@@ -317,6 +320,14 @@ generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0, machine.T
     common, own = sorted(map(str, prepared.questions), key=lambda text: "machine.H" in text)
     assert re.match(r"line 15, units.generator_parameters.*: sg30, sg31, sg32 and 7 more: machine.T_d10 = 8000", common)
     assert re.match(r".*units.csv, line 5, sg33.machine.H: sg33: machine.H = 6500 s", own)
+
+
+def test_questions_about_two_values_at_one_place_both_stay():
+    found = SimpleNamespace(questions=[])
+    draft = SimpleNamespace(found=found, given=SimpleNamespace(case=SimpleNamespace(meant=())))
+    question(draft, [UnusualValue("a.H", "units.csv, line 5", "H is large")])
+    question(draft, [UnusualValue("a.S_n", "units.csv, line 5", "S_n is small")])
+    assert [one.text.partition(";")[0] for one in found.questions] == ["a: H is large", "a: S_n is small"]
 
 
 def test_a_question_is_put_once_on_the_terminal_and_stands_in_the_json(gfor, tmp_path):
