@@ -57,4 +57,4 @@ HOSTS: dict[str, Tool] = {
 def with_port(name: str, port: Port, known: tuple[str, ...]) -> str:
     """The model with a port; the one that was asked for where it has another port by its name, or there is none."""
     found = name + ENDINGS[port]
-    return found if found in known and not name.endswith(("_abc", "_phasor")) else name
+    return found if found in known and not name.endswith(tuple(filter(None, ENDINGS.values()))) else name

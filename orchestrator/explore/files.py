@@ -1,9 +1,10 @@
 """The files of the page: no build step, nothing from elsewhere."""
 
-import json
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from orchestrator.report.html.elements import held_data
 
 PAGE = "page.html"
 SCRIPTS = ("base.js", "map.js", "table.js", "values.js", "network.js", "response.js", "page.js")
@@ -27,8 +28,7 @@ def whole_page(saved: Any) -> str:
     """The page as one file that asks no server: ``saved`` is what it shows, as JSON's types."""
     text = content_of(PAGE).decode()
     text = text.replace(f'<link rel="stylesheet" href="{STYLE}">', f"<style>{content_of(STYLE).decode()}</style>")
-    data = json.dumps(saved, ensure_ascii=False).replace("<", "\\u003c")
     for name in SCRIPTS:
-        held = f'<script type="application/json" id="saved">{data}</script>' if name == SCRIPTS[0] else ""
+        held = held_data("saved", saved) if name == SCRIPTS[0] else ""
         text = text.replace(f'<script src="{name}"></script>', f"{held}<script>{content_of(name).decode()}</script>")
     return text

@@ -14,7 +14,7 @@ import xarray as xr
 
 from orchestrator.errors import InputError
 from orchestrator.report.html import studies
-from orchestrator.report.html.elements import damping, table
+from orchestrator.report.html.elements import damping, held_data, table
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, read_manifest
 
@@ -274,8 +274,7 @@ def changes(old: Path, chapters: Sequence[Chapter]) -> str:
 def kept_answers(chapters: Sequence[Chapter]) -> str:
     """The answers as data in the page, for `changes` of a later one."""
     data = [{"question": one.question, "source": one.source.name, "answer": one.answer} for one in chapters]
-    text = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
-    return f'<script type="application/json" id="answers">{text}</script>'
+    return held_data("answers", data)
 
 
 def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:

@@ -1,7 +1,9 @@
 """Small pieces of HTML: tables, figures with numbers, texts that are safe to put in a page."""
 
+import json
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import Any
 
 COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """As in the picture files: a scenario keeps its colour everywhere."""
@@ -39,6 +41,12 @@ class Figures:
             f'<figure id="figure-{self.count}">{content}{below}</figure>',
             f'<a href="#figure-{self.count}">{name}</a>',
         )
+
+
+def held_data(name: str, data: Any) -> str:
+    """Data that a page holds as JSON, under an id; nothing in it is markup."""
+    text = json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="{name}">{text}</script>'
 
 
 def number(value: float, digits: int) -> str:
