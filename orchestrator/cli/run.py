@@ -42,6 +42,7 @@ from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder
 from orchestrator.results.room import require_room
 from orchestrator.results.staging import ScenarioFolder, mend, staged, unfinished
 from orchestrator.safe_files import PARTIAL, made_folder
+from orchestrator.study.all_modes import all_ours
 from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.files import save_run, save_study, summary_of
 from orchestrator.study.run import RunResult
@@ -61,8 +62,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--linear", "lay the linear model's response over the simulated one")
     option(parser, "--threads", "N", "threads that step native FMUs (default: as many as are faster than one, up to "
            "one for each core); no value depends on it", read=read_whole(1, MOST_THREADS))  # fmt: skip
-    option(parser, "--workers", "N", "scenarios at a time, each in a process (default: one a core; Linux only); "
-           "no value depends on it", read=read_whole(1, 1000))  # fmt: skip
+    option(parser, "--workers", "N", "scenarios at a time, each in a process (default: one a core, or one alone "
+           "with an FMU that is not ours; Linux only); no value depends on it", read=read_whole(1, 1000))  # fmt: skip
     switch(parser, "--json", "print the summary as JSON")
     add_verdict_argument(parser)
     add_details_argument(parser)
@@ -102,7 +103,8 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     console = make_console(stderr=options.json)
     kept = checkpoints.StudyCheckpoints([scenario.prepared for scenario in scenarios], folder, options)
     run_id = kept.run
-    workers = 1 if engine is not None else number_of_workers(options.workers, len(scenarios))
+    alone = engine is not None or not (options.workers or all(all_ours(one.prepared) for one in scenarios))
+    workers = 1 if alone else number_of_workers(options.workers, len(scenarios))
     if options.threads is None and workers > 1 and workers >= number_of_cores():
         options.threads = 1  # each core has its scenario
     results: list[RunResult] = []

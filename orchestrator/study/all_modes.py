@@ -26,7 +26,7 @@ def compute_all_modes(
     FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file.
 
     Raises a `CosimError`: As `compute_modes`, of the first scenario that cannot be computed."""
-    if len(scenarios) < 2 or not all(_all_ours(prepared) for prepared in scenarios):
+    if len(scenarios) < 2 or not all(all_ours(prepared) for prepared in scenarios):
         return [compute_modes(one, frequency_range, critical, directional=directional) for one in scenarios]
     results: list[ModesResult] = []
     before: Linearised | None = None
@@ -54,6 +54,7 @@ def compute_all_modes(
     return results
 
 
-def _all_ours(prepared: PreparedScenario) -> bool:
+def all_ours(prepared: PreparedScenario) -> bool:
+    """Whether no FMU of a scenario is another's: those may allow one instance, or share a file or a licence."""
     plans = prepared.system.components.values()
     return all(plan.isolated is not True for plan in plans) and all(map(is_ours, {p.description.path for p in plans}))

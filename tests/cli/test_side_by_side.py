@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cases.case import BUILT_IN
-from orchestrator.cli import side_by_side
+from orchestrator.cli import run, side_by_side
 from orchestrator.cli.side_by_side import SideBySide, number_of_workers
 from orchestrator.errors import CaseError, ComponentError, CosimError, ErrorKind, InputError, NotFiniteError, Problem
 from orchestrator.fmi.interrupts import calls
@@ -225,6 +225,32 @@ def test_an_interrupt_when_all_is_done_is_not_lost():
 
     with pytest.raises(KeyboardInterrupt), calls.terminable(), SideBySide(1, work) as copies:
         copies.outcomes(1, lambda *_: os.kill(os.getpid(), signal.SIGINT))
+
+
+@pytest.mark.parametrize(("own", "words", "made"), [
+    ("", (), [2]), ("isolated = true\n", (), []), ("isolated = true\n", ("--workers", 2), [2]),
+])  # fmt: skip
+def test_others_fmus_run_one_scenario_after_the_other_unless_it_is_asked_for(
+    gfor, monkeypatch, tmp_path, own, words, made
+):
+    monkeypatch.setattr(side_by_side, "number_of_cores", lambda: 2)
+    text = (BUILT_IN / "infinite_bus" / "case.toml").read_text(encoding="utf-8")
+    (tmp_path / "case.toml").write_text(text.replace("[components.gfor]\n", f"[components.gfor]\n{own}"))
+    seen = []
+
+    class Seen(SideBySide):
+        def __enter__(self):
+            seen.append(self._number)
+            raise InputError("that is enough")
+
+    monkeypatch.setattr(run, "SideBySide", Seen)
+    monkeypatch.setattr(run, "_run_into", _stop)
+    gfor("run", tmp_path / "case.toml", "--stop", "0.1", "--out", tmp_path / "out", *words)
+    assert seen == made
+
+
+def _stop(*_):
+    raise InputError("that is enough")
 
 
 def test_how_many(monkeypatch):

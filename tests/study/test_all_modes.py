@@ -65,10 +65,10 @@ def test_a_component_that_is_asked_to_be_isolated_stands_once_at_a_time(scenario
     name = next(iter(plans))
     try:
         plans[name], kept = replace(plans[name], isolated=True), plans[name]
-        assert not all_modes._all_ours(scenarios[0])
+        assert not all_modes.all_ours(scenarios[0])
     finally:
         plans[name] = kept
-    assert all_modes._all_ours(scenarios[0])
+    assert all_modes.all_ours(scenarios[0])
 
 
 @pytest.mark.parametrize("faulty", [("gfor", "pod_p"), ("pod_p",)])
