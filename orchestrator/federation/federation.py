@@ -37,7 +37,7 @@ from orchestrator.fmi.process_end import fault_of_exit, last_line
 
 _LOOK = 0.2  # between two looks at the processes while something is waited for [s]
 _GRACE = 10.0  # what the hub gets beyond its own patience [s]
-_TO_END = 5.0  # for a process to end by itself [s]
+_TO_END = 10.0  # for a process to end by itself [s]
 _AFTER_CTRL_C = 2.0  # how long Ctrl-C waits for the end of a step [s]
 
 

@@ -29,6 +29,8 @@ from orchestrator.federation.helics_calls import (
 )
 
 _END = json.dumps({"number": 0, "command": "end", "arguments": []})
+_END_OF_OTHERS = "end"
+_TO_LEAVE = 8000  # for the others, once they are told [ms]
 _LOOK = 0.02  # between two looks at who has joined [s]
 
 
@@ -51,7 +53,7 @@ class Hub:
         self._federate: Any = None
         self._broker: Any = None
         self._now = 0
-        self._ours: list[str] = []
+        self._joined: dict[str, dict[str, Any]] = {}
         self.ended = False
 
     def serve(self) -> None:
@@ -131,7 +133,7 @@ class Hub:
         self._wait_for("all federates to enter the initialisation", self._request["to_join"])
         helics.helicsFederateEnterInitializingMode(self._federate)
         joined = {part["name"]: self._published(part) for part in self._parts}
-        self._ours = [name for name, found in joined.items() if found["ours"]]
+        self._joined = joined
         self._refuse_unknown_names()
         for handle, value in self._start:
             helics.helicsPublicationPublishDouble(handle, value)
@@ -287,19 +289,20 @@ class Hub:
         helics = library()
         worker = threading.Thread(target=self._leave, args=(helics, reason), daemon=True)
         worker.start()
-        worker.join(3.0)  # a call of HELICS may wait for somebody who is gone
+        worker.join(3.0 if reason else 1.0 + 1e-3 * _TO_LEAVE)  # a call of HELICS may wait for somebody who is gone
 
     def _leave(self, helics: ModuleType, reason: str) -> None:
         with suppress(helics.HelicsException):
-            for name in () if reason else self._ours:  # a broker that ends before they leave may not reach them
-                helics.helicsFederateSendCommand(self._federate, name, _END)
+            # A broker that ends before they leave may not reach them, or lets them wait for ever.
+            for name, found in {} if reason else self._joined.items():
+                helics.helicsFederateSendCommand(self._federate, name, _END if found["ours"] else _END_OF_OTHERS)
             if self._federate is not None and reason:
                 helics.helicsFederateGlobalError(self._federate, 1, reason)
                 time.sleep(0.1)
             if self._federate is not None:
                 helics.helicsFederateDisconnect(self._federate)
             if self._broker is not None:
-                helics.helicsBrokerWaitForDisconnect(self._broker, 1000)
+                helics.helicsBrokerWaitForDisconnect(self._broker, 1000 if reason else _TO_LEAVE)
                 helics.helicsBrokerDisconnect(self._broker)
 
 

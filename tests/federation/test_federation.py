@@ -385,8 +385,11 @@ def test_the_program_of_the_guide(tmp_path, temporary, started):
     flow = ready.values
     current = complex(flow["gfor.P_0"], -flow["gfor.Q_0"]) * flow["gfor.S_n"] / 100 / flow["gfor.v_0"]
     with subprocess.Popen([sys.executable, str(program), f"tcp://127.0.0.1:{port}"]) as process:
-        result = run_scenario(ready, federates=Federates(external=("gfor",), port=port))
-        assert process.wait(30) == 0
+        try:
+            result = run_scenario(ready, federates=Federates(external=("gfor",), port=port))
+            assert process.wait(30) == 0
+        finally:
+            process.kill()
     assert result.failure is None
     data = result.dataset
     found = data["gfor.i_re"].values + 1j * data["gfor.i_im"].values
