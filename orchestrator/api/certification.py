@@ -63,6 +63,7 @@ def certify(
     black_box: bool = False,
     check: bool = True,
     folder: str | Path | None = None,
+    into: str | Path | None = None,
     workers: int | None = 1,
     progress: bool = False,
 ) -> IssuedCertificate:
@@ -90,6 +91,8 @@ def certify(
         Whether the acceptance tests of the FMU are run.
     folder
         For the certificate; ``results/certify_<file>[_<code>]`` by default. Points that are there are kept.
+    into
+        Where the FMU is written with the certificate in it, and with experiments that any tool can repeat.
     workers
         Processes; one for each core where None.
     progress
@@ -112,15 +115,19 @@ def certify(
     """
     from orchestrator.certification.acceptance import run_checks  # noqa: PLC0415 - `verify` computes less
     from orchestrator.certification.files import JSON, read_record, save  # noqa: PLC0415 - as above
+    from orchestrator.certification.inside import check_target, put_inside  # noqa: PLC0415 - as above
     from orchestrator.certification.issue import NTS631, WITH_VERDICT, issue_of  # noqa: PLC0415 - as above
     from orchestrator.certification.request import REACTANCES  # noqa: PLC0415 - as above
 
     if code not in WITH_VERDICT:
         raise InputError(f"code = {code!r}; choose from {', '.join(WITH_VERDICT)}")
     file, given = path_of(fmu, "fmu"), plain(values)
+    target = None if into is None else path_of(into, "into")
     chosen = REACTANCES if reactances is None else tuple(reactances)
     issue = issue_of(code, file, binding_path(binding), given, declared=declared or {}, pod=pod, reactances=chosen,
                      black_box=black_box)  # fmt: skip
+    if target is not None:
+        check_target(file, target)
     usual = Path("results") / f"certify_{file.stem}{'' if code == NTS631 else f'_{code}'}"
     place = made_folder(usual if folder is None else path_of(folder, "folder", "folder"), "folder")
     with held(place), shown_progress(f"Certificate, {code}", shown=progress) as report:
@@ -128,6 +135,8 @@ def certify(
             found = issue.compute(executor, place, report)
         found.acceptance = run_checks(issue.request.fmu, issue.request.binding, place) if check else None
         save(found, place)
+    if target is not None:
+        put_inside(place, file, target)
     return IssuedCertificate(place, read_record(place / JSON))
 
 
@@ -139,7 +148,7 @@ def verify(
     Parameters
     ----------
     certificate
-        Its folder, or its ``certificate.json``.
+        Its folder, its ``certificate.json``, or an FMU with certificates in it, which are all verified.
     anew
         Line reactances [pu], or names of rows, that are computed anew; the least damped point, or the row with the
         narrowest margin and one by chance, where None; none where empty.
@@ -169,9 +178,25 @@ def verify(
     ...     print(type(error).__name__)
     InputError
     """
+    from orchestrator.certification.inside import laid_out  # noqa: PLC0415 - as above
+    from orchestrator.certification.verification import Verification  # noqa: PLC0415 - as above
+
+    found = Verification()
+    with laid_out(path_of(certificate, "certificate")) as places:
+        for place in places:
+            one = _verify_one(place, anew, every=every, workers=workers)
+            prefix = f"{place.name}: " if len(places) > 1 else ""
+            found.faults += [prefix + text for text in one.faults]
+            found.agreed += [prefix + text for text in one.agreed]
+    return found
+
+
+def _verify_one(
+    certificate: Path, anew: Iterable[float | str] | None, *, every: bool, workers: int | None
+) -> "Verification":
     from orchestrator.certification.verification import read_certificate, verify_files  # noqa: PLC0415 - as above
 
-    folder, content = read_certificate(path_of(certificate, "certificate"))
+    folder, content = read_certificate(certificate)
     wanted = None if anew is None else tuple(anew)
     chosen = [] if wanted == () and not every else chosen_anew(folder, content, wanted or (), every=every)
     found = verify_files(folder, content)

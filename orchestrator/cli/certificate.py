@@ -23,6 +23,7 @@ from orchestrator.certification.codes.frequency_domain import (
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.devices import Device
 from orchestrator.certification.files import JSON, save
+from orchestrator.certification.inside import check_target, put_inside
 from orchestrator.certification.issue import NTS631, WITH_VERDICT, bench_request, issue_of
 from orchestrator.certification.request import REACTANCES, STUDY
 from orchestrator.certification.verdict import exit_code
@@ -51,7 +52,11 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
         check_code_options(options, [device])
     folder = options.out or Path("results") / f"certify_{device.name}{'' if key == NTS631 else f'_{key}'}"
     console = make_console(stderr=options.json)
+    if options.into:
+        check_target(device.file, options.into)
     found, files = certified(options, device, key, folder, console)
+    if options.into:
+        files.append(put_inside(folder, device.file, options.into))
     if not options.json:
         show(found, files, folder, console)
     beside: dict[str, Any] = {}

@@ -55,6 +55,8 @@ def _add_document_arguments(parser: argparse.ArgumentParser) -> None:
     checks.add_argument("--check", type=Path, metavar="report.json",
                         help="the FMU's acceptance tests by `gfor fmu check --json` (default: run now)")  # fmt: skip
     checks.add_argument("--no-check", action="store_true", help="leave out the acceptance tests; the report says so")
+    option(parser, "--into", "OUT.fmu", "write the FMU with its certificate in it, and with experiments that any tool "
+           "can repeat; certificates by other codes that OUT.fmu holds stay", read=Path)  # fmt: skip
     switch(parser, "--pdf", "print the report to certificate.pdf with an installed browser")
 
 
@@ -73,6 +75,9 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("the converter is missing: gfor certify FILE.fmu")
     check_sensitivity_options(options, codes_of(options.code), NTS631)
     devices = devices_of(options.fmu, options.binding, options.set)
+    if options.into and (len(devices) > 1 or options.code in (GB, ALL)):
+        raise InputError("--into: it takes one device's certificate by one code with a verdict; for another code "
+                         "repeat the command with the same --into")  # fmt: skip
     if options.code == GB and len(devices) == 1:
         return run_stiffness(options, devices[0])
     if len(devices) > 1 or options.code == ALL:

@@ -8,6 +8,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.api.certification import chosen_anew, is_of_norm, verify_anew, worker_of
+from orchestrator.certification.inside import laid_out
+from orchestrator.certification.issue import NTS631
 from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verification, read_certificate, verify_files
@@ -24,7 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "verdict as with gfor certify: 0 the converter passes; 1 it fails; 3 the test is incomplete; 4 it passes, and "
         f"an acceptance test of the FMU failed; {INTERRUPTED} interrupted."
     )
-    parser.add_argument("certificate", type=Path, metavar="CERTIFICATE", help="its folder, or its certificate.json")
+    parser.add_argument(
+        "certificate",
+        type=Path,
+        metavar="CERTIFICATE",
+        help="its folder, its certificate.json, or an FMU with certificates in it",
+    )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--points", type=reactances, metavar="X,X,…",
                        help="line reactances that are computed anew [pu] (default: the least damped one)")  # fmt: skip
@@ -43,7 +50,18 @@ def run(options: argparse.Namespace) -> int:
     -------
     The exit code of the certificate's verdict where it holds, else 5.
     """
-    folder, content = read_certificate(options.certificate)
+    with laid_out(options.certificate) as places:
+        found = [_verified(options, place) for place in places]
+    if options.json:
+        said = [one for one, _ in found]
+        print_json(said[0] if options.certificate.suffix.lower() != ".fmu" else {"certificates": said})
+    codes = [code for _, code in found]
+    return DOES_NOT_HOLD if DOES_NOT_HOLD in codes else max(codes, key=bool)
+
+
+def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any], int]:
+    """What is said of one certificate as JSON, and its exit code."""
+    folder, content = read_certificate(place)
     norm = is_of_norm(content)
     console = make_console(stderr=options.json)
     wanted = options.points or options.rows or ()
@@ -53,14 +71,14 @@ def run(options: argparse.Namespace) -> int:
     if computed:
         again = _anew(options, folder, content, chosen, console, norm=norm)
         found = Verification(found.faults + again.faults, found.agreed + again.agreed)
-    if options.json:
-        said = {"holds": found.holds, "verdict": content["verdict"], **({"points": content["judged"]} if norm else {}),
-                "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
-                "agreed": found.agreed, "computed": chosen if computed else []}  # fmt: skip
-        print_json(said)
-    else:
+    said = {"holds": found.holds, "verdict": content["verdict"], **({"points": content["judged"]} if norm else {}),
+            "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
+            "agreed": found.agreed, "computed": chosen if computed else []}  # fmt: skip
+    if not options.json:
+        console.print(escape(f"{content['title']}:" if place != options.certificate else ""), highlight=False)
         _show(found, content, chosen, console, computed=computed, norm=norm)
-    return exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
+    code = exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
+    return said | ({"code": content.get("code", NTS631)} if place != options.certificate else {}), code
 
 
 def _anew(

@@ -7,6 +7,7 @@ import csv
 import hashlib
 import io
 import sys
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from platform import machine as machine_of
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
@@ -35,12 +36,14 @@ def reference_members(path: Path) -> dict[str, bytes]:
     stimuli, references, state = _run(description)
     platform = platform_of(description.fmi_version)
     files = {
-        "parameters.ssv": _parameters(description),
+        "parameters.ssv": parameter_set("smoke test", {n: v.start for n, v in description.variables.items()
+                                                       if v.causality == "parameter" and v.start is not None},
+                                        description),
         "stimuli.csv": stimuli,
         "references.csv": references,
-        "smoke-test.exp": _experiment(),
-    } | ({f"steady-state.{platform}.bin": state} if state else {})
-    members = {"fmi-ls-manifest.xml": _manifest(files)} | files
+        "smoke-test.exp": _smoke_test(),
+    } | ({f"steady-state.{platform}.bin": state} if state else {})  # fmt: skip
+    members = {"fmi-ls-manifest.xml": manifest({name: (*_purpose(name), text) for name, text in files.items()})} | files
     return {f"{FOLDER}/{name}": content for name, content in members.items()}
 
 
@@ -78,7 +81,7 @@ def _run(description: FmuDescription) -> tuple[bytes, bytes, bytes]:
             component.set(dict(inputs))
             component.step(time, _STEP)
             seen.append(_row((k + 1) * _STEP, component, outputs))
-    return _csv(given), _csv(seen), state
+    return as_csv(given), as_csv(seen), state
 
 
 def _row(time: float, component: Component, names: list[str]) -> list[str]:
@@ -86,45 +89,50 @@ def _row(time: float, component: Component, names: list[str]) -> list[str]:
     return [repr(time), *(repr(float(values[name])) for name in names)]
 
 
-def _csv(rows: list[list[str]]) -> bytes:
+def as_csv(rows: Iterable[Sequence[str]]) -> bytes:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue().encode()
 
 
-def _parameters(description: FmuDescription) -> bytes:
-    root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name="smoke test")
+def parameter_set(name: str, values: Mapping[str, float | bool | str], description: FmuDescription) -> bytes:
+    """Values of variables in the form of SSP."""
+    root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name=name)
     listed = SubElement(root, tag("ssv:Parameters"))
-    for v in description.variables.values():
-        if v.causality == "parameter" and v.start is not None:
-            entry = SubElement(listed, tag("ssv:Parameter"), name=v.name)
-            value = str(v.start).lower() if v.type == "Boolean" else repr(v.start)
-            SubElement(entry, tag(f"ssv:{v.type}"), value=value)
+    for variable, value in values.items():
+        entry = SubElement(listed, tag("ssv:Parameter"), name=variable)
+        match type_ := description.variables[variable].type:
+            case "Boolean":
+                text = str(value).lower()
+            case "Integer":
+                text = str(int(value))
+            case _:
+                text = repr(value)
+        SubElement(entry, tag(f"ssv:{type_}"), value=text)
     return _text(root)
 
 
-def _experiment() -> bytes:
-    root = Element("Experiments", name="Smoke test")
-    experiment = SubElement(
-        root,
-        "Experiment",
-        name="smoke test",
-        description="From the start values; the first input rises. References are outputs read after each step, before "
-        "the next inputs are set. The tolerance is relative to an output's largest value.",
-        tolerance=repr(TOLERANCE),
+def _smoke_test() -> bytes:
+    text = (
+        "From the start values; the first input rises. References are outputs read after each step, before the next "
+        "inputs are set. The tolerance is relative to an output's largest value."
     )
-    times = {"startTime": "0.0", "stopTime": repr(_STEPS * _STEP), "stepSize": repr(_STEP)}
-    SubElement(experiment, "TransientSimulation", times)
-    for name, source in (
-        ("Parameters", "parameters.ssv"),
-        ("Stimuli", "stimuli.csv"),
-        ("References", "references.csv"),
-    ):
-        SubElement(experiment, name, source=source)
+    sources = {"Parameters": "parameters.ssv", "Stimuli": "stimuli.csv", "References": "references.csv"}
+    return experiment("smoke test", text, _STEPS * _STEP, _STEP, sources)
+
+
+def experiment(name: str, text: str, stop: float, step: float, sources: Mapping[str, str]) -> bytes:
+    """A transient simulation; ``sources``: files by what they are, times in s."""
+    root = Element("Experiments", name=name[:1].upper() + name[1:])
+    found = SubElement(root, "Experiment", name=name, description=text, tolerance=repr(TOLERANCE))
+    SubElement(found, "TransientSimulation", {"startTime": "0.0", "stopTime": repr(stop), "stepSize": repr(step)})
+    for kind, source in sources.items():
+        SubElement(found, kind, source=source)
     return _text(root)
 
 
-def _manifest(files: dict[str, bytes]) -> bytes:
+def manifest(files: Mapping[str, tuple[str, str, str, bytes]]) -> bytes:
+    """The manifest of LS-REF; ``files``: type, role, description and content by path from the manifest's folder."""
     root = Element(
         "fmiReferences",
         {
@@ -134,8 +142,7 @@ def _manifest(files: dict[str, bytes]) -> bytes:
             "FMU.",
         },
     )
-    for name, content in files.items():
-        type_, role, text = _purpose(name)
+    for name, (type_, role, text, content) in files.items():
         digest = hashlib.sha3_256(content).hexdigest()
         attributes = {"type": type_, "source": name, "role": role, "description": text, "checksum": digest}
         SubElement(root, "Related", attributes)
