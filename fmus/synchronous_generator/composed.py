@@ -2,6 +2,10 @@
 
 A part that is not named is not there: the field voltage and the mechanical torque are then constant."""
 
+from dataclasses import replace
+
+import casadi as ca
+
 from fmus.synchronous_generator.generator import with_controls
 from fmus.synchronous_generator.machine import flux_state
 from fmus.synchronous_generator.parts import NONE, chosen_parts
@@ -64,4 +68,7 @@ def synchronous_generator_phasor(
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0)
     g = parts.machine(m, port, S_n, lambda m, name, start, text: m.algebraic(name))
+    with m.scope("machine"):
+        with_speed = m.switch("speed_in_emf", not g.at_rated_speed, "Emf is w·e''; else e'', as of rated speed")
+    g = replace(g, emf_speed=ca.if_else(with_speed, g.w, 1))
     return phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)

@@ -40,8 +40,9 @@ class Start:
 class Machine:
     """Parameters, states and operating point of the machine.
 
-    ``salient`` where its last reactances may differ; ``at_rated_speed`` where the emf is e'' instead of w·e'', which
-    only a phasor model can have."""
+    ``salient`` where its last reactances may differ; ``at_rated_speed`` where the emf is e'' instead of w·e'' unless
+    a parameter says otherwise, which only a phasor model can have; ``emf_speed``: what e'' is multiplied by there, w
+    where it is None."""
 
     R: ca.SX
     R_t: ca.SX
@@ -55,6 +56,7 @@ class Machine:
     start: Start
     salient: bool = True
     at_rated_speed: bool = False
+    emf_speed: ca.SX | None = None
 
     @property
     def current(self) -> Phasor:

@@ -21,6 +21,7 @@ from fmus.synchronous_generator.machines.classical import classical
 from fmus.synchronous_generator.machines.standard import genrou, genrou_rated_speed, gensal, two_axis
 from fmus.synchronous_generator.stabilization.pss1a import pss1a
 from fmus.synchronous_generator.stabilization.pss2 import pss2a, pss2b
+from fmus.synchronous_generator.turbines.common import read_either_way
 from fmus.synchronous_generator.turbines.constant import constant_power, constant_torque
 from fmus.synchronous_generator.turbines.gast import gast
 from fmus.synchronous_generator.turbines.hygov import hygov
@@ -45,8 +46,9 @@ EXCITERS: dict[str, Exciter] = {
     "st4b": st4b, "external": external,
 }  # fmt: skip
 GOVERNORS: dict[str, Governor] = {
-    "constant_power": constant_power, "constant_torque": constant_torque, "tgov1": tgov1, "hygov": hygov, "gast": gast,
-    "ieeeg1": ieeeg1,
+    "constant_power": read_either_way(constant_power), "constant_torque": constant_torque,
+    "tgov1": read_either_way(tgov1), "hygov": read_either_way(hygov), "gast": read_either_way(gast),
+    "ieeeg1": read_either_way(ieeeg1),
 }  # fmt: skip
 STABILIZERS: dict[str, Stabilizer | None] = {NONE: None, "pss1a": pss1a, "pss2a": pss2a, "pss2b": pss2b}
 

@@ -61,7 +61,7 @@ def with_controls(
     m: ModelBuilder, port: DevicePort, g: Machine, exciter: Exciter, governor: Governor, stabilizer: Stabilizer | None
 ) -> Model:
     """A machine without stator transients, its stator's fluxes as open signals, and its controls."""
-    emf = Phasor(g.d.emf, g.q.emf) * (1.0 if g.at_rated_speed else g.w)
+    emf = Phasor(g.d.emf, g.q.emf) * (g.w if g.emf_speed is None else g.emf_speed)
     close_stator(m, g, port, emf)
     v_t = phasor_terminal_voltage(g, port, emf)
     v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))

@@ -3,6 +3,7 @@
 import fnmatch
 from typing import Any
 
+from orchestrator.cases.conventions import assign_conventions
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.imperfection_tables import sets_imperfection
 from orchestrator.cases.names import close_names, whose
@@ -16,6 +17,7 @@ _THOUSANDS = (1e-6, 1e-3, 1e3, 1e6)  # between a value and another one of the sa
 def assign_values(draft: Draft) -> None:
     """Give every value to its variable; a later source overrides an earlier one."""
     _assign_frequency(draft)
+    assign_conventions(draft)
     for name, table in draft.tables.items():
         for group in ("parameters", "inputs"):
             flat = flatten(getattr(table, group))

@@ -566,6 +566,14 @@ class KindTable(Table):
     stray_B: PerUnit | None = None
 
 
+class ConventionsTable(Table):
+    """Assumptions about machines, all of a program's or each alone; `conventions` knows who makes which."""
+
+    like: Literal["exact", "psse", "andes"] = "exact"
+    speed_in_emf: Annotated[bool, Field(strict=True)] | None = None
+    governor_gives: Literal["power", "torque"] | None = None
+
+
 class CaseTable(Table):
     """A whole case file; ``meant`` names values ``component.variable`` that are unusual on purpose."""
 
@@ -580,6 +588,7 @@ class CaseTable(Table):
     components: dict[str, ComponentTable] = Field(min_length=1)
     network: NetworkTable | None = None
     units: UnitsTable | None = None
+    conventions: ConventionsTable | None = None
     power_flow: PowerFlowTable | None = None
     connections: list[ConnectionTable] = []
     imperfections: dict[str, ImperfectionTable] = {}

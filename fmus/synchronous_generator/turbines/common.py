@@ -1,5 +1,6 @@
 """Parts that governors and turbines share: their parameters, the reference and the check of their start."""
 
+from collections.abc import Callable
 from functools import partial
 
 import casadi as ca
@@ -22,6 +23,18 @@ def power_reference(m: ModelBuilder, P_ref_0: Scalar) -> ca.SX:
     """Declare the power reference of the operating point and its change; return their sum [pu, S_n]."""
     P_ref = m.calculated("P_ref", P_ref_0, "pu", "Power reference of the operating point", base="S_n")
     return P_ref + m.parameter("delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True)
+
+
+def read_either_way(governor: Callable[[ModelBuilder, ca.SX, ca.SX], ca.SX]) -> Callable[..., ca.SX]:
+    """The same governor whose output is the mechanical power, or, by a parameter, the mechanical torque."""
+
+    def declare(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
+        output = governor(m, w, P_m_0)
+        with m.scope("governor"):
+            is_torque = m.switch("output_is_torque", False, "The output is the mechanical torque, not the power")
+        return output * ca.if_else(is_torque, w, 1)
+
+    return declare
 
 
 require_within = partial(
