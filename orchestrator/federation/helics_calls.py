@@ -1,6 +1,8 @@
 """The calls of HELICS that both the hub and a federate of ours make."""
 
 import json
+import time
+from contextlib import suppress
 from functools import cache
 from types import ModuleType
 from typing import Any
@@ -9,6 +11,7 @@ from fmus.toolchain.extras import require
 from orchestrator.federation.choice import address_of
 
 CORE = "zmq"  # HELICS's own default, and the only core of its packages that always works between machines
+_TRIES, _PAUSE = 2, 0.5  # before the last try to join a broker, and between two tries [s]
 FAULT_MARK, OURS_MARK = "fault", "gfor-cosim"
 """Texts that a federate publishes as ``component/fault`` and ``component/gfor-cosim``."""
 
@@ -26,8 +29,19 @@ def library() -> ModuleType:
 def join(name: str, broker: str, seconds: float) -> Any:
     """A federate at a broker.
 
-    Raises a `helics.HelicsException` if the broker does not answer within the time [s], or the name is taken."""
-    helics = library()
+    Raises a `helics.HelicsException` if the broker does not answer within the time [s], or the name is taken. On a busy
+    machine HELICS gives up before the time is over, and is asked again."""
+    helics, end = library(), time.monotonic() + seconds
+    for _ in range(_TRIES):
+        with suppress(helics.HelicsException):
+            return _joined(helics, name, broker, end - time.monotonic())
+        time.sleep(_PAUSE)
+        if time.monotonic() > end:
+            break
+    return _joined(helics, name, broker, end - time.monotonic())
+
+
+def _joined(helics: ModuleType, name: str, broker: str, seconds: float) -> Any:
     host, port = address_of(broker)
     info = helics.helicsCreateFederateInfo()
     helics.helicsFederateInfoSetCoreTypeFromString(info, CORE)
