@@ -2,6 +2,8 @@
 
 A part that is not named is not there: the field voltage and the mechanical torque are then constant."""
 
+from dataclasses import replace
+
 from fmus.synchronous_generator.generator import with_controls
 from fmus.synchronous_generator.machine import flux_state
 from fmus.synchronous_generator.parts import NONE, chosen_parts
@@ -41,7 +43,8 @@ def synchronous_generator(
             f"machine = {machine!r}: its emf is that of rated speed, which stator transients contradict; take "
             "machine = 'genrou', or model = 'synchronous_generator_phasor'"
         )
-    return with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    made = with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    return replace(made, of_parts=True)
 
 
 def synchronous_generator_phasor(
@@ -64,4 +67,5 @@ def synchronous_generator_phasor(
     S_n = declare_rating(m, S_N)
     port = device_port_of(m, S_n, P_0)
     g = parts.machine(m, port, S_n, lambda m, name, start, text: m.algebraic(name))
-    return phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    made = phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    return replace(made, of_parts=True)
