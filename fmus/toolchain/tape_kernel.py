@@ -13,7 +13,8 @@ from math import copysign, fabs, inf, isfinite, isnan, nan
 VERSION = 1
 G = 0.29289321881345254
 FIXED, INITIALISE, REQUIREMENTS, OUTPUTS, DERIVATIVES, MATRIX, CURRENTS = SECTIONS = range(7)
-SIZES = "np nc nu nx ny implicit held given buses rank nm nlu numbers fixed slots".split()
+SIZES = ("np", "nc", "nu", "nx", "ny", "implicit", "held", "given", "buses", "rank", "nm", "nlu", "numbers", "fixed",
+         "slots")  # fmt: skip
 
 # Arithmetic as in C: what is undefined becomes inf or nan and is found by its name after the step.
 
