@@ -34,8 +34,10 @@ def with_pairs(operations: dict[int, Operation], results: Iterable[int]) -> dict
             paired[value] = (MUL_ADD if code == ADD else MUL_SUB, *left, b)
         elif right:
             paired[value] = (MUL_ADD if code == ADD else SUB_MUL, *right, a)
-        for inside in (a if left else None, b if right else None):
-            paired.pop(inside, None)
+        if left:
+            paired.pop(a)
+        if right:
+            paired.pop(b)
     return paired
 
 
