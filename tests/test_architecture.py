@@ -318,6 +318,8 @@ def test_the_slave_needs_nothing_but_python_and_pythonfmu():
     foreign = {name for name in names if name.split(".")[0] not in sys.stdlib_module_names}
     assert foreign
     assert all(within(name, "pythonfmu") for name in foreign)
+    names = imported_names(MODULES["fmus.toolchain.tape_kernel"])
+    assert all(name.split(".")[0] in sys.stdlib_module_names for name in names)
 
 
 # -- habits ----------------------------------------------------------------------------------------

@@ -46,9 +46,21 @@ WRITTEN_OUT = 1_000
 """Buses up to which the solution is code. With 1,354 buses as data a step takes a seventh of the time."""
 
 
+_sketched: dict[Network, Model] = {}
+"""A large network whose model was asked for as a sketch, which costs as much, and which most often is built next."""
+
+
 def phasor_grid(network: Network) -> Model:
     """Build the model of a network; parameters are named after its elements, as in `grid`."""
-    return _phasor_grid(network, "data" if len(network.buses) > WRITTEN_OUT else "code")
+    large = len(network.buses) > WRITTEN_OUT
+    return _sketched.pop(network, None) or _phasor_grid(network, "data" if large else "code")
+
+
+def _sketch(network: Network) -> Model:
+    if len(network.buses) <= WRITTEN_OUT:
+        return _phasor_grid(network, "none")
+    _sketched.clear()
+    return _sketched.setdefault(network, _phasor_grid(network, "data"))
 
 
 def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) -> Model:
@@ -96,7 +108,7 @@ def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) ->
     return m.build()
 
 
-setattr(phasor_grid, SKETCH, partial(_phasor_grid, solution="none"))
+setattr(phasor_grid, SKETCH, _sketch)
 
 
 def _settle(

@@ -45,7 +45,8 @@ def synchronous_generator(
             f"machine = {machine!r}: its emf is that of rated speed, which stator transients contradict; take "
             "machine = 'genrou', or model = 'synchronous_generator_phasor'"
         )
-    return with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    made = with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    return replace(made, of_parts=True)
 
 
 def synchronous_generator_phasor(
@@ -71,4 +72,5 @@ def synchronous_generator_phasor(
     with m.scope("machine"):
         with_speed = m.switch("speed_in_emf", not g.at_rated_speed, "Emf is w·e''; else e'', as of rated speed")
     g = replace(g, emf_speed=ca.if_else(with_speed, g.w, 1))
-    return phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    made = phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
+    return replace(made, of_parts=True)

@@ -9,11 +9,10 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 
 from fmus.toolchain.cache import cache_directory, intact, keep
-from fmus.toolchain.extras import require
+from fmus.toolchain.extras import installed_version, require
 from fmus.toolchain.temporary import own_folder, remove, sweep_partial_files
 from fmus.toolchain.universal_binary import universal_binary
 
@@ -39,7 +38,7 @@ FLAGS = (
 _MAC_FLAGS = ("-Wl,-install_name,@rpath/library.dylib",)
 
 
-_OWN_HEADER = re.compile(r'#include "(\w+\.h)"\s*$')
+_OWN_HEADER = re.compile(r'#include "(\w+\.[ch])"\s*$')
 
 _PREBUILT = Path(__file__).with_name("prebuilt")
 
@@ -48,7 +47,7 @@ _PREBUILT = Path(__file__).with_name("prebuilt")
 def recipe() -> tuple[str, ...]:
     """Everything except the source that determines a library's contents. It is part of every hash that names a
     library."""
-    return (*FLAGS, *_MAC_FLAGS, f"ziglang {version('ziglang')}")
+    return (*FLAGS, *_MAC_FLAGS, f"ziglang {installed_version('ziglang')}")
 
 
 def host_platform() -> str | None:
@@ -78,6 +77,11 @@ def compile_here(*files: Path) -> Path:
     platform = host_platform()
     if platform is None:
         raise RuntimeError("there is no compiler for this platform")
+    return library_of(platform, *files)
+
+
+def library_of(platform: str, *files: Path) -> Path:
+    """Compile files of C, as one, for a platform, or return the library of the package."""
     source = joined_source(*files)
     brought = _prebuilt(source, platform)
     return brought if brought.exists() else compile_library(source, platform)
@@ -100,7 +104,7 @@ def _prebuilt(source: str, platform: str) -> Path:
 
 
 def joined_source(*files: Path) -> str:
-    """Files of C as one text, with the toolchain's own headers written in; messages name each file and its lines."""
+    """Files of C as one text, with those that they include of the toolchain's written in; messages name the line."""
 
     def header(match: re.Match[str]) -> str:
         return (Path(__file__).parent / "c" / match[1]).read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
   its own it needs between calls;
 - ``requirements(z, r)``: the model may run where every r > 0.
 
-`python_kernel` writes the same functions in Python."""
+`tape` writes the same functions as data."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -19,9 +19,8 @@ from pathlib import Path
 import casadi as ca
 
 from fmus.toolchain.elimination import plan_elimination
-from fmus.toolchain.long_functions import LONGEST, LONGEST_OF_DATA, cut
+from fmus.toolchain.long_functions import cut
 from fmus.toolchain.model import Model
-from fmus.toolchain.nodes import LARGEST_REST
 
 _C = Path(__file__).with_name("c")
 
@@ -45,18 +44,11 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
         elimination = plan_elimination(model)
         functions["iteration"] = elimination.values
         sizes |= {"NM": len(elimination.plan.matrix_column), "NLU": len(elimination.plan.column)}
-        tables = _tables(elimination.plan.tables())
+        tables = "#define IMPLICIT\n" + _tables(elimination.plan.tables())
     else:
         held = [index for index, state in enumerate(model.states) if state.stepwise]
         sizes["NS"] = len(held)
         tables = f"static const int STEPWISE[] = {{{', '.join(map(str, held or [-1]))}}};"
-    if model.nodal is not None:
-        plan = model.nodal.plan
-        sizes |= {"NM": len(plan.matrix_column), "NLU": len(plan.column), "NB": len(plan.order)}
-        sizes["NG"] = len(model.nodal.given)
-        tables += f"\n#define LARGEST_REST {LARGEST_REST!r}\n" + _tables(
-            plan.tables() | {"GIVEN": list(model.nodal.given) or [-1]}
-        )
     sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
     if further:
         sizes["NWD"] = max(f.sz_w() for f in further.values())
@@ -66,10 +58,10 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
     for name, function in (functions | further).items():
         generator.add(scalar_function(function, f"{name}_code"))
     enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
-    parts = [cut(str(generator.dump()), LONGEST if model.nodal is None else LONGEST_OF_DATA), enumeration, tables]
-    files = ["nodal.c"] if model.nodal is not None else []
-    parts += [(_C / name).read_text(encoding="utf-8") for name in (*files, "kernel.c", f"{model.integrator}.c")]
-    return "\n".join(parts)
+    parts = [cut(str(generator.dump())), enumeration, tables]
+    parts += [(_C / name).read_text(encoding="utf-8") for name in ("kernel.c", f"{model.integrator}.c")]
+    kept = "IMPLICIT_SIZE" if model.integrator == "sdirk" else "0"
+    return "\n".join([*parts, f"KERNEL int workspace_size(void) {{ return {kept}; }}", ""])
 
 
 def _tables(lists: Mapping[str, list[int]]) -> str:
@@ -79,16 +71,7 @@ def _tables(lists: Mapping[str, list[int]]) -> str:
 
 
 def kernel_functions(model: Model) -> dict[str, ca.Function]:
-    """The functions of a kernel by name; where voltages are solved for, those at given voltages, and the equations."""
-    if model.nodal is not None:
-        return {
-            "initialise": model.initialise,
-            "outputs_at": model.outputs_function,
-            "derivatives_at": model.derivatives,
-            "requirements": model.requirements,
-            "nodal_values": model.nodal.values,
-            "nodal_currents": model.nodal.currents,
-        }
+    """The functions of a kernel by name."""
     return {
         "initialise": model.initialise,
         "outputs": model.outputs_function,

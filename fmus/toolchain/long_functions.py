@@ -7,7 +7,6 @@ of these lines on an array in place of the local variables, without the branches
 import re
 
 LONGEST = 20_000  # operations of a function that stays as it is
-LONGEST_OF_DATA = 1_000  # the same where a network is solved as data: no such model was built before this was so short
 _PART = 300
 """Operations of each part: a tenth as many make calls of them, ten times as many cost twice the time to compile."""
 

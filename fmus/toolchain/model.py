@@ -62,6 +62,8 @@ class Model:
         ``derivatives`` and ``outputs_function`` then.
     kind
         What the component is in a power system.
+    of_parts
+        Whether it is made of parts that somebody chose, so that few have the same.
     """
 
     name: str
@@ -80,6 +82,13 @@ class Model:
     implicit: Function | None = None
     nodal: NodalEquations | None = None
     kind: Kind = ""
+    of_parts: bool = False
+
+    @property
+    def compiled(self) -> bool:
+        """Whether a Python-backed FMU has its functions compiled, where a compiler is there. It takes seconds, which a
+        model that is new most times it is asked for does not have: it is a tape, with the same results."""
+        return self.kind != "network" and not self.of_parts
 
     @property
     def written_out(self) -> Model:

@@ -11,15 +11,18 @@ from pathlib import Path
 import pythonfmu
 
 from fmus.toolchain.archive import digest_of, guid_of
-from fmus.toolchain.compiler import ENDINGS, compile_library, recipe
+from fmus.toolchain.compiler import ENDINGS, compile_library, joined_source, library_of, recipe
 from fmus.toolchain.description import model_description, with_guid
 from fmus.toolchain.exporter import this_machine
+from fmus.toolchain.extras import installed_version
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import Model
-from fmus.toolchain.python_kernel import python_source
+from fmus.toolchain.tape import LIBRARY, tape_of
 from fmus.toolchain.wrapper import wrapper_binaries
 
-_SLAVE, _WRAPPER = (Path(__file__).with_name(name) for name in ("slave.py", "wrapper.py"))
+_SLAVE, _WRAPPER, _TAPE_KERNEL = (
+    Path(__file__).with_name(name) for name in ("slave.py", "wrapper.py", "tape_kernel.py")
+)
 
 _EXECUTED = """import ctypes
 from {} import Slave
@@ -38,14 +41,18 @@ class PythonFmu:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self._c = c_source(model)
-        self._python = python_source(model)
+        self._tape = tape_of(model)
+        self._c = c_source(model) if model.compiled and installed_version("ziglang") else ""
+        code = self._c or joined_source(LIBRARY)
+        self._python = _TAPE_KERNEL.read_text(encoding="utf-8")
         self._slave = _SLAVE.read_text(encoding="utf-8")
         self._tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
         self._description = description = model_description(model, "", model.name, self._tool).decode()
         exporter = "".join(file.read_text(encoding="utf-8") for file in (Path(__file__), _WRAPPER))
         data = json.dumps(_slave_data(model))
-        self.digest = digest_of(self._c, self._python, self._slave, description, data, exporter, *recipe())
+        self.digest = digest_of(
+            self._tape.hex(), code, self._python, self._slave, description, data, exporter, *recipe()
+        )
 
     def default_platforms(self) -> tuple[str, ...]:
         return this_machine()
@@ -69,13 +76,16 @@ class PythonFmu:
             f"resources/{slave_module}.py": _EXECUTED.format(class_module).encode(),
             f"resources/{class_module}.py": self._slave.encode(),
             f"resources/{kernel_module}.py": self._python.encode(),
+            "resources/tape.bin": self._tape,
             "resources/model.json": json.dumps(
                 _slave_data(model) | {"hash": self.digest, "kernel_module": kernel_module}, ensure_ascii=False
             ).encode(),
         }
         for platform in platforms:
-            library = compile_library(self._c, platform)
-            contents[f"resources/kernel/{platform}/kernel{ENDINGS[platform]}"] = library.read_bytes()
+            name, library = (
+                ("kernel", compile_library(self._c, platform)) if self._c else ("tape", library_of(platform, LIBRARY))
+            )
+            contents[f"resources/kernel/{platform}/{name}{ENDINGS[platform]}"] = library.read_bytes()
         package = Path(pythonfmu.__file__).parent
         for file in sorted(package.glob("*.py")):
             contents[f"resources/pythonfmu/{file.name}"] = file.read_bytes()

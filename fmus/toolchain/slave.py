@@ -25,16 +25,20 @@ INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
 MOST_PARTS = 1_000_000  # internal steps in one communication step
 LOGGING = ctypes.sizeof(ctypes.c_void_p)  # where the wrapper's logger, a C++ object, says whether it logs
 LONG = 64  # from here on it pays to see whether value references follow each other
-LIBRARIES = {
-    ("linux", "x86_64"): "linux64/kernel.so",
-    ("win32", "amd64"): "win64/kernel.dll",
-    ("darwin", "x86_64"): "darwin64/kernel.dylib",
-    ("darwin", "arm64"): "darwin64/kernel.dylib",
+PLATFORMS = {
+    ("linux", "x86_64"): ("linux64", ".so"),
+    ("win32", "amd64"): ("win64", ".dll"),
+    ("darwin", "x86_64"): ("darwin64", ".dylib"),
+    ("darwin", "arm64"): ("darwin64", ".dylib"),
 }
+POINTER = ctypes.c_void_p
+DAMAGED = "resources/tape.bin is damaged ({}); build or copy the FMU again"
 
 
 class Slave(Fmi2Slave):
     """All variables of the instance lie in one vector, indexed by value reference: [p | c | u | x | y | der(x)]."""
+
+    _tape = None
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
@@ -72,29 +76,61 @@ class Slave(Fmi2Slave):
         self._load_kernel(resources, model["kernel_module"])
 
     def _load_kernel(self, resources, python_kernel):
-        """Take the compiled kernel where one fits the platform, else evaluate in Python."""
-        library = resources / "kernel" / LIBRARIES.get((sys.platform, platform.machine().lower()), "none")
-        if library.exists() and os.environ.get("GFOR_COSIM_KERNEL") != "python":
-            try:
-                kernel = ctypes.PyDLL(str(library))
-                kernel.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
-                for function in (kernel.initialise, kernel.outputs, kernel.derivatives):
-                    function.argtypes, function.restype = [ctypes.c_void_p], None
-                kernel.requirements.argtypes, kernel.requirements.restype = [ctypes.c_void_p] * 2, None
-            except OSError as error:
-                self.log(f"compiled kernel not usable ({error}); evaluating in Python", Fmi2Status.warning)
-            else:
-                # The address, not the array: a plain integer argument is the cheapest call.
-                self._kernel, self._address = kernel, ctypes.addressof(self._z)
-                self._margins_address = ctypes.addressof(self._margins)
-                self._advance = kernel.advance
-                self._workspace = (ctypes.c_double * max(1, kernel.workspace_size()))()
-                self._workspace_address = ctypes.addressof(self._workspace)
-                return
-        self._kernel, self._address = importlib.import_module(python_kernel), self._z
-        self._margins_address = self._margins
-        self._advance = self._kernel.advance
-        self._workspace_address = None
+        """Take the compiled kernel or the library for tapes, where one fits the platform, else evaluate in Python."""
+        folder, ending = PLATFORMS.get((sys.platform, platform.machine().lower()), ("none", ""))
+        for name, use in (("kernel", self._use_compiled), ("tape", self._use_tape)):
+            library = resources / "kernel" / folder / (name + ending)
+            if library.exists() and os.environ.get("GFOR_COSIM_KERNEL") != "python":
+                try:
+                    kernel = ctypes.PyDLL(str(library))
+                except OSError as error:
+                    self.log(f"compiled kernel not usable ({error}); evaluating in Python", Fmi2Status.warning)
+                else:
+                    use(kernel, resources)
+                    return
+        content, evaluated = self._read_tape(resources), importlib.import_module(python_kernel)
+        try:
+            self._kernel = evaluated.Kernel(content, len(self._names))
+        except ValueError as error:
+            raise ValueError(DAMAGED.format(error)) from error
+        self._advance, self._workspace_address = self._kernel.advance, None
+        self._arguments, self._margins_address = (self._z,), self._margins
+
+    def _use_compiled(self, kernel, _):
+        self._use(kernel, (ctypes.c_double * max(1, kernel.workspace_size()))())
+
+    def _use_tape(self, kernel, resources):
+        content = self._read_tape(resources)
+        kernel.tape_fault.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_int]
+        kernel.tape_fault.restype = ctypes.c_char_p
+        fault = kernel.tape_fault(content, len(content), len(self._names), len(self._rules))
+        if fault is not None:
+            raise ValueError(DAMAGED.format(fault.decode()))
+        tape = ctypes.cast(ctypes.c_char_p(content), POINTER)
+        kernel.workspace_size.argtypes, kernel.workspace_size.restype = [POINTER], ctypes.c_int64
+        workspace = (ctypes.c_double * kernel.workspace_size(tape))()
+        kernel.begin.argtypes, kernel.begin.restype = [POINTER, POINTER], None
+        kernel.begin(tape, ctypes.addressof(workspace))
+        self._use(kernel, workspace, ctypes.addressof(workspace))
+
+    def _use(self, kernel, workspace, *further):
+        """``further``: arguments of its functions behind the variables."""
+        # Addresses, not arrays: a plain integer argument is the cheapest call.
+        self._kernel, self._advance, self._workspace = kernel, kernel.advance, workspace
+        kernel.advance.argtypes = [POINTER, ctypes.c_double, ctypes.c_int, POINTER]
+        self._workspace_address = ctypes.addressof(workspace)
+        self._arguments = (ctypes.addressof(self._z), *further)
+        for function in (kernel.initialise, kernel.outputs, kernel.derivatives, kernel.requirements):
+            function.argtypes, function.restype = [POINTER] * len(self._arguments), None
+        kernel.requirements.argtypes = [POINTER] * (len(self._arguments) + 1)
+        self._margins_address = ctypes.addressof(self._margins)
+
+    @classmethod
+    def _read_tape(cls, resources):
+        """What all instances of the process execute."""
+        if cls._tape is None:
+            cls._tape = (resources / "tape.bin").read_bytes()
+        return cls._tape
 
     # -- reports ---------------------------------------------------------------------------------
 
@@ -117,7 +153,7 @@ class Slave(Fmi2Slave):
         return False
 
     def _check_requirements(self):
-        self._kernel.requirements(self._address, self._margins_address)
+        self._kernel.requirements(*self._arguments, self._margins_address)
         broken = [rule for rule, margin in zip(self._rules, self._margins) if not margin > 0.0]
         if broken:
             self._fail("parameters cannot be used: " + "; ".join(broken))
@@ -158,7 +194,7 @@ class Slave(Fmi2Slave):
                 self._parameters_changed = False
                 if self._failure is not None:
                     return self._discard(self._failure, reported=True)
-            status = self._advance(self._address, step_size / self._parts, self._parts, self._workspace_address)
+            status = self._advance(self._arguments[0], step_size / self._parts, self._parts, self._workspace_address)
             self._outputs_stale = False
             if status:
                 self._failure = self._describe_divergence(status - 1, current_time)
@@ -179,12 +215,12 @@ class Slave(Fmi2Slave):
 
     def _refresh(self):
         if self._phase < STEPPING and self._parameters_changed:
-            self._kernel.initialise(self._address)
+            self._kernel.initialise(*self._arguments)
             self._parameters_changed = False
         elif self._phase == STEPPING and self._parameters_changed:
             self._check_requirements()  # before partners see what follows from values that cannot be used
             self._parameters_changed = False
-        self._kernel.outputs(self._address)
+        self._kernel.outputs(*self._arguments)
         self._outputs_stale = False
 
     # -- values ----------------------------------------------------------------------------------
@@ -198,7 +234,7 @@ class Slave(Fmi2Slave):
                 if first >= 0 and vrs == list(range(first, end)):
                     return self._z[first:end]  # such as all states at once
             if vrs and max(vrs) >= self._first_derivative:
-                self._kernel.derivatives(self._address)
+                self._kernel.derivatives(*self._arguments)
             if vrs and min(vrs) < 0:  # references above 2**31 arrive so, and Python would count from the end
                 raise IndexError("there is no such value reference")
             z = self._z

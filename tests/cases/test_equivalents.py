@@ -2,7 +2,6 @@
 network of phasors, which is then the same as the one that was reduced.
 """
 
-import ctypes
 import re
 
 import numpy as np
@@ -10,15 +9,13 @@ import pytest
 
 from fmus.grid import phasor_grid
 from fmus.grid.network import Line, Network, Port
-from fmus.toolchain.compiler import compile_library, host_platform
-from fmus.toolchain.kernel import c_source
-from fmus.toolchain.python_kernel import python_source
 from orchestrator.analysis.linearization import linearize
 from orchestrator.analysis.modes import find_modes
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CaseError
+from tests.support.kernels import in_python, taped, vector
 
 CASE = """\
 name = "pair"
@@ -139,13 +136,6 @@ def test_a_reactance_of_nothing_is_refused(prepared):
         prepared('lines.none = { from = "b1", to = "b2", X = 0, R = -0.1 }')
 
 
-def _kernels(model):
-    library = ctypes.CDLL(str(compile_library(c_source(model), host_platform())))
-    scope = {}
-    exec(python_source(model), scope)
-    return [(library.initialise, library.outputs), (scope["initialise"], scope["outputs"])]
-
-
 @pytest.mark.parametrize("how", ["code", "data"])
 @pytest.mark.parametrize(("beside", "solved"), [(1e-12, False), (0.01, True)])
 def test_a_pivot_that_vanishes_gives_no_wrong_voltage(how, beside, solved):
@@ -160,13 +150,11 @@ def test_a_pivot_that_vanishes_gives_no_wrong_voltage(how, beside, solved):
     network = Network("n", ("m", "a", "b", "c", "d"), lines, (), (Port("g", "a"),), phasors=True)
     model = phasor_grid._phasor_grid(network, how)
     at = model.value_references
-    for initialise, outputs in _kernels(model):
-        z = (ctypes.c_double * len(at))()
-        for variable in (*model.parameters, *model.inputs):
-            z[at[variable.name]] = variable.start
+    for kernel in (taped(model), in_python(model)):
+        z = vector(model)
         z[at["g.e_re"]], z[at["g.y_im"]] = 1.0, -5.0
-        initialise(z)
-        outputs(z)
+        kernel.initialise(z)
+        kernel.outputs(z)
         values = np.array([z[at[f"{bus}.v"]] for bus in network.buses])
         assert np.isfinite(values).all() == solved
         if solved:

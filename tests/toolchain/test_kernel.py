@@ -3,7 +3,6 @@
 import contextlib
 import ctypes
 import math
-from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -12,40 +11,8 @@ import pytest
 from fmus.toolchain.compiler import compile_library, host_platform
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.python_kernel import python_source
-
-
-def compiled(model):
-    source = c_source(model)
-    library = ctypes.CDLL(str(compile_library(source, host_platform())))
-    library.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
-    return with_workspace(library, (ctypes.c_double * max(1, library.workspace_size()))())
-
-
-def in_python(model):
-    scope = {}
-    exec(python_source(model), scope)
-    return with_workspace(SimpleNamespace(**scope), None)
-
-
-def with_workspace(code, workspace):
-    """The functions of a kernel, one instance's workspace bound to ``advance``."""
-    names = ("initialise", "outputs", "derivatives", "requirements")
-    functions = {name: getattr(code, name) for name in names}
-    return SimpleNamespace(advance=lambda z, h, n: code.advance(z, h, n, workspace), **functions)
-
-
-KERNELS = {"compiled": compiled, "python": in_python}
-
-
-def vector(model, **values):
-    """z with the start values of parameters and inputs, and the values given by name."""
-    z = (ctypes.c_double * len(model.value_references))()
-    for variable in (*model.parameters, *model.inputs):
-        z[model.value_references[variable.name]] = variable.start
-    for name, value in values.items():
-        z[model.value_references[name]] = value
-    return z
+from fmus.toolchain.tape import tape_of
+from tests.support.kernels import KERNELS, compiled, in_python, vector
 
 
 def lag():
@@ -196,14 +163,15 @@ def test_the_implicit_method_factorises_again_when_a_parameter_or_the_step_chang
         assert list(used) == list(untouched)
 
 
-def test_both_kernels_of_the_implicit_method_agree():
+def test_all_kernels_of_the_implicit_method_agree():
     model, results = stiff_chain(), []
     for make in KERNELS.values():
         code, z = make(model), vector(model)
         code.initialise(z)
         code.advance(z, 1e-4, 50)
         results.append(list(z))
-    assert results[0] == pytest.approx(results[1], rel=1e-13)
+    assert results[0] == results[1]
+    assert results[0] == pytest.approx(results[2], rel=1e-13)
 
 
 def test_the_implicit_method_is_refused_for_a_nonlinear_model():
@@ -301,9 +269,10 @@ def test_python_kernel_computes_what_casadi_computes(name):
         assert z[model.value_references[name]] == pytest.approx(expected, rel=1e-15, abs=0.0), (a, b)
 
 
-def test_compiled_kernel_computes_what_casadi_computes():
+@pytest.mark.parametrize("kernel", ["compiled", "tape"])
+def test_kernels_in_c_compute_what_casadi_computes(kernel):
     model = algebra(OPERATIONS)
-    code = compiled(model)
+    code = KERNELS[kernel](model)
     for a, b in POINTS:
         z = vector(model, a=a, b=b)
         code.outputs(z)
@@ -312,7 +281,7 @@ def test_compiled_kernel_computes_what_casadi_computes():
         np.testing.assert_allclose(got, expected, rtol=1e-15, err_msg=f"{a}, {b}")
 
 
-@pytest.mark.parametrize("kernel", ["compiled", "python"])
+@pytest.mark.parametrize("kernel", KERNELS)
 def test_the_branch_not_taken_may_be_undefined(kernel):
     model = algebra({"y": lambda a, b: ca.if_else(a > 0, 1 / a, b)})
     code, z = KERNELS[kernel](model), vector(model, a=0.0, b=7.0)
@@ -320,9 +289,9 @@ def test_the_branch_not_taken_may_be_undefined(kernel):
     assert z[model.value_references["y"]] == 7.0
 
 
-def test_an_operation_without_a_python_form_is_refused_by_number():
-    with pytest.raises(ValueError, match=f"outputs_code: operation {ca.OP_ERF} of CasADi has no Python form"):
-        python_source(algebra({"y": lambda a, b: ca.erf(a)}))
+def test_an_operation_without_a_code_is_refused_by_number():
+    with pytest.raises(ValueError, match=f"outputs: operation {ca.OP_ERF} of CasADi has no code"):
+        tape_of(algebra({"y": lambda a, b: ca.erf(a)}))
 
 
 def test_an_unknown_platform_is_refused_with_those_there_are():

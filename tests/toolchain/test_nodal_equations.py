@@ -1,6 +1,5 @@
 """A network that is solved as data, by a planned factorisation, beside the same network in code."""
 
-import ctypes
 import math
 
 import numpy as np
@@ -8,13 +7,11 @@ import pytest
 
 from fmus.grid import phasor_grid
 from fmus.grid.network import Line, Load, Network, Port, Zip
-from fmus.toolchain.compiler import compile_library, host_platform
 from fmus.toolchain.dependencies import structure
 from fmus.toolchain.elimination_plan import plan_pattern
-from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.native_fmu import NativeFmu
-from fmus.toolchain.python_kernel import python_source
+from tests.support.kernels import compiled, in_python, taped, vector
 
 BUSES = 12
 
@@ -45,20 +42,16 @@ def models():
 
 @pytest.fixture(scope="module")
 def kernels(models):
-    libraries = {}
-    for how, model in models.items():
-        library = ctypes.CDLL(str(compile_library(c_source(model), host_platform())))
-        library.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
-        libraries[how] = library
-    scope = {}
-    exec(python_source(models["data"]), scope)
-    return libraries | {"python": type("Kernel", (), {k: staticmethod(v) for k, v in scope.items() if callable(v)})}
+    return {
+        "code": compiled(models["code"]),
+        "tape of code": taped(models["code"]),
+        "data": taped(models["data"]),
+        "python": in_python(models["data"]),
+    }
 
 
 def started(model, kernel):
-    z = (ctypes.c_double * len(model.value_references))()
-    for variable in (*model.parameters, *model.inputs):
-        z[model.value_references[variable.name]] = variable.start
+    z = vector(model)
     for k, name in enumerate(("g1", "g2", "g3")):
         for variable, value in (("e_re", 1.0), ("e_im", 0.1 * k), ("y_re", 0.1), ("y_im", -3.0 - k)):
             z[model.value_references[f"{name}.{variable}"]] = value
@@ -77,7 +70,7 @@ def test_data_and_code_have_one_solution(models, kernels, how):
         for changes in ({}, {"g2.y_im": -9.0}, {"chord.connected": 0.0}, {"b7.fault.on": 1.0}):
             for name, value in changes.items():
                 z[at[name]] = value
-            assert kernel.advance(z, 2e-3, 3, None) == 0
+            assert kernel.advance(z, 2e-3, 3) == 0
             kernel.derivatives(z)
             seen.append(list(z))
         z = started(models["code"], kernel)
@@ -93,7 +86,7 @@ def test_data_and_code_have_one_solution(models, kernels, how):
 
 
 def test_the_factors_of_one_instance_do_not_serve_another(models, kernels):
-    """Two instances with different admittances share the kernel's factors; each gets its own answer, in turns."""
+    """Different admittances by turns in one workspace; each gets its own answer."""
     kernel, at = kernels["data"], models["data"].value_references
 
     def voltage(z):

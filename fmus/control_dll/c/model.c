@@ -98,7 +98,7 @@ EXPORT int32_t CALLED Model_Initialize(struct dll_instance *s) {
     take_parameters(s, z);
     initialise(z);
     memcpy(z + U, s->inputs, NU * sizeof *z);
-    if (NS) rates(z, z + X, rate);
+    if (NS) rates(z, z + X, rate, NULL);
     for (int i = 0; i < NS; ++i) z[X + STEPWISE[i]] += rate[STEPWISE[i]] * s->time;
     for (int i = 0; i < NX; ++i)
         if (!isfinite(z[X + i])) return fails(s, NO_START);

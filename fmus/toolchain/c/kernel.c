@@ -1,5 +1,6 @@
 /* Functions of a kernel around the code that CasADi generates. Every quantity of an instance lies in
-   one vector z = [p | c | u | x | y | dx]; the sizes NP ... NY and NW stand above, generated. */
+   one vector z = [p | c | u | x | y | dx]; the sizes NP ... NY and NW stand above, generated.
+   A tape's kernel (tape.c) has functions of the same names; integrators give both their workspace. */
 #include <math.h>
 #include <string.h>
 #ifdef _WIN32
@@ -10,12 +11,13 @@
 #ifndef KERNEL /* a native FMU keeps these functions to itself */
 #define KERNEL EXPORT
 #endif
-enum { C = NP, U = C + NC, X = U + NU, Y = X + NX, DX = Y + NY };
+enum { OWN = 0, C = NP, U = C + NC, X = U + NU, Y = X + NX, DX = Y + NY };
 
-static void rates(const double *z, const double *x, double *rate) {
+static void rates(const double *z, const double *x, double *rate, double *workspace) {
     double w[NW];
     const double *arg[] = {x, z + U, z, z + C};
     double *res[] = {rate};
+    (void)workspace;
     derivatives_code(arg, res, 0, w, 0);
 }
 
@@ -33,7 +35,7 @@ KERNEL void outputs(double *z) {
     outputs_code(arg, res, 0, w, 0);
 }
 
-KERNEL void derivatives(double *z) { rates(z, z + X, z + DX); }
+KERNEL void derivatives(double *z) { rates(z, z + X, z + DX, NULL); }
 
 KERNEL void requirements(const double *z, double *r) {
     double w[NW];
@@ -43,9 +45,20 @@ KERNEL void requirements(const double *z, double *r) {
 }
 
 /* Outputs after a step, or 1 + the index of the first state that is no longer finite. */
-static int finish(double *z) {
+static int finish(double *z, double *workspace) {
+    (void)workspace;
     for (int i = 0; i < NX; ++i)
         if (!isfinite(z[X + i])) return i + 1;
     outputs(z);
     return 0;
 }
+
+#ifdef IMPLICIT /* the matrix of an implicit step */
+static void matrix(const double *z, double gh, double *m, double *workspace) {
+    double w[NW];
+    const double *arg[] = {z, z + C, &gh};
+    double *res[] = {m};
+    (void)workspace;
+    iteration_code(arg, res, 0, w, 0);
+}
+#endif

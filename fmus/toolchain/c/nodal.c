@@ -1,42 +1,44 @@
-/* Voltages v of a network from Y v = i, for models whose derivatives and outputs are given at known voltages: a sparse
-   complex LU without pivoting. Its pattern (PERM, ROW, COL, DIAG, MROW, MCOL) is generated above: rows in order of
-   elimination, each with its columns ascending; MROW and MCOL hold the matrix itself. Y follows from parameters and
-   from the inputs GIVEN; its factors are kept until one of these changes, by whatever instance. Only one thread at a
-   time comes here: Python holds its lock while a kernel works. LARGEST_REST is generated above, too. */
-#include <math.h>
-#include <string.h>
-
-static struct {
-    int there;
-    double parameters[NP + NC], inputs[NG + 1], lu[2 * NLU], inverse[2 * NB];
-} factors;
+/* Voltages v of a network from Y v = i, for tapes whose derivatives and outputs are given at known voltages: a sparse
+   complex LU without pivoting. Its pattern (PERM, ROW, COL, DIAG, MROW, MCOL): rows in order of elimination, each with
+   its columns ascending; MROW and MCOL hold the matrix itself. Y follows from parameters and from the inputs GIVEN; its
+   factors are kept until one of these changes. */
+#define MADE_OF OWN /* p, c and given inputs that the factors were made of, once there are any */
+#define FACTORS (MADE_OF + 1 + NP + NC + NG)
+#define INVERSE (FACTORS + 2 * NLU)
+#define ELEMENTS (INVERSE + 2 * NB)
+#define SOUGHT (ELEMENTS + 2 * NM)
+#define CURRENT (SOUGHT + 2 * NB)
+#define NODAL_SIZE (CURRENT + 2 * NB - OWN)
 
 /* What Y follows from is as it was when it was factorised. */
-static int unchanged(const double *u, const double *p, const double *c) {
-    if (!factors.there || memcmp(factors.parameters, p, NP * sizeof *p)) return 0;
-    if (memcmp(factors.parameters + NP, c, NC * sizeof *c)) return 0;
+static int unchanged(const double *w) {
+    const double *made_of = w + MADE_OF + 1, *given = made_of + U;
+    if (!w[MADE_OF] || memcmp(made_of, SLOT, U * sizeof *w)) return 0;
     for (int k = 0; k < NG; ++k)
-        if (memcmp(factors.inputs + k, u + GIVEN[k], sizeof *u)) return 0;
+        if (memcmp(given + k, SLOT + U + GIVEN[k], sizeof *w)) return 0;
     return 1;
 }
 
-/* s, in the order of elimination, from b by bus: real parts, then imaginary parts. */
-static void through_factors(const double *b, double *s) {
-    const double *lu = factors.lu, *inverse = factors.inverse;
-    for (int i = 0; i < NB; ++i) {
-        double re = b[PERM[i]], im = b[NB + PERM[i]];
-        for (int q = ROW[i]; q < DIAG[i]; ++q) {
-            re -= lu[2 * q] * s[2 * COL[q]] - lu[2 * q + 1] * s[2 * COL[q] + 1];
-            im -= lu[2 * q] * s[2 * COL[q] + 1] + lu[2 * q + 1] * s[2 * COL[q]];
+/* The solution, in the order of elimination, from b by bus: real parts, then imaginary parts. */
+static void through_factors(double *w) {
+    const double *lu = w + FACTORS, *inverse = w + INVERSE, *b = w + CURRENT;
+    double *s = w + SOUGHT;
+    const int32_t *perm = PERM, *row = ROW, *col = COL, *diag = DIAG;
+    const int n = NB;
+    for (int i = 0; i < n; ++i) {
+        double re = b[perm[i]], im = b[n + perm[i]];
+        for (int q = row[i]; q < diag[i]; ++q) {
+            re -= lu[2 * q] * s[2 * col[q]] - lu[2 * q + 1] * s[2 * col[q] + 1];
+            im -= lu[2 * q] * s[2 * col[q] + 1] + lu[2 * q + 1] * s[2 * col[q]];
         }
         s[2 * i] = re;
         s[2 * i + 1] = im;
     }
-    for (int i = NB - 1; i >= 0; --i) {
+    for (int i = n - 1; i >= 0; --i) {
         double re = s[2 * i], im = s[2 * i + 1];
-        for (int q = DIAG[i] + 1; q < ROW[i + 1]; ++q) {
-            re -= lu[2 * q] * s[2 * COL[q]] - lu[2 * q + 1] * s[2 * COL[q] + 1];
-            im -= lu[2 * q] * s[2 * COL[q] + 1] + lu[2 * q + 1] * s[2 * COL[q]];
+        for (int q = diag[i] + 1; q < row[i + 1]; ++q) {
+            re -= lu[2 * q] * s[2 * col[q]] - lu[2 * q + 1] * s[2 * col[q] + 1];
+            im -= lu[2 * q] * s[2 * col[q] + 1] + lu[2 * q + 1] * s[2 * col[q]];
         }
         s[2 * i] = re * inverse[2 * i] - im * inverse[2 * i + 1];
         s[2 * i + 1] = re * inverse[2 * i + 1] + im * inverse[2 * i];
@@ -45,13 +47,14 @@ static void through_factors(const double *b, double *s) {
 
 /* Whether a trial solution leaves hardly anything over. A network that is not passive may need pivoting. The currents
    follow no pattern that the network could have as well. */
-static int accurate(const double *m) {
-    static double b[2 * NB], s[2 * NB];
+static int accurate(double *w) {
+    const double *m = w + ELEMENTS, *s = w + SOUGHT;
+    double *b = w + CURRENT;
     for (int i = 0; i < NB; ++i) {
         b[i] = cos(i);
         b[NB + i] = sin(i);
     }
-    through_factors(b, s);
+    through_factors(w);
     for (int i = 0; i < NB; ++i) {
         double re = -b[PERM[i]], im = -b[NB + PERM[i]], size = fabs(re) + fabs(im);
         for (int q = MROW[i]; q < MROW[i + 1]; ++q) {
@@ -61,16 +64,14 @@ static int accurate(const double *m) {
             im += c;
             size += fabs(a) + fabs(c);
         }
-        if (fabs(re) + fabs(im) > LARGEST_REST * size) return 0;
+        if (fabs(re) + fabs(im) > OF(w)->largest_rest * size) return 0;
     }
     return 1;
 }
 
-static void factorise_nodes(const double *u, const double *p, const double *c) {
-    static double m[2 * NM], row[2 * NB], cw[NW];
-    const double *arg[] = {u, p, c};
-    double *res[] = {m}, *lu = factors.lu, *inverse = factors.inverse;
-    nodal_values_code(arg, res, 0, cw, 0);
+static void factorise_nodes(double *w) {
+    double *m = w + ELEMENTS, *row = w + SOUGHT, *lu = w + FACTORS, *inverse = w + INVERSE, *made_of = w + MADE_OF + 1;
+    evaluate(w, MATRIX, m);
     for (int i = 0; i < NB; ++i) {
         for (int q = ROW[i]; q < ROW[i + 1]; ++q) row[2 * COL[q]] = row[2 * COL[q] + 1] = 0;
         for (int q = MROW[i]; q < MROW[i + 1]; ++q) {
@@ -96,39 +97,22 @@ static void factorise_nodes(const double *u, const double *p, const double *c) {
         inverse[2 * i] = row[2 * i] / square;
         inverse[2 * i + 1] = -row[2 * i + 1] / square;
     }
-    if (!accurate(m))
+    if (!accurate(w))
         for (int i = 0; i < 2 * NB; ++i) inverse[i] = NAN; /* no voltage is finite then, which the instance reports */
-    memcpy(factors.parameters, p, NP * sizeof *p);
-    memcpy(factors.parameters + NP, c, NC * sizeof *c);
-    for (int k = 0; k < NG; ++k) factors.inputs[k] = u[GIVEN[k]];
-    factors.there = 1;
+    memcpy(made_of, SLOT, U * sizeof *w);
+    for (int k = 0; k < NG; ++k) made_of[U + k] = SLOT[U + GIVEN[k]];
+    w[MADE_OF] = 1;
 }
 
-/* v: real parts by bus, then imaginary parts. */
-static void solve_nodes(const double **known, double *v) {
-    static double b[2 * NB], s[2 * NB], cw[NW];
-    double *res[] = {b};
-    if (!unchanged(known[1], known[2], known[3])) factorise_nodes(known[1], known[2], known[3]);
-    nodal_currents_code(known, res, 0, cw, 0);
-    through_factors(b, s);
+/* Voltages in their slots, by bus: real parts, then imaginary parts. */
+static void solve_nodes(double *w) {
+    double *v = SLOT + AT_V;
+    const double *s = w + SOUGHT;
+    if (!unchanged(w)) factorise_nodes(w);
+    evaluate(w, CURRENTS, w + CURRENT);
+    through_factors(w);
     for (int i = 0; i < NB; ++i) {
         v[PERM[i]] = s[2 * i];
         v[NB + PERM[i]] = s[2 * i + 1];
     }
-}
-
-static int outputs_code(const double **arg, double **res, void *iw, double *w, int mem) {
-    double v[2 * NB];
-    const double *known[] = {arg[0], arg[1], arg[2], arg[3], v};
-    (void)iw;
-    solve_nodes(known, v);
-    return outputs_at_code(known, res, 0, w, mem);
-}
-
-static int derivatives_code(const double **arg, double **res, void *iw, double *w, int mem) {
-    double v[2 * NB];
-    const double *known[] = {arg[0], arg[1], arg[2], arg[3], v};
-    (void)iw;
-    solve_nodes(known, v);
-    return derivatives_at_code(known, res, 0, w, mem);
 }

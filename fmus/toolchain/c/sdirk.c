@@ -1,18 +1,21 @@
 /* Two-stage SDIRK of order 2, L-stable, for models that are linear in x:
        (1 - g h A) k1 = f(x),   (1 - g h A) k2 = f(x + (1 - g) h k1),   x += h ((1 - g) k1 + g k2)
    with g = 1 - 1/sqrt(2). One sparse LU without pivoting serves both stages and every step until a
-   parameter or h changes. Its pattern (PERM, ROW, COL, DIAG, MROW, MCOL) is generated above: rows in
-   order of elimination, each with its columns ascending; MROW and MCOL hold the matrix itself. */
-enum { KEY = 0, LU = KEY + 1 + U, INV = LU + NLU, K1 = INV + NX, K2 = K1 + NX, T = K2 + NX, V = T + NX, SIZE = V + NX };
+   parameter or h changes. Its pattern (PERM, ROW, COL, DIAG, MROW, MCOL): rows in order of elimination,
+   each with its columns ascending; MROW and MCOL hold the matrix itself. */
+#define KEY OWN
+#define LU (KEY + 1 + U)
+#define INV (LU + NLU)
+#define K1 (INV + NX)
+#define K2 (K1 + NX)
+#define T (K2 + NX)
+#define V (T + NX)
+#define IMPLICIT_SIZE (V + NX - OWN)
 static const double G = 0.29289321881345254;
 
-KERNEL int workspace_size(void) { return SIZE; }
-
 static void factorise(const double *z, double gh, double *w) {
-    double m[NM], cw[NW], *lu = w + LU, *inv = w + INV, *row = w + V;
-    const double *arg[] = {z, z + C, &gh};
-    double *res[] = {m};
-    iteration_code(arg, res, 0, cw, 0);
+    double m[NM + 1], *lu = w + LU, *inv = w + INV, *row = w + V;
+    matrix(z, gh, m, w);
     for (int i = 0; i < NX; ++i) {
         for (int q = ROW[i]; q < ROW[i + 1]; ++q) row[COL[q]] = 0;
         for (int q = MROW[i]; q < MROW[i + 1]; ++q) row[MCOL[q]] = m[q];
@@ -51,12 +54,12 @@ KERNEL int advance(double *z, double h, int n, double *w) {
         memcpy(w + KEY + 1, z, U * sizeof(double));
     }
     for (int step = 0; step < n; ++step) {
-        rates(z, x, t);
+        rates(z, x, t, w);
         solve(t, k1, w);
         for (int i = 0; i < NX; ++i) k2[i] = x[i] + (1 - G) * h * k1[i];
-        rates(z, k2, t);
+        rates(z, k2, t, w);
         solve(t, k2, w);
         for (int i = 0; i < NX; ++i) x[i] += h * ((1 - G) * k1[i] + G * k2[i]);
     }
-    return finish(z);
+    return finish(z, w);
 }

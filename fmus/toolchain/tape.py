@@ -1,0 +1,160 @@
+"""A model's functions as data: a tape, which one compiled library executes for every model.
+
+A tape has sections, one for each function. Values lie in one row of slots: parameters p, calculated c, inputs u, states
+x, voltages v of a network that is solved as data, γh of an implicit step; numbers; what follows from p and c alone and
+is evaluated only where these change; then what a section computes. A section is runs of one operation each, the slots
+of its results, and the slots that each operation takes. Operations are those of the equations, and so is every
+rounding; only their order is another, where nothing depends on it. ``c/tape.c`` executes a tape, and where that cannot
+be had, `tape_kernel.py` does."""
+
+import struct
+import zlib
+from array import array
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import casadi as ca
+
+from fmus.toolchain.elimination import plan_elimination
+from fmus.toolchain.instructions import CONSTANT, INPUT, OUTPUT, SAME, instructions
+from fmus.toolchain.model import Model
+from fmus.toolchain.nodes import LARGEST_REST
+from fmus.toolchain.plan import Plan
+from fmus.toolchain.tape_order import Operation, runs_of, with_pairs
+
+MAGIC, VERSION = b"gfortape", 1
+
+LIBRARY = Path(__file__).with_name("c") / "tape.c"
+"""What executes tapes, with the files that it includes."""
+
+
+def tape_of(model: Model) -> bytes:
+    nodal, plan = model.nodal, Plan([], [0], [], [], [0], [])
+    elimination = plan_elimination(model) if model.integrator == "sdirk" else None
+    if solved := nodal or elimination:
+        plan = solved.plan
+    groups = {"p": model.parameters, "c": model.calculated, "u": model.inputs, "x": model.states}
+    sizes = {group: len(variables) for group, variables in groups.items()}
+    buses = len(plan.order) if nodal else 0
+    values = _Values(sizes | {"v": 2 * buses, "g": 1})
+    at = "xupcv" if nodal else "xupc"
+    often = {
+        "outputs": values.read(model.outputs_function, "outputs", at),
+        "derivatives": values.read(model.derivatives, "derivatives", at),
+        "currents": values.read(nodal.currents, "currents", "xupc") if nodal else [],
+    }
+    seldom = {
+        "initialise": values.read(model.initialise, "initialise", "p"),
+        "requirements": values.read(model.requirements, "requirements", "pc"),
+        "matrix": values.read(solved.values, "matrix", "upc" if nodal else "pcg") if solved else [],
+    }
+    rows = {name: values.behind(results, values.fixed) for name, results in often.items()}
+    taken = {value for row in rows.values() for operation in row.values() for value in operation[1:]}
+    kept = taken.union(*often.values()) & values.fixed
+    rows |= {name: values.behind(results) for name, results in seldom.items()}
+
+    lists = _Lists(values)
+    fixed = lists.add_fixed(values.behind(kept), kept)
+    for name in ("initialise", "requirements", "outputs", "derivatives", "matrix", "currents"):
+        lists.add(rows[name], (often | seldom)[name])
+    held = [index for index, state in enumerate(model.states) if state.stepwise]
+    given = list(nodal.given) if nodal else []
+    head = [*sizes.values(), len(model.outputs), int(elimination is not None), len(held), len(given), buses]
+    head += [len(plan.order), len(plan.matrix_column), len(plan.column), len(values.numbers), fixed, lists.slots]
+    head += lists.lengths
+    body = [struct.pack("<d", LARGEST_REST), array("i", head).tobytes(), *values.numbers]
+    body += [array("i", numbers).tobytes() for numbers in (held, given, *plan.tables().values())]
+    content = b"".join([*body, *(numbers.tobytes() for numbers in lists.lists)])
+    return struct.pack("<8s4I", MAGIC, VERSION, 24 + len(content), zlib.crc32(content), 0) + content
+
+
+class _Values:
+    """Every value once: an argument's element, a number, or an operation on others."""
+
+    def __init__(self, sizes: Mapping[str, int]) -> None:
+        self.first: dict[str, int] = {}  # of each argument
+        self.operations: list[Operation | None] = []  # by value
+        for group, size in sizes.items():
+            self.first[group] = len(self.operations)
+            self.operations += [None] * size
+        self.arguments = len(self.operations)
+        self.numbers: dict[bytes, int] = {}  # by their bits: −0.0 is not 0.0, and a NaN is itself
+        self.fixed = set(range(sizes["p"] + sizes["c"]))
+        self._known: dict[Operation, int] = {}
+
+    def read(self, function: ca.Function, name: str, groups: str) -> list[int]:
+        """The values of a function's results, one after the other."""
+        edges = [0]
+        for k in range(function.n_out()):
+            edges.append(edges[-1] + function.numel_out(k))
+        results, register = [-1] * edges[-1], dict[int, int]()
+        for code, source, target, value in instructions(function, name):
+            if code >= 0:
+                register[target[0]] = self._operation((code, *(register[k] for k in source)))
+            elif code == INPUT:
+                register[target[0]] = self.first[groups[source[0]]] + source[1]
+            elif code == CONSTANT:
+                register[target[0]] = self._number(struct.pack("<d", value))
+            elif code == OUTPUT:
+                results[edges[target[0]] + target[1]] = register[source[0]]
+            elif code == SAME:
+                register[target[0]] = register[source[0]]
+        return results
+
+    def _number(self, bits: bytes) -> int:
+        if (found := self.numbers.get(bits)) is None:
+            found = self.numbers[bits] = len(self.operations)
+            self.operations.append(None)
+            self.fixed.add(found)
+        return found
+
+    def _operation(self, operation: Operation) -> int:
+        if (found := self._known.get(operation)) is None:
+            found = self._known[operation] = len(self.operations)
+            self.operations.append(operation)
+            if self.fixed.issuperset(operation[1:]):
+                self.fixed.add(found)
+        return found
+
+    def behind(self, results: Iterable[int], known: set[int] | frozenset[int] = frozenset()) -> dict[int, Operation]:
+        """The operations that some values need, in order, by the value that each gives; without those already known."""
+        needed, waiting = dict[int, Operation](), list(results)
+        while waiting:
+            value = waiting.pop()
+            if value not in needed and value not in known and (operation := self.operations[value]):
+                needed[value] = operation
+                waiting += operation[1:]
+        return dict(sorted(needed.items()))
+
+
+class _Lists:
+    """Runs, results and operands of sections, as numbers of slots."""
+
+    def __init__(self, values: _Values) -> None:
+        self._slot = {value: slot for slot, value in enumerate([*range(values.arguments), *values.numbers.values()])}
+        self._first = self.slots = len(self._slot)
+        self.lengths: list[int] = []
+        self.lists: list[array[int]] = []
+
+    def add_fixed(self, operations: dict[int, Operation], kept: set[int]) -> int:
+        """Add the first section, whose values stay where others use them; returns their number."""
+        before = self.slots
+        self._slot = self._add(with_pairs(operations, kept), [])
+        self._first = self.slots
+        return self._first - before
+
+    def add(self, operations: dict[int, Operation], results: list[int]) -> None:
+        self._add(with_pairs(operations, results), results)
+
+    def _add(self, operations: dict[int, Operation], results: list[int]) -> dict[int, int]:
+        """Slots of all values then."""
+        runs, operands, slot, place = array("i"), array("i"), self._slot.copy(), self._first
+        for code, values in runs_of(operations):
+            runs.extend((code, len(values)))
+            for value in values:
+                operands.extend(slot[taken] for taken in operations[value][1:])
+                slot[value], place = place, place + 1
+        self.lists += [runs, array("i", [slot[value] for value in results]), operands]
+        self.lengths += [len(runs) // 2, len(results), len(operands)]
+        self.slots = max(self.slots, place)
+        return slot
