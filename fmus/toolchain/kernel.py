@@ -16,17 +16,22 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
 from collections.abc import Mapping
 from pathlib import Path
 
-import casadi as ca
-
 from fmus.toolchain.elimination import plan_elimination
-from fmus.toolchain.long_functions import LONGEST, LONGEST_OF_DATA, cut
 from fmus.toolchain.model import Model
 from fmus.toolchain.nodes import LARGEST_REST
+from fmus.toolchain.symbols import Function
+from fmus.toolchain.symbols.c_code import c_function
+
+LONGEST = 20_000
+"""Operations of a function that is not written in parts."""
+
+LONGEST_OF_DATA = 1_000
+"""The same where a network is solved as data."""
 
 _C = Path(__file__).with_name("c")
 
 
-def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> str:
+def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str:
     """The whole C kernel of a model as one translation unit.
 
     ``further``: Functions by name whose code is wanted beside the kernel's own; the enumerator ``NWD`` is the room they
@@ -57,16 +62,13 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
         tables += f"\n#define LARGEST_REST {LARGEST_REST!r}\n" + _tables(
             plan.tables() | {"GIVEN": list(model.nodal.given) or [-1]}
         )
-    sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
+    sizes["NW"] = max(1, *(f.room for f in functions.values()))
     if further:
-        sizes["NWD"] = max(f.sz_w() for f in further.values())
-    generator = ca.CodeGenerator(
-        model.name, {"with_header": False, "main": False, "verbose": False, "with_export": False}
-    )
-    for name, function in (functions | further).items():
-        generator.add(scalar_function(function, f"{name}_code"))
+        sizes["NWD"] = max(1, *(f.room for f in further.values()))
+    longest = LONGEST if model.nodal is None else LONGEST_OF_DATA
+    code = [c_function(function, f"{name}_code", longest) for name, function in (functions | further).items()]
     enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
-    parts = [cut(str(generator.dump()), LONGEST if model.nodal is None else LONGEST_OF_DATA), enumeration, tables]
+    parts = ["#include <math.h>", *code, enumeration, tables]
     files = ["nodal.c"] if model.nodal is not None else []
     parts += [(_C / name).read_text(encoding="utf-8") for name in (*files, "kernel.c", f"{model.integrator}.c")]
     return "\n".join(parts)
@@ -78,7 +80,7 @@ def _tables(lists: Mapping[str, list[int]]) -> str:
     )
 
 
-def kernel_functions(model: Model) -> dict[str, ca.Function]:
+def kernel_functions(model: Model) -> dict[str, Function]:
     """The functions of a kernel by name; where voltages are solved for, those at given voltages, and the equations."""
     if model.nodal is not None:
         return {
@@ -95,10 +97,3 @@ def kernel_functions(model: Model) -> dict[str, ca.Function]:
         "derivatives": model.derivatives,
         "requirements": model.requirements,
     }
-
-
-def scalar_function(function: ca.Function, name: str) -> ca.Function:
-    """The same function under another name, in scalar operations, with dense outputs."""
-    inputs = [ca.SX.sym("a", function.sparsity_in(k)) for k in range(function.n_in())]
-    outputs = [ca.densify(e) for e in function.call(inputs)]
-    return ca.Function(name, inputs, outputs)

@@ -1,20 +1,19 @@
 """The kernel of a model in pure Python: the fallback where no compiled kernel fits the platform.
 
-It is written from the same CasADi operations in the same order as the C code, so both give the same
+It is written from the same operations in the same order as the C code, so both give the same
 results to rounding."""
 
-import casadi as ca
-
 from fmus.toolchain.elimination import plan_elimination
-from fmus.toolchain.kernel import kernel_functions, scalar_function
+from fmus.toolchain.kernel import kernel_functions
 from fmus.toolchain.model import Model
 from fmus.toolchain.nodes import LARGEST_REST
 from fmus.toolchain.plan import Plan
+from fmus.toolchain.symbols import Function, Op
+from fmus.toolchain.symbols.operations import ARITHMETIC, PYTHON
 
 _PYTHON_HEADER = '''"""Pure-Python kernel of {name}: the fallback where no compiled kernel fits the platform."""
 
-import math
-from math import atan2, copysign, fabs, floor, inf, isfinite, nan
+{arithmetic}
 
 NP, NC, NU, NX, NY = {np}, {nc}, {nu}, {nx}, {ny}
 C = NP
@@ -22,39 +21,6 @@ U = C + NC
 X = U + NU
 Y = X + NX
 DX = Y + NY
-
-
-# Arithmetic as in C: what is undefined becomes inf or nan and is found by its name after the step.
-
-
-def divide(a, b):
-    try:
-        return a / b
-    except ZeroDivisionError:
-        return copysign(inf, a) * copysign(1.0, b) if a == a and a != 0.0 else nan
-
-
-def power(a, b):
-    try:
-        return math.pow(a, b)
-    except (ValueError, OverflowError):
-        return nan if a < 0.0 else inf
-
-
-def as_in_c(function, overflow):
-    def evaluate(a):
-        try:
-            return function(a)
-        except (ValueError, OverflowError):
-            return overflow(a)
-
-    return evaluate
-
-
-sqrt = as_in_c(math.sqrt, lambda a: nan)
-log = as_in_c(math.log, lambda a: -inf if a == 0.0 else nan)
-exp = as_in_c(math.exp, lambda a: inf)
-sin, cos, tan = (as_in_c(f, lambda a: nan) for f in (math.sin, math.cos, math.tan))
 
 
 '''
@@ -244,47 +210,12 @@ def advance(z, h, n, workspace):
     return _finish(z, x)
 """
 
-_BINARY = {
-    ca.OP_ADD: "{0} + {1}",
-    ca.OP_SUB: "{0} - {1}",
-    ca.OP_MUL: "{0} * {1}",
-    ca.OP_DIV: "divide({0}, {1})",
-    ca.OP_POW: "power({0}, {1})",
-    ca.OP_CONSTPOW: "power({0}, {1})",
-    ca.OP_LT: "1.0 if {0} < {1} else 0.0",
-    ca.OP_LE: "1.0 if {0} <= {1} else 0.0",
-    ca.OP_EQ: "1.0 if {0} == {1} else 0.0",
-    ca.OP_NE: "1.0 if {0} != {1} else 0.0",
-    ca.OP_AND: "1.0 if {0} and {1} else 0.0",
-    ca.OP_OR: "1.0 if {0} or {1} else 0.0",
-    ca.OP_FMIN: "min({0}, {1})",
-    ca.OP_FMAX: "max({0}, {1})",
-    ca.OP_IF_ELSE_ZERO: "{1} if {0} else 0.0",
-    ca.OP_ATAN2: "atan2({0}, {1})",
-    ca.OP_COPYSIGN: "copysign({0}, {1})",
-}
-_UNARY = {
-    ca.OP_ASSIGN: "{0}",
-    ca.OP_NEG: "-{0}",
-    ca.OP_INV: "divide(1.0, {0})",
-    ca.OP_SQ: "{0} * {0}",
-    ca.OP_TWICE: "2.0 * {0}",
-    ca.OP_SQRT: "sqrt({0})",
-    ca.OP_SIN: "sin({0})",
-    ca.OP_COS: "cos({0})",
-    ca.OP_TAN: "tan({0})",
-    ca.OP_EXP: "exp({0})",
-    ca.OP_LOG: "log({0})",
-    ca.OP_FABS: "fabs({0})",
-    ca.OP_FLOOR: "floor({0})",
-    ca.OP_NOT: "0.0 if {0} else 1.0",
-}
-
 
 def python_source(model: Model) -> str:
     """The kernel of a model as the text of a Python module that imports nothing but `math`."""
     header = _PYTHON_HEADER.format(
         name=model.name,
+        arithmetic=ARITHMETIC,
         np=len(model.parameters),
         nc=len(model.calculated),
         nu=len(model.inputs),
@@ -309,27 +240,18 @@ def _tables(plan: Plan) -> str:
     return "".join(f"{name} = {values}\n" for name, values in plan.tables().items()) + "\n"
 
 
-def _python_function(name: str, function: ca.Function) -> str:
-    """Write an SX function as straight-line Python, one line an operation."""
-    function = scalar_function(function, name)
-    arguments = [f"i{k}" for k in range(function.n_in())]
-    lines = [f"def {name}({', '.join(arguments)}):"]
-    lines += [f"    o{k} = [0.0] * {function.numel_out(k)}" for k in range(function.n_out())]
-    for k in range(function.n_instructions()):
-        operation = function.instruction_id(k)
-        source, target = function.instruction_input(k), function.instruction_output(k)
-        if operation == ca.OP_CONST:
-            lines.append(f"    w{target[0]} = {function.instruction_constant(k)!r}")
-        elif operation == ca.OP_INPUT:
-            lines.append(f"    w{target[0]} = i{source[0]}[{source[1]}]")
-        elif operation == ca.OP_OUTPUT:
-            lines.append(f"    o{target[0]}[{target[1]}] = w{source[0]}")
+def _python_function(name: str, function: Function) -> str:
+    """Write a function as straight-line Python, one line an operation."""
+    lines = [f"def {name}({', '.join(f'i{k}' for k in range(len(function.inputs)))}):"]
+    lines += [f"    o{k} = [0.0] * {len(vector)}" for k, vector in enumerate(function.outputs)]
+    for op, place, a, b, value in function.instructions:
+        if op == Op.CONST:
+            lines.append(f"    w{place} = {value!r}")
+        elif op == Op.INPUT:
+            lines.append(f"    w{place} = i{a}[{b}]")
+        elif op == Op.OUTPUT:
+            lines.append(f"    o{place}[{a}] = w{b}")
         else:
-            template = _UNARY.get(operation) or _BINARY.get(operation)
-            if template is None:
-                raise ValueError(
-                    f"{name}: operation {operation} of CasADi has no Python form yet; add it to python_kernel.py"
-                )
-            lines.append(f"    w{target[0]} = " + template.format(*[f"w{s}" for s in source]))
-    lines.append(f"    return {', '.join(f'o{k}' for k in range(function.n_out()))},")
+            lines.append(f"    w{place} = " + PYTHON[op].format(f"w{a}", f"w{b}"))
+    lines.append(f"    return {', '.join(f'o{k}' for k in range(len(function.outputs)))},")
     return "\n".join(lines)

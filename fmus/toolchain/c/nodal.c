@@ -70,7 +70,7 @@ static void factorise_nodes(const double *u, const double *p, const double *c) {
     static double m[2 * NM], row[2 * NB], cw[NW];
     const double *arg[] = {u, p, c};
     double *res[] = {m}, *lu = factors.lu, *inverse = factors.inverse;
-    nodal_values_code(arg, res, 0, cw, 0);
+    nodal_values_code(arg, res, cw);
     for (int i = 0; i < NB; ++i) {
         for (int q = ROW[i]; q < ROW[i + 1]; ++q) row[2 * COL[q]] = row[2 * COL[q] + 1] = 0;
         for (int q = MROW[i]; q < MROW[i + 1]; ++q) {
@@ -109,7 +109,7 @@ static void solve_nodes(const double **known, double *v) {
     static double b[2 * NB], s[2 * NB], cw[NW];
     double *res[] = {b};
     if (!unchanged(known[1], known[2], known[3])) factorise_nodes(known[1], known[2], known[3]);
-    nodal_currents_code(known, res, 0, cw, 0);
+    nodal_currents_code(known, res, cw);
     through_factors(b, s);
     for (int i = 0; i < NB; ++i) {
         v[PERM[i]] = s[2 * i];
@@ -117,18 +117,16 @@ static void solve_nodes(const double **known, double *v) {
     }
 }
 
-static int outputs_code(const double **arg, double **res, void *iw, double *w, int mem) {
+static void outputs_code(const double **arg, double **res, double *w) {
     double v[2 * NB];
     const double *known[] = {arg[0], arg[1], arg[2], arg[3], v};
-    (void)iw;
     solve_nodes(known, v);
-    return outputs_at_code(known, res, 0, w, mem);
+    outputs_at_code(known, res, w);
 }
 
-static int derivatives_code(const double **arg, double **res, void *iw, double *w, int mem) {
+static void derivatives_code(const double **arg, double **res, double *w) {
     double v[2 * NB];
     const double *known[] = {arg[0], arg[1], arg[2], arg[3], v};
-    (void)iw;
     solve_nodes(known, v);
-    return derivatives_at_code(known, res, 0, w, mem);
+    derivatives_at_code(known, res, w);
 }

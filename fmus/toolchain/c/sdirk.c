@@ -12,7 +12,7 @@ static void factorise(const double *z, double gh, double *w) {
     double m[NM], cw[NW], *lu = w + LU, *inv = w + INV, *row = w + V;
     const double *arg[] = {z, z + C, &gh};
     double *res[] = {m};
-    iteration_code(arg, res, 0, cw, 0);
+    iteration_code(arg, res, cw);
     for (int i = 0; i < NX; ++i) {
         for (int q = ROW[i]; q < ROW[i + 1]; ++q) row[COL[q]] = 0;
         for (int q = MROW[i]; q < MROW[i + 1]; ++q) row[MCOL[q]] = m[q];
