@@ -7,14 +7,13 @@ host: `control_part` says what it must build."""
 
 from dataclasses import fields
 
-import casadi as ca
-
 from fmus.converter_parts.control_part import CircuitElement, ControlPart
 from fmus.converter_parts.filter import FilterData, MeasuredFilter, declare_filter_data
 from fmus.toolchain.frames import Phasor, QdState, of_phases, phases, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import declare_operating_point, declare_rating
+from fmus.toolchain.symbols import Expr, sqrt
 from gfor_fmu.converter import P_0, S_N, OuterControl, outer_control
 from gfor_fmu.droop import declare_droop
 from gfor_fmu.inner_loops import inner_loops
@@ -42,7 +41,7 @@ def grid_forming_control() -> Model:
         LEAD, 0.0, "s", "Time by which the bridge voltage leads: from the sample to the middle of its use", minimum=0.0
     )
     # Of phase quantities: 1 pu is the amplitude of the rated phase voltage, and the current that gives S_n with it.
-    volt, ampere = V_n * ca.sqrt(2 / 3), rating / V_n * ca.sqrt(2 / 3)
+    volt, ampere = V_n * sqrt(2 / 3), rating / V_n * sqrt(2 / 3)
     start_volt, start_ampere = V_N * (2 / 3) ** 0.5, S_N / V_N * (2 / 3) ** 0.5
     u = _measured(m, "u", "kV", "Voltage of phase {} across the capacitor branch, to neutral", start_volt)
     i_s = _measured(
@@ -74,7 +73,7 @@ def grid_forming_control() -> Model:
     return m.build()
 
 
-def _measured(m: ModelBuilder, name: str, unit: str, text: str, peak: float) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _measured(m: ModelBuilder, name: str, unit: str, text: str, peak: float) -> tuple[Expr, Expr, Expr]:
     a, b, c = (
         m.input(f"{name}_{phase}", unit, text.format(phase), start=peak * part)
         for phase, part in zip("abc", _THIRD, strict=True)
@@ -85,11 +84,11 @@ def _measured(m: ModelBuilder, name: str, unit: str, text: str, peak: float) -> 
 def _as_measured(data: FilterData, u: Phasor, i_s: Phasor, i_g: Phasor) -> MeasuredFilter:
     """The filter's data with its measured quantities in place of states, converter's frame [pu, S_n]."""
     known = {field.name: getattr(data, field.name) for field in fields(FilterData)}
-    as_pair = [QdState(ca.SX(value.re), -ca.SX(value.im)) for value in (i_s, i_g)]
+    as_pair = [QdState(Expr(value.re), -Expr(value.im)) for value in (i_s, i_g)]
     return MeasuredFilter(**known, i_s=as_pair[0], i_g=as_pair[1], u=u)
 
 
-def _declare_signals(m: ModelBuilder, f: MeasuredFilter, control: OuterControl, rating: ca.SX) -> None:
+def _declare_signals(m: ModelBuilder, f: MeasuredFilter, control: OuterControl, rating: Expr) -> None:
     s = power(f.u, f.i_g.value) * rating
     m.output("p", s.re, "MW", "Active power at the filter capacitor")
     m.output("q", s.im, "Mvar", "Reactive power at the filter capacitor")

@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.converter_parts.filter import declare_filter, filter_equations
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
+from fmus.toolchain.symbols import Expr
 from gfor_fmu.droop import Droop, declare_droop, frequency, voltage_reference
 from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.pod import pod
@@ -23,10 +22,10 @@ class OuterControl:
     """Droops and POD controllers, and their outputs: frequency, voltage reference, supplementary references [pu]."""
 
     droop: Droop
-    omega: ca.SX
+    omega: Expr
     u_ref: Phasor
-    delta_p: ca.SX
-    delta_q: ca.SX
+    delta_p: Expr
+    delta_q: Expr
 
 
 @dataclass(frozen=True)
@@ -36,9 +35,9 @@ class Converter:
 
     current: Phasor
     control: OuterControl
-    u: ca.SX
-    i_s: ca.SX
-    current_demand: ca.SX | None = None
+    u: Expr
+    i_s: Expr
+    current_demand: Expr | None = None
 
 
 def grid_forming_converter() -> Model:
@@ -56,7 +55,7 @@ def grid_forming_converter() -> Model:
     return m.build()
 
 
-def declare_converter(m: ModelBuilder, port: DevicePort, measured: ca.SX | None = None) -> Converter:
+def declare_converter(m: ModelBuilder, port: DevicePort, measured: Expr | None = None) -> Converter:
     """Everything behind a port, whatever its inputs are; ``measured`` as `outer_control`."""
     electrical = declare_filter(m, port)
     P, Q = m.algebraic("P"), m.algebraic("Q")
@@ -72,7 +71,7 @@ def declare_converter(m: ModelBuilder, port: DevicePort, measured: ca.SX | None 
     return Converter(current, control, electrical.u.magnitude(), electrical.i_s.value.magnitude(), limited.share)
 
 
-def outer_control(m: ModelBuilder, droop: Droop, omega_b: ca.SX, measured: ca.SX | None = None) -> OuterControl:
+def outer_control(m: ModelBuilder, droop: Droop, omega_b: Expr, measured: Expr | None = None) -> OuterControl:
     """Both POD controllers around the droops, and the angle that follows.
 
     Parameters

@@ -6,11 +6,10 @@ What the limit takes from the voltage is Z·i = (i* − i)/k_p. It is exactly 0 
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.converter_parts.filter import SteadyState
 from fmus.toolchain.frames import ZERO, Phasor
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, cos, fabs, fmax, if_else, logic_and, logic_not, sin, sqrt
 
 PAPER = "Mateu-Barriendos et al. 2024, appendix, current saturation"
 
@@ -28,8 +27,8 @@ _SMALLEST = 1e-12
 class BoxLimits:
     """Limits of i_q,ref and i_d,ref in the paper's saturation [pu, S_n]."""
 
-    i_q_max: ca.SX
-    i_d_max: ca.SX
+    i_q_max: Expr
+    i_d_max: Expr
 
 
 @dataclass(frozen=True)
@@ -50,17 +49,17 @@ class CurrentLimit:
         X/R of a threshold impedance [1], and its resistance for 1 pu beyond the threshold [pu, S_n].
     """
 
-    kind: ca.SX
+    kind: Expr
     box: BoxLimits
-    I_max: ca.SX
-    threshold: ca.SX
-    angle: ca.SX
-    X_R: ca.SX
-    slope: ca.SX
+    I_max: Expr
+    threshold: Expr
+    angle: Expr
+    X_R: Expr
+    slope: Expr
 
-    def is_kind(self, *kinds: int) -> ca.SX:
+    def is_kind(self, *kinds: int) -> Expr:
         """Whether the limit is one of these kinds."""
-        return ca.logic_and(self.kind > min(kinds) - 0.5, self.kind < max(kinds) + 0.5)
+        return logic_and(self.kind > min(kinds) - 0.5, self.kind < max(kinds) + 0.5)
 
 
 @dataclass(frozen=True)
@@ -83,20 +82,20 @@ class LimitedCurrent:
     allowed: Phasor
     missing: Phasor
     informed: Phasor
-    share: ca.SX
+    share: Expr
 
 
-def declare_box_limits(m: ModelBuilder, start: SteadyState, kind: ca.SX | float = float(BOX)) -> BoxLimits:
+def declare_box_limits(m: ModelBuilder, start: SteadyState, kind: Expr | float = float(BOX)) -> BoxLimits:
     """Declare the limits of i_q,ref and i_d,ref; a dispatch beyond them is refused if that kind of limit acts."""
     i_q_max = m.parameter("i_q_max", 1.1, "pu", "Limit of i_q,ref", base="S_n", minimum=0.1, source=PAPER)
     i_d_max = m.parameter("i_d_max", 1.1, "pu", "Limit of i_d,ref", base="S_n", minimum=0.1, source=PAPER)
-    acts = ca.SX(kind) < BOX + 0.5
+    acts = Expr(kind) < BOX + 0.5
     m.require(
-        ca.if_else(acts, i_q_max - ca.fabs(start.i_s.re), 1),
+        if_else(acts, i_q_max - fabs(start.i_s.re), 1),
         "the power flow asks for more active current than voltage_control.i_q_max: lower P_0 or raise S_n",
     )
     m.require(
-        ca.if_else(acts, i_d_max - ca.fabs(start.i_s.im), 1),
+        if_else(acts, i_d_max - fabs(start.i_s.im), 1),
         "the power flow asks for more reactive current than voltage_control.i_d_max: lower Q_0 or raise S_n",
     )
     return BoxLimits(i_q_max, i_d_max)
@@ -119,27 +118,27 @@ def declare_current_limit(m: ModelBuilder, start: SteadyState) -> CurrentLimit:
         )  # fmt: skip
         X_R = m.parameter("X_R", 5.0, "1", "X/R of the impedance of kind 2", minimum=0, maximum=100)
         slope = m.calculated(
-            "slope", start.u.re / (I_max * ca.fmax(I_max - threshold, 1e-6) * ca.sqrt(1 + X_R**2)), "pu",
+            "slope", start.u.re / (I_max * fmax(I_max - threshold, 1e-6) * sqrt(1 + X_R**2)), "pu",
             "Resistance of kind 2 for 1 pu beyond the threshold: a short circuit at the capacitor gives I_max", "S_n",
         )  # fmt: skip
     with m.scope("voltage_control"):
         limit = CurrentLimit(kind, declare_box_limits(m, start, kind), I_max, threshold, angle, X_R, slope)
     m.require(
-        ca.if_else(limit.is_kind(THRESHOLD_IMPEDANCE), I_max - threshold, 1),
+        if_else(limit.is_kind(THRESHOLD_IMPEDANCE), I_max - threshold, 1),
         "current_limit.threshold must be below current_limit.I_max",
     )
     m.require(
-        ca.if_else(limit.is_kind(CIRCULAR, SATURATION_INFORMED), I_max - start.i_s.magnitude(), 1),
+        if_else(limit.is_kind(CIRCULAR, SATURATION_INFORMED), I_max - start.i_s.magnitude(), 1),
         "the power flow asks for more current than current_limit.I_max: lower P_0 or Q_0, or raise S_n",
     )
     m.require(
-        ca.if_else(limit.is_kind(THRESHOLD_IMPEDANCE), threshold - start.i_s.magnitude(), 1),
+        if_else(limit.is_kind(THRESHOLD_IMPEDANCE), threshold - start.i_s.magnitude(), 1),
         "the power flow asks for more current than current_limit.threshold: lower P_0 or Q_0, or raise S_n",
     )
     return limit
 
 
-def limited_current(limit: CurrentLimit, demanded: Phasor, k_p: ca.SX) -> LimitedCurrent:
+def limited_current(limit: CurrentLimit, demanded: Phasor, k_p: Expr) -> LimitedCurrent:
     """Apply the limit.
 
     Parameters
@@ -151,42 +150,42 @@ def limited_current(limit: CurrentLimit, demanded: Phasor, k_p: ca.SX) -> Limite
     k_p
         Proportional gain of the voltage control [pu, S_n].
     """
-    size = ca.sqrt(ca.fmax(demanded.re**2 + demanded.im**2, _SMALLEST))
+    size = sqrt(fmax(demanded.re**2 + demanded.im**2, _SMALLEST))
     box, threshold = limit.is_kind(BOX), limit.is_kind(THRESHOLD_IMPEDANCE)
-    free = ca.if_else(threshold, limit.threshold, limit.I_max)
-    acts = ca.logic_and(size > free, ca.logic_not(box))
+    free = if_else(threshold, limit.threshold, limit.I_max)
+    acts = logic_and(size > free, logic_not(box))
     drop = _where(threshold, _threshold_drop(limit, size, k_p), _circular_drop(limit, size))
     passed = demanded / (Phasor(1.0, 0.0) + _where(acts, drop, ZERO))
     missing = (demanded - passed) / k_p
     clamped = demanded.clamped(limit.box.i_q_max, limit.box.i_d_max)
-    of_box = ca.fmax(ca.fabs(demanded.re) / limit.box.i_q_max, ca.fabs(demanded.im) / limit.box.i_d_max)
+    of_box = fmax(fabs(demanded.re) / limit.box.i_q_max, fabs(demanded.im) / limit.box.i_d_max)
     return LimitedCurrent(
         demanded,
         _where(box, clamped, passed),
         missing,
         _where(limit.is_kind(SATURATION_INFORMED), missing, ZERO),
-        ca.if_else(box, of_box, size / free),
+        if_else(box, of_box, size / free),
     )
 
 
-def _where(condition: ca.SX, then: Phasor, otherwise: Phasor) -> Phasor:
-    return Phasor(ca.if_else(condition, then.re, otherwise.re), ca.if_else(condition, then.im, otherwise.im))
+def _where(condition: Expr, then: Phasor, otherwise: Phasor) -> Phasor:
+    return Phasor(if_else(condition, then.re, otherwise.re), if_else(condition, then.im, otherwise.im))
 
 
-def _circular_drop(limit: CurrentLimit, size: ca.SX) -> Phasor:
+def _circular_drop(limit: CurrentLimit, size: Expr) -> Phasor:
     """k_p·Z of the impedance with the chosen angle φ that leaves exactly I_max: |1 + k_p·Z| = m = |i*|/I_max."""
-    cos, sin = ca.cos(limit.angle), ca.sin(limit.angle)
-    m = ca.fmax(size / limit.I_max, 1)
-    drop = ca.sqrt(ca.fmax(m**2 - sin**2, _SMALLEST)) - cos
-    return Phasor(drop * cos, drop * sin)
+    cosine, sine = cos(limit.angle), sin(limit.angle)
+    m = fmax(size / limit.I_max, 1)
+    drop = sqrt(fmax(m**2 - sine**2, _SMALLEST)) - cosine
+    return Phasor(drop * cosine, drop * sine)
 
 
-def _threshold_drop(limit: CurrentLimit, size: ca.SX, k_p: ca.SX) -> Phasor:
+def _threshold_drop(limit: CurrentLimit, size: Expr, k_p: Expr) -> Phasor:
     """k_p·Z of Z = slope·(|i| − threshold)·(1 + j·X_R), at the current that solves |i|·|1 + k_p·Z| = |i*|.
 
     The square of the left-hand side is convex in |i|: Newton's method converges from any value above the solution."""
     a, I_th = k_p * limit.slope, limit.threshold
-    demand = ca.fmax(size, I_th)
+    demand = fmax(size, I_th)
     over = (demand - I_th) / (1 + a * I_th)
     for _ in range(_NEWTON):
         i, r, x = I_th + over, 1 + a * over, a * limit.X_R * over

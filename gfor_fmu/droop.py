@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.converter_parts.filter import APPENDIX, SteadyState
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr
 
 
 @dataclass(frozen=True)
@@ -15,14 +14,14 @@ class Droop:
 
     ``p_f`` and ``q_f`` are states, so the frequency that they give has no direct feed-through."""
 
-    R_f: ca.SX
-    R_V: ca.SX
-    P_ref: ca.SX
-    Q_ref: ca.SX
-    U_ref: ca.SX
-    p_f: ca.SX
-    q_f: ca.SX
-    theta: ca.SX
+    R_f: Expr
+    R_V: Expr
+    P_ref: Expr
+    Q_ref: Expr
+    U_ref: Expr
+    p_f: Expr
+    q_f: Expr
+    theta: Expr
 
 
 def declare_droop(m: ModelBuilder, start: SteadyState, measured: Phasor) -> Droop:
@@ -46,11 +45,11 @@ def declare_droop(m: ModelBuilder, start: SteadyState, measured: Phasor) -> Droo
     return Droop(R_f, R_V, P_0 + delta_P, Q_0 + delta_Q, U_0 + delta_U, p_f, q_f, theta)
 
 
-def frequency(d: Droop, delta_p_pod: ca.SX) -> ca.SX:
+def frequency(d: Droop, delta_p_pod: Expr) -> Expr:
     """Frequency w = 1 + R_f (P_ref + ΔP_POD − P_f)  [pu]."""
     return 1 + d.R_f * (d.P_ref + delta_p_pod - d.p_f)
 
 
-def voltage_reference(d: Droop, delta_q_pod: ca.SX) -> Phasor:
+def voltage_reference(d: Droop, delta_q_pod: Expr) -> Phasor:
     """Reference u_ref = U_0 + R_V (Q_ref + ΔQ_POD − Q_f) on the q axis, 0 on the d axis [pu]."""
     return Phasor(d.U_ref + d.R_V * (d.Q_ref + delta_q_pod - d.q_f), 0)

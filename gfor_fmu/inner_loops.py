@@ -1,16 +1,15 @@
 """Inner control: voltage PI around current PI, with lagged feed-forwards and a limit on the current reference."""
 
-import casadi as ca
-
 from fmus.converter_parts.current_control import current_control
 from fmus.converter_parts.filter import APPENDIX, MeasuredFilter
 from fmus.toolchain.frames import Phasor, QdState, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, fabs, if_else, logic_and
 from gfor_fmu.current_limit import BOX, CurrentLimit, LimitedCurrent, declare_current_limit, limited_current
 
 
 def inner_loops(
-    m: ModelBuilder, f: MeasuredFilter, omega_b: ca.SX, w: ca.SX, u_ref: Phasor
+    m: ModelBuilder, f: MeasuredFilter, omega_b: Expr, w: Expr, u_ref: Phasor
 ) -> tuple[Phasor, LimitedCurrent]:
     """Declare both loops; return the voltage that the converter applies [pu, S_n], and the limit at work.
 
@@ -58,11 +57,11 @@ def _feed_forwards(m: ModelBuilder, f: MeasuredFilter) -> tuple[Phasor, Phasor]:
 
 
 def _integrate_what_is_left(
-    m: ModelBuilder, x: QdState, limit: CurrentLimit, found: LimitedCurrent, k_i: ca.SX, error: Phasor
+    m: ModelBuilder, x: QdState, limit: CurrentLimit, found: LimitedCurrent, k_i: Expr, error: Phasor
 ) -> None:
     """Anti-windup. In the paper's box each component stands still while it is clamped; behind the other limits the
     voltage that they take away is no error."""
     box, left = limit.is_kind(BOX), error - found.missing
-    q_stops = ca.logic_and(box, ca.fabs(found.demanded.re) >= limit.box.i_q_max)
-    d_stops = ca.logic_and(box, ca.fabs(found.demanded.im) >= limit.box.i_d_max)
-    x.set_derivative(m, Phasor(ca.if_else(q_stops, 0, k_i * left.re), ca.if_else(d_stops, 0, k_i * left.im)))
+    q_stops = logic_and(box, fabs(found.demanded.re) >= limit.box.i_q_max)
+    d_stops = logic_and(box, fabs(found.demanded.im) >= limit.box.i_d_max)
+    x.set_derivative(m, Phasor(if_else(q_stops, 0, k_i * left.re), if_else(d_stops, 0, k_i * left.im)))

@@ -4,14 +4,13 @@ Filter, inner loops, feed-forwards and transformer settle within a few milliseco
 voltage control holds u = u_ref, so that the emf is u_ref·e^{jθ}, a function of the droops' and the POD controllers'
 states alone. The current limit is not represented; ``current_limit`` shows when it would act."""
 
-import casadi as ca
-
 from fmus.converter_parts.filter import FilterData, declare_filter_data
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import device_port
+from fmus.toolchain.symbols import Expr, fabs, fmax
 from gfor_fmu.converter import P_0, S_N, Converter, declare_converter_outputs, outer_control
 from gfor_fmu.current_limit import declare_box_limits
 from gfor_fmu.droop import declare_droop
@@ -57,7 +56,7 @@ def _capacitor_current(f: FilterData, u: Phasor) -> Phasor:
     return Phasor(0.0, f.B_c) * u / Phasor(1.0, f.R_cap * f.B_c)
 
 
-def _of_limit(m: ModelBuilder, f: FilterData, i_s: Phasor) -> ca.SX:
+def _of_limit(m: ModelBuilder, f: FilterData, i_s: Phasor) -> Expr:
     with m.scope("voltage_control"):
         box = declare_box_limits(m, f.initial)
-    return ca.fmax(ca.fabs(i_s.re) / box.i_q_max, ca.fabs(i_s.im) / box.i_d_max)
+    return fmax(fabs(i_s.re) / box.i_q_max, fabs(i_s.im) / box.i_d_max)

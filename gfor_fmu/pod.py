@@ -9,10 +9,9 @@
 The input is the deviation of the frequency that the converter itself imposes, so nothing needs to
 be measured. Because of T_f the output never depends directly on the input: no algebraic loop."""
 
-import casadi as ca
-
 from fmus.toolchain.blocks import lead_lag, limit, low_pass, washout
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, if_else, logic_and
 
 N_S_MAX = 3
 """Most lead/lag stages a controller can be given."""
@@ -20,7 +19,7 @@ N_S_MAX = 3
 SOURCE = "Mateu-Barriendos et al. 2024, table of POD parameters"
 
 
-def pod(m: ModelBuilder, name: str, delta_omega: ca.SX, *, sign: int, T_S1: float, T_S2: float) -> ca.SX:
+def pod(m: ModelBuilder, name: str, delta_omega: Expr, *, sign: int, T_S1: float, T_S2: float) -> Expr:
     """Declare one controller and return its supplementary reference [pu, S_n].
 
     Parameters
@@ -47,9 +46,9 @@ def pod(m: ModelBuilder, name: str, delta_omega: ca.SX, *, sign: int, T_S1: floa
         )
         K = m.parameter("K", 200.0, "pu", "Gain", base="S_n", minimum=0, maximum=1e5, tunable=True, source=SOURCE)
         bound = m.parameter("limit", 0.2, "pu", "Output limit", base="S_n", minimum=0, tunable=True, source=SOURCE)
-        m.require(ca.if_else(ca.logic_and(T_2 <= 0, T_1 > 0), -1, 1), f"{name}.T_S2 = 0 needs {name}.T_S1 = 0 as well")
+        m.require(if_else(logic_and(T_2 <= 0, T_1 > 0), -1, 1), f"{name}.T_S2 = 0 needs {name}.T_S1 = 0 as well")
         m.require(
-            ca.if_else(T_2 <= 0, 1, T_2 - m.internal_step / 2),
+            if_else(T_2 <= 0, 1, T_2 - m.internal_step / 2),
             f"{name}.T_S2 must be 0 or longer than half of internal_step",
         )
 
@@ -57,5 +56,5 @@ def pod(m: ModelBuilder, name: str, delta_omega: ca.SX, *, sign: int, T_S1: floa
         signal = low_pass(m, "low_pass", signal, T_f)
         for stage in range(1, N_S_MAX + 1):
             compensated = lead_lag(m, f"lead_lag_{stage}", signal, T_1, T_2)
-            signal = ca.if_else(stage <= N_S, compensated, signal)
+            signal = if_else(stage <= N_S, compensated, signal)
         return enabled * limit(sign * K * signal, bound)

@@ -7,13 +7,12 @@ point, exactly as in the variant with v_re and v_im."""
 
 from dataclasses import replace
 
-import casadi as ca
-
 from fmus.toolchain import port_variables
 from fmus.toolchain.frames import of_phases, phases, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import declare_rating, port_at
+from fmus.toolchain.symbols import sqrt
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
 from gfor_fmu.usual import FORMING
 
@@ -35,7 +34,7 @@ def grid_forming_converter_abc() -> Model:
         "angle_0", 0.0, "rad", "Angle of the network frame at the start; phase a is v·cos(angle_0 + theta_0) there"
     )
     # Of phase quantities: 1 pu is the amplitude of the rated phase voltage, and the current that gives S_n with it.
-    volt, ampere = V_n * 1e3 * ca.sqrt(2 / 3), rating / V_n * 1e3 * ca.sqrt(2 / 3)
+    volt, ampere = V_n * 1e3 * sqrt(2 / 3), rating / V_n * 1e3 * sqrt(2 / 3)
     peak = V_N * 1e3 * (2 / 3) ** 0.5
     v_a = m.input("v_a", "V", "Instantaneous voltage of phase a to neutral at the bus", start=peak)
     v_b = m.input("v_b", "V", "Instantaneous voltage of phase b to neutral at the bus", start=-peak / 2)

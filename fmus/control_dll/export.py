@@ -66,7 +66,7 @@ def with_values(part: ControlPart, values: Mapping[str, float], sample_time: flo
     starts = tuple(replace(p, start=float(given.get(p.name, p.start))) for p in model.parameters)
     made = replace(model, parameters=starts)
     start = [p.start for p in starts]
-    margins = made.requirements(start, made.initialise(start)[0]).full().ravel()
+    (margins,) = made.requirements(start, made.initialise(start)[0])
     for margin, rule in zip(margins, made.requirement_texts, strict=True):
         if not margin > 0:
             raise ControlDllError(f"these values cannot be used: {rule}")

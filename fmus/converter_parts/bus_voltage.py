@@ -5,12 +5,11 @@ of states alone."""
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import MasterStep
 from fmus.toolchain.port import DevicePort
+from fmus.toolchain.symbols import Expr, exp, fmax
 
 SHORT = 1e-3
 """Communication step in parts of the lags below which their delays are those of a step so short: 2e-7 from τ."""
@@ -24,24 +23,24 @@ class ExtrapolatedVoltage:
 
     once: Phasor
     twice: Phasor
-    tau: ca.SX
-    delay: ca.SX
-    more: ca.SX
+    tau: Expr
+    delay: Expr
+    more: Expr
 
     @property
     def value(self) -> Phasor:
         """The voltage, extrapolated [pu]; right on average over a step in which the input is held."""
         return 2 * self.once - self.twice
 
-    def after(self, time: ca.SX) -> Phasor:
+    def after(self, time: Expr) -> Phasor:
         """The voltage [pu] at that time [s] after the end of a communication step."""
         return self.once + (self.once - self.twice) * ((self.delay + time) / self.more)
 
     def follow(self, m: ModelBuilder, v: Phasor) -> None:
         """Give both lags what they follow."""
         for behind, ahead in ((self.once, v), (self.twice, self.once)):
-            m.derivative(ca.SX(behind.re), (ahead.re - behind.re) / self.tau)
-            m.derivative(ca.SX(behind.im), (ahead.im - behind.im) / self.tau)
+            m.derivative(Expr(behind.re), (ahead.re - behind.re) / self.tau)
+            m.derivative(Expr(behind.im), (ahead.im - behind.im) / self.tau)
 
 
 def extrapolated_voltage(m: ModelBuilder, port: DevicePort, master: MasterStep) -> ExtrapolatedVoltage:
@@ -63,8 +62,8 @@ def extrapolated_voltage(m: ModelBuilder, port: DevicePort, master: MasterStep) 
             )
             for name, text in (("once", "one lag"), ("twice", "two lags"))
         )
-    tau = ca.fmax(shortest, master.size)
-    ratio = ca.fmax(master.size / tau, SHORT)
-    growth = ca.exp(ratio)
+    tau = fmax(shortest, master.size)
+    ratio = fmax(master.size / tau, SHORT)
+    growth = exp(ratio)
     more = tau * ratio**2 / (growth - 2 + 1 / growth)
     return ExtrapolatedVoltage(once, twice, tau, tau * ratio / 2 * (growth + 1) / (growth - 1), more)

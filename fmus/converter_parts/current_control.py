@@ -1,14 +1,13 @@
 """Current control: a PI controller in a converter's own frame, with decoupling and a feed-forward of the voltage."""
 
-import casadi as ca
-
 from fmus.converter_parts.filter import APPENDIX, MeasuredFilter
 from fmus.toolchain.frames import Phasor, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr
 
 
 def current_control(
-    m: ModelBuilder, f: MeasuredFilter, omega_b: ca.SX, w: ca.SX, i_ref: Phasor, u_lagged: Phasor
+    m: ModelBuilder, f: MeasuredFilter, omega_b: Expr, w: Expr, i_ref: Phasor, u_lagged: Phasor
 ) -> Phasor:
     """Declare the controller and return the voltage that the converter applies [pu, S_n].
 

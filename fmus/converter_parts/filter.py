@@ -4,11 +4,10 @@ Everything is complex, f = f_q − j·f_d, per unit on the rating S_n; w is the 
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.toolchain.frames import Phasor, QdState, power, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort, OperatingPoint
+from fmus.toolchain.symbols import Expr
 
 APPENDIX = "Mateu-Barriendos et al. 2024, appendix, grid-forming converter parameters"
 STAMP = "STAMP toolbox of the paper's group"
@@ -18,7 +17,7 @@ STAMP = "STAMP toolbox of the paper's group"
 class SteadyState:
     """The operating point of the electrical side, in the converter's frame, from the power flow."""
 
-    theta: ca.SX
+    theta: Expr
     u: Phasor
     i_s: Phasor
     i_g: Phasor
@@ -30,12 +29,12 @@ class SteadyState:
 class FilterData:
     """Parameters of the electrical side [pu, S_n], and its operating point."""
 
-    R_c: ca.SX
-    X_c: ca.SX
-    B_c: ca.SX
-    R_t: ca.SX
-    X_t: ca.SX
-    R_cap: ca.SX
+    R_c: Expr
+    X_c: Expr
+    B_c: Expr
+    R_t: Expr
+    X_t: Expr
+    R_cap: Expr
     initial: SteadyState
 
 
@@ -88,7 +87,7 @@ def declare_filter(m: ModelBuilder, port: DevicePort) -> Filter:
     )  # fmt: skip
 
 
-def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, theta: ca.SX, w: ca.SX) -> None:
+def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, theta: Expr, w: Expr) -> None:
     """Voltage over each inductor and current into the capacitor.
 
     ``port``: the port, which gives the bus voltage and the breaker's position; ``v_c``: the converter's own voltage, in
@@ -103,7 +102,7 @@ def filter_equations(m: ModelBuilder, f: Filter, port: DevicePort, v_c: Phasor, 
 
 
 def _steady_state(
-    port: OperatingPoint, R_c: ca.SX, X_c: ca.SX, B_c: ca.SX, R_t: ca.SX, X_t: ca.SX, R_cap: ca.SX
+    port: OperatingPoint, R_c: Expr, X_c: Expr, B_c: Expr, R_t: Expr, X_t: Expr, R_cap: Expr
 ) -> SteadyState:
     u_network = port.v_0 + Phasor(R_t, X_t) * port.i_0
     theta = u_network.angle()

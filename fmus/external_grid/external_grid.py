@@ -2,14 +2,13 @@
 
 from dataclasses import replace
 
-import casadi as ca
-
 from fmus.toolchain import port_variables
 from fmus.toolchain.frames import Phasor, phasor_derivative
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import SourceEmf, declare_phasor_outputs, phasor_builder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, device_port_of
+from fmus.toolchain.symbols import sqrt
 
 S_SC = 20000.0
 """Default short-circuit power [MVA]."""
@@ -48,7 +47,7 @@ def _declare(m: ModelBuilder) -> tuple[DevicePort, Phasor, Phasor]:
     S_n = m.declare(replace(port_variables.S_N, start=S_SC, description=text))
     port = device_port_of(m, S_n, P_0=0.0)
     ratio = m.parameter("R_X", 0.1, "1", "R/X of the grid's impedance", minimum=0.0, maximum=10.0)
-    X = 1 / ca.sqrt(1 + ratio**2)
+    X = 1 / sqrt(1 + ratio**2)
     Z = Phasor(ratio * X, X)
     start = port.v_0 + Z * port.i_0
     with m.scope("source"):

@@ -4,8 +4,6 @@ Gains are those of the benchmark itself, so that its data can be entered as they
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.gfl_l2ep.electrical import COLIB, Transformer, declare_transformer, transformer_equation
 from fmus.gfl_l2ep.freezing import running
 from fmus.gfl_l2ep.limits import Limits, declare_limits, limited
@@ -14,6 +12,7 @@ from fmus.toolchain.blocks import clamp, low_pass
 from fmus.toolchain.frames import Phasor, power, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort
+from fmus.toolchain.symbols import Expr, if_else, logic_and, logic_or, sqrt
 
 LOOP = LoopDefaults(f_0=7.957747154594767, xi=1.0, source=f"{COLIB}: 5/(2π·0.1 s), from its gains 10/T and 25/T²")
 MODES = f"{COLIB}, mode 0; 0.1667 and 50 in mode 1"
@@ -25,9 +24,9 @@ class Following:
 
     frame: Frame
     into_bus: Phasor
-    u_c: ca.SX
-    i: ca.SX
-    demand: ca.SX
+    u_c: Expr
+    i: Expr
+    demand: Expr
 
 
 def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Following:
@@ -41,21 +40,21 @@ def following_converter(m: ModelBuilder, port: DevicePort, v: Phasor) -> Followi
     m.close(theta, frame.theta)
     u, i = bus / t.ratio, t.i.value
     inside = u + Phasor(t.R, t.X) * i
-    limits = declare_limits(m, t.start, ca.SX(i.im))
+    limits = declare_limits(m, t.start, Expr(i.im))
     with m.scope("measurement"):
         tau = m.parameter("tau", 0.0033, "s", "Lag of the measurements of P, Q and u_c", minimum=1e-3, source=COLIB)
     s = power(u, i)
-    active = _active_power(m, port, t, limits, ca.SX(s.re), tau)
-    seen = _Seen(ca.SX(s.im), inside.magnitude(), v.magnitude())
+    active = _active_power(m, port, t, limits, Expr(s.re), tau)
+    seen = _Seen(Expr(s.im), inside.magnitude(), v.magnitude())
     reactive = _reactive_power(m, port, t, limits, seen, tau)
     i_ref = limited(limits, active, reactive)
     v_c = _current_control(m, port, t, u, frame.w, i_ref)
     transformer_equation(m, t, port, v_c, u, frame.w)
-    asked = ca.sqrt(active**2 + reactive**2) / limits.I_max
+    asked = sqrt(active**2 + reactive**2) / limits.I_max
     return Following(frame, i / t.ratio, inside.magnitude(), i.magnitude(), asked)
 
 
-def _active_power(m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, P: ca.SX, tau: ca.SX) -> ca.SX:
+def _active_power(m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, P: Expr, tau: Expr) -> Expr:
     """Active current that the PI controller asks for [pu, S_n]."""
     with m.scope("active_power"):
         K_p = m.parameter(
@@ -74,14 +73,12 @@ def _active_power(m: ModelBuilder, port: DevicePort, t: Transformer, limits: Lim
 class _Seen:
     """Reactive power at the bus, magnitudes of the converter's and of the bus voltage [pu]."""
 
-    Q: ca.SX
-    u_c: ca.SX
-    v: ca.SX
+    Q: Expr
+    u_c: Expr
+    v: Expr
 
 
-def _reactive_power(
-    m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, seen: _Seen, tau: ca.SX
-) -> ca.SX:
+def _reactive_power(m: ModelBuilder, port: DevicePort, t: Transformer, limits: Limits, seen: _Seen, tau: Expr) -> Expr:
     """Reactive current that is asked for [pu, S_n]: a PI controller, and what a low voltage adds."""
     with m.scope("reactive_power"):
         mode = m.parameter(
@@ -94,18 +91,18 @@ def _reactive_power(
         U_ref = m.calculated("U_ref", t.start.v_c.magnitude(), "pu", "Reference of the operating point", base="S_n")
         change = m.parameter("delta_ref", 0, "pu", "Change of the reference", base="S_n", tunable=True)
         by_q = mode < 0.5
-        controlled = ca.if_else(by_q, seen.Q, seen.u_c)
-        start = ca.if_else(by_q, Q_ref, U_ref)
+        controlled = if_else(by_q, seen.Q, seen.u_c)
+        start = if_else(by_q, Q_ref, U_ref)
         slow = low_pass(m, "measured", controlled, tau, start)
         high, low = _support(m)
-        error = ca.if_else(seen.v < low, 0, slow - start - change)
+        error = if_else(seen.v < low, 0, slow - start - change)
         x = m.state("x", t.start.i.im, "pu", "Integrator, reactive current", base="S_n")
         _integrate(m, port, x, K_i * error, limits.reactive)
         asked = clamp(K_p * error + clamp(x, -limits.reactive, limits.reactive), -limits.reactive, limits.reactive)
         return asked - limits.I_max * clamp((high - seen.v) / (high - low), 0, 1)
 
 
-def _support(m: ModelBuilder) -> tuple[ca.SX, ca.SX]:
+def _support(m: ModelBuilder) -> tuple[Expr, Expr]:
     """Bus voltages [pu] at which the support begins, and at which all current is reactive."""
     with m.scope("support"):
         high = m.parameter("V_1", 0.95, "pu", "Voltage below which reactive current is added", base="bus", source=COLIB)
@@ -115,13 +112,13 @@ def _support(m: ModelBuilder) -> tuple[ca.SX, ca.SX]:
         return high, low
 
 
-def _integrate(m: ModelBuilder, port: DevicePort, x: ca.SX, rate: ca.SX, most: ca.SX) -> None:
+def _integrate(m: ModelBuilder, port: DevicePort, x: Expr, rate: Expr, most: Expr) -> None:
     """The integrator stands still at its limit; behind an open breaker it returns to 0."""
-    outward = ca.logic_or(ca.logic_and(x > most, rate > 0), ca.logic_and(x < -most, rate < 0))
-    m.derivative(x, ca.if_else(outward, 0, rate) * port.connected - x / BREAKER_TIME * (1 - port.connected))
+    outward = logic_or(logic_and(x > most, rate > 0), logic_and(x < -most, rate < 0))
+    m.derivative(x, if_else(outward, 0, rate) * port.connected - x / BREAKER_TIME * (1 - port.connected))
 
 
-def _current_control(m: ModelBuilder, port: DevicePort, t: Transformer, u: Phasor, w: ca.SX, i_ref: Phasor) -> Phasor:
+def _current_control(m: ModelBuilder, port: DevicePort, t: Transformer, u: Phasor, w: Expr, i_ref: Phasor) -> Phasor:
     """Voltage of the converter [pu, S_n]: PI controller, decoupling, and the voltage along the frame fed forward."""
     with m.scope("current_control"):
         K_p = m.parameter("K_p", 0.4584, "pu", "Proportional gain", base="S_n", minimum=0.01, source=COLIB)

@@ -1,7 +1,5 @@
 """Both variants: at a bus whose voltage is instantaneous, and at one of a network of admittances."""
 
-import casadi as ca
-
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
 from fmus.converter_parts.usual import FOLLOWING
 from fmus.gfl_l2ep.control import Following, following_converter
@@ -10,6 +8,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, motion, phasor_builder
 from fmus.toolchain.port import declare_port_outputs, device_port
+from fmus.toolchain.symbols import Expr
 
 S_N, P_0 = 2400.0, 0.83
 """Default rating [MVA] and dispatch [pu]: those of a wind park of the benchmark."""
@@ -52,7 +51,7 @@ def gfl_l2ep_phasor() -> Model:
         moving = motion(m, "slow", found.into_bus, start, "Current into the bus")
     turning = port.omega_b * (found.frame.w - 1)
 
-    def emf(time: ca.SX) -> Phasor:
+    def emf(time: Expr) -> Phasor:
         current = (found.into_bus + moving * time).rotated(found.frame.theta + turning * time)
         return seen.after(time) + BEHIND * current
 

@@ -5,11 +5,10 @@ grid's side: u = v/r and i = r·i_bus, per unit on S_n. Names of the benchmark: 
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.toolchain.frames import Phasor, QdState, power, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort
+from fmus.toolchain.symbols import Expr
 
 COLIB = "COLIB, four-VSC benchmark (Van Cutsem 2023), a wind park"
 
@@ -18,7 +17,7 @@ COLIB = "COLIB, four-VSC benchmark (Van Cutsem 2023), a wind park"
 class Start:
     """The operating point: frame [rad], u and i in it [pu, S_n], P + jQ at the bus, voltage of the converter."""
 
-    theta: ca.SX
+    theta: Expr
     u: Phasor
     i: Phasor
     s: Phasor
@@ -29,9 +28,9 @@ class Start:
 class Transformer:
     """Resistance and reactance [pu, S_n], ratio at the grid's side, the operating point, and the current's state."""
 
-    R: ca.SX
-    X: ca.SX
-    ratio: ca.SX
+    R: Expr
+    X: Expr
+    ratio: Expr
     start: Start
     i: QdState
 
@@ -49,7 +48,7 @@ def declare_transformer(m: ModelBuilder, port: DevicePort) -> Transformer:
         return Transformer(R, X, ratio, start, qd_state(m, "i", inside, "Current of the converter"))
 
 
-def transformer_equation(m: ModelBuilder, t: Transformer, port: DevicePort, v_c: Phasor, u: Phasor, w: ca.SX) -> None:
+def transformer_equation(m: ModelBuilder, t: Transformer, port: DevicePort, v_c: Phasor, u: Phasor, w: Expr) -> None:
     """(X/ω_b)·di/dt = v_c − u − (R + j·w·X)·i; behind an open breaker the current fades.
 
     ``port``: the port, which gives the breaker's position; ``v_c``, ``u``: voltage of the converter, and of the bus

@@ -1,15 +1,14 @@
 """Whether the PLL runs: it stands while the voltage is low, and runs again only once the voltage is clearly back."""
 
-import casadi as ca
-
 from fmus.gfl_l2ep.electrical import COLIB
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, if_else
 
 MEMORY = 1e-3
 """Time constant [s] of the state that remembers; it passes the middle 0.7 ms after a threshold."""
 
 
-def running(m: ModelBuilder, v: ca.SX) -> ca.SX:
+def running(m: ModelBuilder, v: Expr) -> Expr:
     """1 while the PLL runs, 0 while it stands: below ``V_low``, and from there until ``V_high``.
 
     ``v``: magnitude of the bus voltage [pu]."""
@@ -20,6 +19,6 @@ def running(m: ModelBuilder, v: ca.SX) -> ca.SX:
         high = m.parameter("V_high", 0.5, "pu", "Voltage above which it runs again", base="bus", source=COLIB)
         m.require(high - low, "pll.freezing.V_high must be above pll.freezing.V_low")
         awake = m.state("awake", 1.0, "1", "Memory of the thresholds: the PLL runs above 0.5")
-        runs = ca.if_else(awake > 0.5, 1.0, 0.0)
-        m.derivative(awake, (ca.if_else(v < low, 0.0, ca.if_else(v > high, 1.0, runs)) - awake) / MEMORY)
+        runs = if_else(awake > 0.5, 1.0, 0.0)
+        m.derivative(awake, (if_else(v < low, 0.0, if_else(v > high, 1.0, runs)) - awake) / MEMORY)
     return runs

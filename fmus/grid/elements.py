@@ -3,14 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.grid.names import injection_names
 from fmus.grid.network import OPEN_CHARGING, SMALLEST_REACTANCE, Line, Load, Network, Port, Shunt
 from fmus.toolchain.frames import ZERO, Phasor, phasor_derivative, phasor_state, polar, power
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME
 from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
+from fmus.toolchain.symbols import Expr, Scalar
 
 
 @dataclass
@@ -19,8 +18,8 @@ class Bus:
 
     v_0: Phasor
     injected: Phasor
-    G: ca.SX
-    B: ca.SX
+    G: Expr
+    B: Expr
     v: Phasor = ZERO
 
 
@@ -36,12 +35,12 @@ class Branch:
     current: Phasor
     drawn: Phasor
     R: Scalar
-    X: ca.SX
+    X: Expr
     from_bus: str
     to_bus: str | None = None
     ratio: Phasor | None = None
-    connected: ca.SX | None = None
-    capacitor: tuple[Phasor, ca.SX] | None = None
+    connected: Expr | None = None
+    capacitor: tuple[Phasor, Expr] | None = None
 
 
 @dataclass(frozen=True)
@@ -51,11 +50,11 @@ class DeclaredLoad:
     G_0: Scalar
     B_0: Scalar
     G: Scalar
-    scale: ca.SX
+    scale: Expr
     branches: list[Branch]
 
 
-Inductor = Callable[[ModelBuilder, Bus, str, ca.SX, Scalar], list[Branch]]
+Inductor = Callable[[ModelBuilder, Bus, str, Expr, Scalar], list[Branch]]
 """Puts an inductor of reactance X [pu, 100 MVA] between a bus and earth; the bus feeds ``scale`` times its current."""
 
 
@@ -64,11 +63,11 @@ class LineValues:
     """Parameters of a line: series impedance, ratio at the from side (None without one), 1 or 0 where it is open,
     series capacitor (None without one)."""
 
-    R: ca.SX
-    X: ca.SX
+    R: Expr
+    X: Expr
     ratio: Phasor | None
-    connected: ca.SX
-    X_C: ca.SX | None = None
+    connected: Expr
+    X_C: Expr | None = None
 
 
 def declare_bus(m: ModelBuilder, name: str) -> Bus:
@@ -76,7 +75,7 @@ def declare_bus(m: ModelBuilder, name: str) -> Bus:
     with m.scope(name):
         magnitude = m.parameter("v_0", 1.0, "pu", "Power flow: voltage magnitude", base="bus", minimum=0.1, maximum=2.0)
         angle = m.parameter("theta_0", 0.0, "rad", "Power flow: voltage angle")
-    return Bus(polar(magnitude, angle), ZERO, ca.SX(0), ca.SX(0))
+    return Bus(polar(magnitude, angle), ZERO, Expr(0), Expr(0))
 
 
 def declare_port(m: ModelBuilder, port: Port, buses: dict[str, Bus]) -> Phasor:
@@ -104,7 +103,7 @@ def declare_injection(m: ModelBuilder, name: str, buses: dict[str, Bus]) -> None
 def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> LineValues:
     """Declare the parameters of a π section and add its charging to both buses."""
 
-    def parameter(name: str, value: float, unit: str, text: str, minimum: float | None, maximum: float | None) -> ca.SX:
+    def parameter(name: str, value: float, unit: str, text: str, minimum: float | None, maximum: float | None) -> Expr:
         base = SYSTEM_BASE if unit == "pu" and name != "tap" else "bus" if unit == "pu" else ""
         return m.parameter(
             line.variable(name), value, unit, f"{text} of line {line.name}", base=base, minimum=minimum,
@@ -116,7 +115,7 @@ def declare_line_values(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> L
     X = parameter("X", line.X, "pu", "Reactance", least, most)
     R = parameter("R", line.R, "pu", "Resistance", *((None, 0) if line.R < 0 else (0, None)))
     connected = m.switch(line.variable("connected"), True, f"Line {line.name} is closed at both ends", tunable=True)
-    ratio, turns = None, ca.SX(1)
+    ratio, turns = None, Expr(1)
     if line.has_ratio:
         turns = parameter("tap", line.tap, "1", "Magnitude of the ratio at the from side", 0.1, 10)
         ratio = polar(turns, parameter("shift", line.shift, "rad", "Phase shift at the from side", None, None))
@@ -152,7 +151,7 @@ def declare_line(m: ModelBuilder, line: Line, buses: dict[str, Bus]) -> Branch:
     )  # fmt: skip
 
 
-def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar) -> list[Branch]:
+def inductor_state(m: ModelBuilder, bus: Bus, name: str, X: Expr, scale: Scalar) -> list[Branch]:
     """An inductor whose state is its current at scale 1.
 
     The bus feeds ``scale`` times this current. A load that is switched off and on again therefore comes back without a
@@ -264,7 +263,7 @@ def declare_network_outputs(
         declare_power(m, port.name, buses[port.bus].v, current, *texts)
 
 
-def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omega_b: ca.SX) -> None:
+def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omega_b: Expr) -> None:
     """(X/ω_b)·di/dt = v_from/t − v_to − (R + jX)·i; where the line is open, di/dt = −i/τ.
 
     ``branch``: with its current as a state; ``buses``: by name, with their voltages; ``omega_b``: base angular
@@ -286,7 +285,7 @@ def branch_equation(m: ModelBuilder, branch: Branch, buses: dict[str, Bus], omeg
     phasor_derivative(m, branch.current, rate)
 
 
-def _capacitor_equation(m: ModelBuilder, branch: Branch, omega_b: ca.SX) -> None:
+def _capacitor_equation(m: ModelBuilder, branch: Branch, omega_b: Expr) -> None:
     """dv/dt = ω_b·(X_C·i − j·v); where the line is open its capacitor is bypassed, and dv/dt = −v/τ."""
     assert branch.capacitor is not None
     assert branch.connected is not None

@@ -3,13 +3,12 @@
 In an EMT network its current is a state; once the fault is over the current fades within a millisecond, as that of a
 line which opens. In a network of phasors it is an admittance."""
 
-import casadi as ca
-
 from fmus.grid.element_data import SMALLEST_REACTANCE
 from fmus.grid.elements import Branch, Bus
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE
+from fmus.toolchain.symbols import Expr
 
 
 def declare_fault(m: ModelBuilder, bus: str, buses: dict[str, Bus]) -> Branch:
@@ -38,7 +37,7 @@ def declare_fault_outputs(m: ModelBuilder, bus: str, current: Phasor) -> None:
         m.output("i_im", current.im, "pu", "Current into the fault, imaginary part, network frame", base=SYSTEM_BASE)
 
 
-def _declare_values(m: ModelBuilder, bus: str) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _declare_values(m: ModelBuilder, bus: str) -> tuple[Expr, Expr, Expr]:
     with m.scope(f"{bus}.fault"):
         return (
             m.parameter("R", 0.0, "pu", f"Resistance of a fault at {bus}", base=SYSTEM_BASE, minimum=0, tunable=True),

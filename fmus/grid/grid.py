@@ -3,7 +3,7 @@
 A bus with capacitance has its voltage as a state. A bus without capacitance has v = Σ i / G, directly from the currents
 that the devices inject: the FMU has direct feed-through there, and declares it."""
 
-import casadi as ca
+from math import pi
 
 from fmus.grid.elements import (
     Branch,
@@ -25,13 +25,14 @@ from fmus.grid.three_winding import declare_transformer, declare_winding_powers,
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr
 
 
 def grid(network: Network) -> Model:
     """Build the model of a network; parameters are named after its elements (``X_<line>``, ``<load>.P``)."""
     m = ModelBuilder(network.name, f"EMT network {network.name} in the frame turning at ω_b", kind="network")
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
-    omega_b = 2 * ca.pi * f_n
+    omega_b = 2 * pi * f_n
     buses = {bus: declare_bus(m, bus) for bus in network.buses}
     fed = [declare_port(m, port, buses) for port in network.ports]
     lines = [declare_line(m, line, buses) for line in network.lines]
@@ -70,7 +71,7 @@ def grid(network: Network) -> Model:
     return m.build(integrator="sdirk" if stiff else "runge_kutta")
 
 
-def _bus_voltage(m: ModelBuilder, name: str, bus: Bus, omega_b: ca.SX, network: Network) -> None:
+def _bus_voltage(m: ModelBuilder, name: str, bus: Bus, omega_b: Expr, network: Network) -> None:
     """(B/ω_b)·dv/dt = Σ i − (G + jB)·v, or v = Σ i / G where there is no capacitance."""
     dynamic = network.has_capacitance(name)
     if network.loads_decide(name):

@@ -16,13 +16,12 @@ implicitly."""
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.grid.element_data import LEAST_LOW_VOLTAGE, Load, Zip
 from fmus.grid.elements import Bus, DeclaredLoad
 from fmus.toolchain.frames import ZERO, Phasor, phasor_derivative, phasor_state, power
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE
+from fmus.toolchain.symbols import Expr, Scalar, fmax
 
 RECOVERY_TIME = 1e-3
 """Default of τ [s]: its pole lies far above all electromechanical modes and well below the communication rate."""
@@ -56,9 +55,9 @@ class FollowingLoad:
     bus: Bus
     load: DeclaredLoad
     correction: Phasor
-    tau: ca.SX
-    v_min: ca.SX | None
-    delayed: tuple[Phasor, ca.SX] | None
+    tau: Expr
+    v_min: Expr | None
+    delayed: tuple[Phasor, Expr] | None
     omega_b: Scalar | None
 
 
@@ -135,7 +134,7 @@ def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
 def _wanted(m: ModelBuilder, load: FollowingLoad) -> Phasor:
     """(Y' − Y)·v: what the law draws more than the admittance."""
     v, data = load.bus.v, load.data
-    w = v.magnitude() if load.v_min is None else ca.fmax(v.magnitude(), load.v_min)
+    w = v.magnitude() if load.v_min is None else fmax(v.magnitude(), load.v_min)
     ratio = load.bus.v_0.magnitude() / w
     deviation = _frequency_deviation(load)
     G: Scalar = 0.0
@@ -147,11 +146,11 @@ def _wanted(m: ModelBuilder, load: FollowingLoad) -> Phasor:
     return v * G if not data.reactive_follows else v * Phasor(G, B)
 
 
-def _of_law(law: Zip, ratio: ca.SX, k: float, deviation: Scalar) -> Scalar:
+def _of_law(law: Zip, ratio: Expr, k: float, deviation: Scalar) -> Scalar:
     """Admittance by a law, relative to that at v_0; ``ratio`` is v_0/v."""
     terms = [
         term if share == 1 else share * term
-        for share, term in ((law.z, ca.SX(1)), (law.i, ratio), (law.p, ratio**2))
+        for share, term in ((law.z, Expr(1)), (law.i, ratio), (law.p, ratio**2))
         if share
     ]
     total = terms[0] if len(terms) == 1 else sum(terms[1:], terms[0])
@@ -171,7 +170,7 @@ def _recovery_time(load: Load, phasors: bool) -> float:
     return POWER_RECOVERY_TIME if load.active.p or load.reactive.p else RECOVERY_TIME
 
 
-def _delayed_voltage(m: ModelBuilder, bus: Bus) -> tuple[Phasor, ca.SX]:
+def _delayed_voltage(m: ModelBuilder, bus: Bus) -> tuple[Phasor, Expr]:
     lag = m.parameter(
         "T_f", FREQUENCY_TIME, "s", "Time constant of the frequency that the load feels", minimum=5e-3, maximum=10.0
     )

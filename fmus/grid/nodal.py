@@ -4,12 +4,11 @@ data, by the kernel of the model."""
 from collections.abc import Callable
 from heapq import heapify, heappop, heappush
 
-import casadi as ca
-
 from fmus.toolchain.frames import ZERO, Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.nodes import LARGEST_REST
+from fmus.toolchain.symbols import Expr, fabs, fmax
 
 Admittances = dict[str, dict[str, Phasor]]
 """Rows and columns by bus; the pattern is symmetric."""
@@ -31,19 +30,19 @@ def solve(Y: Admittances, currents: dict[str, Phasor], *, checked: bool = False)
     voltages = _solve(Y, currents)
     if not checked:
         return voltages
-    worst = ca.SX(0)
+    worst = Expr(0)
     for bus, row in Y.items():
         rest, size = -currents[bus], _size(currents[bus])
         for other, y in row.items():
             term = y * voltages[other]
             rest, size = rest + term, size + _size(term)
-        worst = ca.fmax(worst, _size(rest) - LARGEST_REST * size)
+        worst = fmax(worst, _size(rest) - LARGEST_REST * size)
     holds = worst <= 0
     return {bus: Phasor(v.re / holds, v.im / holds) for bus, v in voltages.items()}
 
 
-def _size(value: Phasor) -> ca.SX:
-    return ca.fabs(value.re) + ca.fabs(value.im)
+def _size(value: Phasor) -> Expr:
+    return fabs(value.re) + fabs(value.im)
 
 
 def _solve(Y: Admittances, currents: dict[str, Phasor]) -> dict[str, Phasor]:

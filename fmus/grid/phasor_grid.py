@@ -9,9 +9,8 @@ Elements, parameters and outputs are those of `grid`. Constant-impedance loads, 
 described there."""
 
 from functools import partial
+from math import pi
 from typing import Literal
-
-import casadi as ca
 
 from fmus.grid.elements import (
     Branch,
@@ -33,9 +32,10 @@ from fmus.grid.three_winding import add_windings, declare_winding_powers, declar
 from fmus.toolchain.catalogue import SKETCH
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import phasor_builder
 from fmus.toolchain.port_variables import SYSTEM_BASE
+from fmus.toolchain.symbols import Expr, Scalar
 
 LEAST_CONDUCTANCE = 1e-12
 """Conductance to earth [pu, 100 MVA] of a bus that has no other admittance to earth: where all its lines open, its
@@ -68,9 +68,9 @@ def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) ->
     nothing is solved."""
     m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency", kind="network")
     following: list[FollowingLoad] = []
-    omega_b: ca.SX | None = None
+    omega_b: Expr | None = None
     if any(load.follows and (load.k_pf or load.k_qf) for load in network.loads):
-        omega_b = 2 * ca.pi * m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
+        omega_b = 2 * pi * m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     buses = {bus: declare_bus(m, bus) for bus in network.buses}
     Y: Admittances = {bus: {} for bus in buses}
     sources = [_declare_source(m, port, buses, Y) for port in network.ports]
@@ -142,7 +142,7 @@ def _declare_source(m: ModelBuilder, port: Port, buses: dict[str, Bus], Y: Admit
     return e, y
 
 
-def _susceptance(m: ModelBuilder, bus: Bus, name: str, X: ca.SX, scale: Scalar) -> list[Branch]:
+def _susceptance(m: ModelBuilder, bus: Bus, name: str, X: Expr, scale: Scalar) -> list[Branch]:
     """An inductor between a bus and earth, as an admittance."""
     bus.B -= scale / X
     return []

@@ -8,8 +8,6 @@ It has a solution wherever that matrix is positive definite, also where one X_k 
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.grid.element_data import ThreeWinding
 from fmus.grid.elements import Bus, declare_power
 from fmus.grid.nodal import Admittances, add_admittance
@@ -17,6 +15,7 @@ from fmus.toolchain.frames import Phasor, phasor_derivative, polar
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME
 from fmus.toolchain.port_variables import SYSTEM_BASE
+from fmus.toolchain.symbols import Expr
 
 _ONE = Phasor(1.0, 0.0)
 
@@ -28,7 +27,7 @@ class Windings:
     data: ThreeWinding
     Z: tuple[Phasor, Phasor, Phasor]
     ratio: tuple[Phasor, Phasor, Phasor]
-    connected: ca.SX
+    connected: Expr
     currents: tuple[Phasor, Phasor, Phasor] | None = None
 
 
@@ -47,7 +46,7 @@ def declare_windings(m: ModelBuilder, data: ThreeWinding) -> Windings:
                 turns = polar(tap, m.parameter(f"shift_{n}", data.shift[k], "rad", f"Phase shift at winding {n}"))
             ratio.append(turns)
         connected = m.switch("connected", True, "The transformer is closed at all windings", tunable=True)
-    a, b, c = (ca.SX(z.im) for z in Z)
+    a, b, c = (Expr(z.im) for z in Z)
     rule = f"transformer {data.name}: the reactances of any two windings, and of all three, must be those of inductors"
     m.require(a + c, rule)
     m.require(a * b + b * c + c * a, rule)
@@ -72,7 +71,7 @@ def declare_transformer(m: ModelBuilder, data: ThreeWinding, buses: dict[str, Bu
     return Windings(data, windings.Z, windings.ratio, windings.connected, currents)
 
 
-def transformer_equations(m: ModelBuilder, windings: Windings, buses: dict[str, Bus], omega_b: ca.SX) -> None:
+def transformer_equations(m: ModelBuilder, windings: Windings, buses: dict[str, Bus], omega_b: Expr) -> None:
     """Give both currents their rates; where the transformer is open they fade, as a line's current does.
 
     ``windings``: the declared transformer, with its currents; ``buses``: by name; they give the voltages; ``omega_b``:
@@ -81,7 +80,7 @@ def transformer_equations(m: ModelBuilder, windings: Windings, buses: dict[str, 
     behind = [buses[bus].v / t for bus, t in zip(windings.data.buses, windings.ratio, strict=True)]
     drops = [z * i for z, i in zip(windings.Z, windings.currents, strict=True)]
     over = [behind[k] - behind[2] - drops[k] + drops[2] for k in (0, 1)]
-    a, b, c = (ca.SX(z.im) for z in windings.Z)
+    a, b, c = (Expr(z.im) for z in windings.Z)
     factor = windings.connected * omega_b / (a * b + b * c + c * a)
     fading = (1 - windings.connected) / BREAKER_TIME
     for current, own, other, X in (

@@ -22,7 +22,7 @@ TWO_AREA_PHASOR = replace(TWO_AREA, name="two_area_phasor_grid")
 
 def two_area_grid(network: Network = TWO_AREA) -> Model:
     """EMT line and constant-impedance loads of the two-area system."""
-    from fmus.grid.grid import grid  # noqa: PLC0415 - imports CasADi, without which the network can be read
+    from fmus.grid.grid import grid  # noqa: PLC0415 - a network is read without equations
 
     return grid(network)
 

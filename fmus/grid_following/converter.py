@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.converter_parts.current_control import current_control
 from fmus.converter_parts.filter import APPENDIX, Filter, declare_filter, filter_equations
 from fmus.converter_parts.usual import FOLLOWING
@@ -14,6 +12,7 @@ from fmus.toolchain.frames import Phasor, QdState, power, qd_state
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
+from fmus.toolchain.symbols import Expr
 
 S_N, P_0 = 1500.0, 0.9
 """Default rating [MVA] and dispatch [pu]: those of the two-area system's converter, whose place it can take."""
@@ -25,8 +24,8 @@ class Signals:
 
     frame: Frame
     limited: Limited
-    u: ca.SX
-    i_s: ca.SX
+    u: Expr
+    i_s: Expr
 
 
 def grid_following_converter() -> Model:
@@ -66,7 +65,7 @@ def declare_signals(m: ModelBuilder, signals: Signals) -> None:
     )
 
 
-def _declare_measurement(m: ModelBuilder, f: Filter) -> tuple[QdState, ca.SX]:
+def _declare_measurement(m: ModelBuilder, f: Filter) -> tuple[QdState, Expr]:
     """Declare the voltage that PLL and feed-forward see, and its lag [s]."""
     with m.scope("feed_forward"):
         tau = m.parameter("tau", 1e-4, "s", "Lag of the voltage of PLL and feed-forward", minimum=1e-5, source=APPENDIX)

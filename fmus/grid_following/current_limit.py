@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.converter_parts.filter import SteadyState
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, sqrt
 
 SOURCE = "Mateu-Barriendos et al. 2024, appendix: 1.1 pu, there for each component"
 SMALLEST = 1e-6
@@ -19,7 +18,7 @@ class Limited:
 
     demanded: Phasor
     allowed: Phasor
-    share: ca.SX
+    share: Expr
 
     @property
     def excess(self) -> Phasor:
@@ -43,24 +42,24 @@ def limited_current(m: ModelBuilder, start: SteadyState, demanded: Phasor) -> Li
         "the power flow asks for more current than current_limit.I_max: lower P_0 or Q_0, or raise S_n",
     )
     square = demanded.re**2 + demanded.im**2
-    together = demanded * (1 / ca.sqrt(ca.fmax(1, square / most**2)))
+    together = demanded * (1 / sqrt(fmax(1, square / most**2)))
     clamped = demanded.clamped(most, most)
     active_first = Phasor(clamped.re, _within(demanded.im, _rest(clamped.re, most)))
     reactive_first = Phasor(_within(demanded.re, _rest(clamped.im, most)), clamped.im)
     chosen = [
-        ca.if_else(priority < 0.5, one, ca.if_else(priority < 1.5, two, three))
+        if_else(priority < 0.5, one, if_else(priority < 1.5, two, three))
         for one, two, three in (
             (together.re, active_first.re, reactive_first.re),
             (together.im, active_first.im, reactive_first.im),
         )
     ]
-    return Limited(demanded, Phasor(*chosen), ca.sqrt(square) / most)
+    return Limited(demanded, Phasor(*chosen), sqrt(square) / most)
 
 
-def _rest(first: Scalar, most: ca.SX) -> ca.SX:
+def _rest(first: Scalar, most: Expr) -> Expr:
     """Largest value of the other component."""
-    return ca.sqrt(ca.fmax(most**2 - first**2, (SMALLEST * most) ** 2))
+    return sqrt(fmax(most**2 - first**2, (SMALLEST * most) ** 2))
 
 
-def _within(value: Scalar, bound: ca.SX) -> ca.SX:
-    return ca.fmin(ca.fmax(value, -bound), bound)
+def _within(value: Scalar, bound: Expr) -> Expr:
+    return fmin(fmax(value, -bound), bound)

@@ -6,14 +6,13 @@ with a fast current control the measured power follows its reference as 1/(1 + s
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.converter_parts.filter import APPENDIX, FilterData
 from fmus.grid_following.current_limit import Limited, limited_current
 from fmus.toolchain.blocks import low_pass
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
+from fmus.toolchain.symbols import Expr, Scalar, if_else
 
 CHOSEN = "chosen here: about six times slower than the PLL"
 TRACKING_TIME = 0.01
@@ -25,8 +24,8 @@ class Measured:
     """P + jQ and voltage magnitude at the capacitor branch [pu, S_n], and the PLL's frequency [pu, f_n]."""
 
     s: Phasor
-    u: ca.SX
-    w: ca.SX
+    u: Expr
+    w: Expr
 
 
 def outer_control(
@@ -40,8 +39,8 @@ def outer_control(
     start = f.initial
     with m.scope("measurement"):
         tau = m.parameter("tau", 0.01, "s", "Lag of the measurements of P, Q and u", minimum=1e-3, source="chosen here")
-        P_f = low_pass(m, "P_f", ca.SX(measured.s.re), tau, start.s.re)
-        Q_f = low_pass(m, "Q_f", ca.SX(measured.s.im), tau, start.s.im)
+        P_f = low_pass(m, "P_f", Expr(measured.s.re), tau, start.s.re)
+        Q_f = low_pass(m, "Q_f", Expr(measured.s.im), tau, start.s.im)
         U_f = low_pass(m, "U_f", measured.u, tau, start.u.re)
     active, K_P = _active_error(m, start.s.re, P_f, measured.w)
     reactive, K_Q = _reactive_error(m, start.s.im, start.u.re, Q_f, U_f)
@@ -61,7 +60,7 @@ def outer_control(
     return limited, port.through_breaker(limited.allowed, standby)
 
 
-def _active_error(m: ModelBuilder, P_0: Scalar, P_f: ca.SX, w: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _active_error(m: ModelBuilder, P_0: Scalar, P_f: Expr, w: Expr) -> tuple[Expr, Expr]:
     """Error of the active power [pu] with the droop's part, and the integral gain [1/s]."""
     with m.scope("active_power"):
         tau = m.parameter("tau", 0.1, "s", "Response time", minimum=5e-3, source=CHOSEN)
@@ -76,7 +75,7 @@ def _active_error(m: ModelBuilder, P_0: Scalar, P_f: ca.SX, w: ca.SX) -> tuple[c
     return P_ref + change + enabled * (1 - w_f) / R_f - P_f, 1 / tau
 
 
-def _reactive_error(m: ModelBuilder, Q_0: Scalar, U_0: Scalar, Q_f: ca.SX, U_f: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _reactive_error(m: ModelBuilder, Q_0: Scalar, U_0: Scalar, Q_f: Expr, U_f: Expr) -> tuple[Expr, Expr]:
     """Error of what the mode controls [pu, as reactive power], and the integral gain [1/s]."""
     with m.scope("reactive_power"):
         mode = m.parameter(
@@ -95,9 +94,9 @@ def _reactive_error(m: ModelBuilder, Q_0: Scalar, U_0: Scalar, Q_f: ca.SX, U_f: 
         U_ref = m.calculated("U_ref", U_0, "pu", "Voltage reference of the operating point", base="S_n")
     of_q, of_u = Q_ref + change_Q - Q_f, U_ref + change_U - U_f
     droop = (of_q + of_u / R_V) / (1 + X_s / R_V)
-    return ca.if_else(mode < 0.5, of_q, ca.if_else(mode < 1.5, of_u / X_s, droop)), 1 / tau
+    return if_else(mode < 0.5, of_q, if_else(mode < 1.5, of_u / X_s, droop)), 1 / tau
 
 
-def _unless_outward(rate: Scalar, excess: Scalar) -> ca.SX:
+def _unless_outward(rate: Scalar, excess: Scalar) -> Expr:
     """The integrator's rate; 0 where it would lead further beyond the limit."""
-    return ca.if_else(rate * excess > 0, 0, rate)
+    return if_else(rate * excess > 0, 0, rate)

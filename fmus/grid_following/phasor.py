@@ -4,8 +4,6 @@ The filter's voltages are algebraic and the current control is a lag; PLL and ou
 variant. Its emf is the voltage that the converter's current gives at the capacitor, with an extrapolated bus voltage.
 """
 
-import casadi as ca
-
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
 from fmus.converter_parts.filter import APPENDIX, FilterData, declare_filter_data
 from fmus.converter_parts.usual import FOLLOWING
@@ -16,6 +14,7 @@ from fmus.toolchain.frames import Phasor, power, qd_state
 from fmus.toolchain.model import Model
 from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, motion, phasor_builder
 from fmus.toolchain.port import device_port
+from fmus.toolchain.symbols import Expr
 
 
 def grid_following_converter_phasor() -> Model:
@@ -44,7 +43,7 @@ def grid_following_converter_phasor() -> Model:
         i_s.set_derivative(m, (i_ref - i_s.value) / tau)
         moving = motion(m, "slow", i_s.value, f.initial.i_s, "Current of the converter")
 
-    def emf(time: ca.SX) -> Phasor:
+    def emf(time: Expr) -> Phasor:
         i_then = (i_s.value + moving * time).rotated(frame.theta + port.omega_b * (frame.w - 1) * time)
         return _capacitor_voltage(f, seen.after(time), i_then)
 

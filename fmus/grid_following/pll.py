@@ -1,11 +1,11 @@
 """Phase-locked loop in the synchronous reference frame (SRF-PLL): the frame in which a voltage has no d component."""
 
 from dataclasses import dataclass
-
-import casadi as ca
+from math import pi
 
 from fmus.toolchain.frames import Phasor
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar
 
 STRUCTURE = "structure and damping: Chung 2000; 10 Hz chosen here"
 
@@ -14,8 +14,8 @@ STRUCTURE = "structure and damping: Chung 2000; 10 Hz chosen here"
 class Frame:
     """The converter's frame: its angle in the network frame [rad], a state, and its frequency [pu, f_n]."""
 
-    theta: ca.SX
-    w: ca.SX
+    theta: Expr
+    w: Expr
 
 
 @dataclass(frozen=True)
@@ -30,10 +30,10 @@ class LoopDefaults:
 def phase_locked_loop(
     m: ModelBuilder,
     angle_0: Scalar,
-    omega_b: ca.SX,
+    omega_b: Expr,
     measured: Phasor,
     defaults: LoopDefaults = LoopDefaults(),
-    running: ca.SX | None = None,
+    running: Expr | None = None,
 ) -> Frame:
     """Declare the loop: w = 1 + k_p·u_⊥ + x, dx/dt = k_i·u_⊥, dθ/dt = ω_b·(w − 1), with u_⊥ = −u_d.
 
@@ -50,7 +50,7 @@ def phase_locked_loop(
         xi = m.parameter(
             "xi", defaults.xi, "1", "Damping ratio at 1 pu", minimum=0.05, maximum=5, source=defaults.source
         )
-        omega_0 = 2 * ca.pi * f_0
+        omega_0 = 2 * pi * f_0
         x = m.state("x", 0, "pu", "Integrator, deviation of the frequency", base="f_n")
         theta = m.state("theta", angle_0, "rad", "Angle of the converter's frame in the network frame")
         w = 1 + 2 * xi * omega_0 / omega_b * seen + x

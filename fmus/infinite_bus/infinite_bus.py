@@ -4,12 +4,13 @@ A voltage dip or a load step can be set by tunable parameters during the run, or
 change no parameter while they run. A clock inside the FMU compares these times. The clock runs only if it is enabled,
 because a running clock is a state that never stands still."""
 
-import casadi as ca
+from math import pi
 
 from fmus.toolchain.frames import Phasor, current_of_power, phasor_derivative, phasor_state, polar, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE, SYSTEM_BASE_MVA
+from fmus.toolchain.symbols import Expr
 
 TOLERANCE = 1e-9
 """A dip or step happens this much before its time [s]: far more than the clock's rounding, far less than an internal
@@ -25,7 +26,7 @@ def infinite_bus() -> Model:
         "infinite_bus", "Infinite bus behind an impedance, with a load, a voltage dip and a load step", kind="network"
     )
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
-    omega_b = 2 * ca.pi * f_n
+    omega_b = 2 * pi * f_n
     v_0, i_0 = _operating_point(m)
     injected = Phasor(
         m.input("i_re", "pu", "Current injected by the device, real part", base=SYSTEM_BASE),
@@ -64,7 +65,7 @@ def _operating_point(m: ModelBuilder) -> tuple[Phasor, Phasor]:
     return voltage, current_of_power(P_0, Q_0, voltage)
 
 
-def _clock(m: ModelBuilder) -> ca.SX:
+def _clock(m: ModelBuilder) -> Expr:
     """Time since the start [s], or always 0 if the clock is not enabled."""
     with m.scope("clock"):
         runs = m.switch("runs", False, "What has a time happens at it; without the clock nothing does")
@@ -73,11 +74,11 @@ def _clock(m: ModelBuilder) -> ca.SX:
     return t
 
 
-def _reached(t: ca.SX, time: ca.SX) -> ca.SX:
+def _reached(t: Expr, time: Expr) -> Expr:
     return t > time - TOLERANCE
 
 
-def _load(m: ModelBuilder, v_0: Phasor, t: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _load(m: ModelBuilder, v_0: Phasor, t: Expr) -> tuple[Expr, Expr]:
     """Conductance at the start and now."""
     with m.scope("load"):
         P = m.parameter("P", 400.0, "MW", "Active power at the start's voltage", minimum=0)
@@ -88,7 +89,7 @@ def _load(m: ModelBuilder, v_0: Phasor, t: ca.SX) -> tuple[ca.SX, ca.SX]:
     return G_0, G_0 * (scale + step * _reached(t, at))
 
 
-def _source(m: ModelBuilder, start: Phasor, t: ca.SX, omega_b: ca.SX) -> Phasor:
+def _source(m: ModelBuilder, start: Phasor, t: Expr, omega_b: Expr) -> Phasor:
     """The source's voltage, with its own frequency, and reduced in a dip."""
     with m.scope("source"):
         E = m.calculated("E", start.magnitude(), "pu", "Voltage magnitude of the source", base="bus")

@@ -1,8 +1,7 @@
 """Both droops of REGFM_A1 with their power limits: what they give is a frequency and a voltage magnitude."""
 
-import casadi as ca
-
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
 
 SPECIFICATION = "PNNL-32278 (2023), as GridKit's REGFMA quotes it"
 
@@ -11,7 +10,7 @@ RETURN_TIME = 0.01
 which has no linear model."""
 
 
-def active_droop(m: ModelBuilder, P_0: Scalar, Pf: ca.SX) -> ca.SX:
+def active_droop(m: ModelBuilder, P_0: Scalar, Pf: Expr) -> Expr:
     """Declare the P-f droop with Pmax and Pmin; return the frequency [pu].
 
     ω = 1 + mp·(Pref − Pf) + u_max + u_min, where u_max ≤ 0 and u_min ≥ 0 act beyond a limit.
@@ -28,7 +27,7 @@ def active_droop(m: ModelBuilder, P_0: Scalar, Pf: ca.SX) -> ca.SX:
     return 1 + mp * (Pref + change - Pf) + beyond
 
 
-def internal_voltage(m: ModelBuilder, V_0: Scalar, E_0: Scalar, Q_0: Scalar, Qf: ca.SX, Vf: ca.SX) -> ca.SX:
+def internal_voltage(m: ModelBuilder, V_0: Scalar, E_0: Scalar, Q_0: Scalar, Qf: Expr, Vf: Expr) -> Expr:
     """Declare the Q-V droop with Qmax and Qmin and the voltage control; return the internal voltage's magnitude [pu].
 
     ``V_0``, ``E_0``, ``Q_0``: terminal voltage, internal voltage and reactive power of the operating point [pu, S_n];
@@ -48,7 +47,7 @@ def internal_voltage(m: ModelBuilder, V_0: Scalar, E_0: Scalar, Q_0: Scalar, Qf:
     ki = m.parameter("kiqmax", 20.0, "1/s", "Integral gain of Qmax and Qmin; 10 where VFlag is false",
                      minimum=0, source=SPECIFICATION)  # fmt: skip
     Qref = m.calculated("Qref", Q_0, "pu", "Reactive-power reference of the operating point", base="S_n")
-    Vref = m.calculated("Vref", ca.if_else(controlled, V_0, E_0), "pu", "Voltage reference of the operating point",
+    Vref = m.calculated("Vref", if_else(controlled, V_0, E_0), "pu", "Voltage reference of the operating point",
                         base="S_n")  # fmt: skip
     m.require(most - E_0, "the power flow asks for an internal voltage above Emax: lower Q_0 or v_0, or raise S_n")
     m.require(E_0 - least, "the power flow asks for an internal voltage below Emin: raise Q_0 or v_0, or raise S_n")
@@ -57,12 +56,12 @@ def internal_voltage(m: ModelBuilder, V_0: Scalar, E_0: Scalar, Q_0: Scalar, Qf:
     error = command - Vf
     x = m.state("x_V", E_0, "pu", "Integrator of the voltage control", base="S_n")
     m.derivative(x, controlled * _held(x, kiv * error, least, most))
-    return ca.fmin(ca.fmax(ca.if_else(controlled, kpv * error + x, command), least), most)
+    return fmin(fmax(if_else(controlled, kpv * error + x, command), least), most)
 
 
 def _limits(
-    m: ModelBuilder, name: str, most: float, least: float, measured: ca.SX, start: Scalar, kp: ca.SX, ki: ca.SX
-) -> ca.SX:
+    m: ModelBuilder, name: str, most: float, least: float, measured: Expr, start: Scalar, kp: Expr, ki: Expr
+) -> Expr:
     """Declare the upper and the lower limit of P or Q; return what both controllers add [pu].
 
     Each is a proportional-integral controller that only leads back: integrator and output stay on one side of 0."""
@@ -74,12 +73,12 @@ def _limits(
     down = m.state(f"x_{name}max", 0, "pu", f"Integrator of {name}max", base="S_n")
     up = m.state(f"x_{name}min", 0, "pu", f"Integrator of {name}min", base="S_n")
     above, below = high - measured, low - measured
-    m.derivative(down, ca.fmin(ki * above, -down / RETURN_TIME))
-    m.derivative(up, ca.fmax(ki * below, -up / RETURN_TIME))
-    return ca.fmin(kp * above + down, 0) + ca.fmax(kp * below + up, 0)
+    m.derivative(down, fmin(ki * above, -down / RETURN_TIME))
+    m.derivative(up, fmax(ki * below, -up / RETURN_TIME))
+    return fmin(kp * above + down, 0) + fmax(kp * below + up, 0)
 
 
-def _held(x: ca.SX, rate: ca.SX, least: ca.SX, most: ca.SX) -> ca.SX:
+def _held(x: Expr, rate: Expr, least: Expr, most: Expr) -> Expr:
     """The rate of an integrator that stays within two values."""
-    outward = ca.logic_or(ca.logic_and(x >= most, rate > 0), ca.logic_and(x <= least, rate < 0))
-    return ca.if_else(outward, 0, rate)
+    outward = logic_or(logic_and(x >= most, rate > 0), logic_and(x <= least, rate < 0))
+    return if_else(outward, 0, rate)

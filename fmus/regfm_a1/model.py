@@ -2,8 +2,6 @@
 
 Names of parameters and signals are those of the specification (PNNL-32278, September 2023)."""
 
-import casadi as ca
-
 from fmus.converter_parts.usual import FILTER, VOLTAGE_DROOP
 from fmus.regfm_a1.droops import SPECIFICATION, active_droop, internal_voltage
 from fmus.toolchain.blocks import low_pass
@@ -12,6 +10,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import DevicePort, device_port
+from fmus.toolchain.symbols import Expr, fmax, sqrt
 from fmus.toolchain.variables import Usual
 
 S_N, P_0 = 1500.0, 0.9
@@ -64,9 +63,7 @@ def regfm_a1_phasor() -> Model:
     return m.build()
 
 
-def _declare_measurement(
-    m: ModelBuilder, port: DevicePort, P: ca.SX, Q: ca.SX, v: Phasor
-) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _declare_measurement(m: ModelBuilder, port: DevicePort, P: Expr, Q: Expr, v: Phasor) -> tuple[Expr, Expr, Expr]:
     """P, Q [pu, S_n] and V [pu] at the terminal, each through its own lag."""
     s_0 = power(port.v_0, port.i_0)
     lags = {"P": (P, s_0.re), "Q": (Q, s_0.im), "V": (v.magnitude(), port.v_0.magnitude())}
@@ -75,13 +72,13 @@ def _declare_measurement(
         T = m.parameter(
             f"T{name}f", 0.01, "s", f"Lag of the measurement of {name}", minimum=1e-3, source=SPECIFICATION
         )  # fmt: skip
-        found.append(low_pass(m, f"{name}f", ca.SX(signal), T, start))
+        found.append(low_pass(m, f"{name}f", Expr(signal), T, start))
     return found[0], found[1], found[2]
 
 
 def _limited(
     m: ModelBuilder, port: DevicePort, inside: Phasor, v: Phasor, Z: Phasor, e_0: Phasor
-) -> tuple[Phasor, ca.SX]:
+) -> tuple[Phasor, Expr]:
     """The internal voltage that keeps the current within ImaxF, and the current without it in parts of ImaxF.
 
     The specification takes the terminal voltage of the same instant. A port whose emf follows from states alone needs a
@@ -91,11 +88,9 @@ def _limited(
                     source="chosen here; none in the specification")  # fmt: skip
     m.require(ImaxF - port.i_0.magnitude(), "the power flow asks for more current than ImaxF: lower P_0, or raise S_n")
     start = port.v_0.rotated(-e_0.angle())
-    seen = Phasor(
-        low_pass(m, "V_seen_re", ca.SX(v.re), T, start.re), low_pass(m, "V_seen_im", ca.SX(v.im), T, start.im)
-    )
+    seen = Phasor(low_pass(m, "V_seen_re", Expr(v.re), T, start.re), low_pass(m, "V_seen_im", Expr(v.im), T, start.im))
     current = (inside - seen) / Z
     square = (current.re**2 + current.im**2) / ImaxF**2
-    scale = 1 / ca.sqrt(ca.fmax(1, square))
+    scale = 1 / sqrt(fmax(1, square))
     # Exactly the internal voltage where the limit does not act.
-    return inside + Z * current * (scale - 1), ca.sqrt(square)
+    return inside + Z * current * (scale - 1), sqrt(square)

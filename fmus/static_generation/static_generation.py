@@ -6,8 +6,7 @@ would be a damping torque. Well above ω_0 the current stands still: an admittan
 negative conductance of a constant power."""
 
 from dataclasses import dataclass
-
-import casadi as ca
+from math import pi
 
 from fmus.converter_parts.bus_voltage import extrapolated_voltage
 from fmus.toolchain.frames import ZERO, Phasor, phasor_derivative
@@ -15,6 +14,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_phasor_outputs, phasor_builder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, device_port
+from fmus.toolchain.symbols import Expr, fmax
 
 S_N, P_0 = 1500.0, 0.9
 """Default rating [MVA] and dispatch [pu]: those of `gfor` and `gfl`, whose place it takes."""
@@ -32,7 +32,7 @@ class Following:
 
     current: Phasor
     turning: Phasor
-    omega_0: ca.SX
+    omega_0: Expr
 
     def rate(self, port: DevicePort, v: Phasor) -> Phasor:
         """di/dt [pu/s] at a bus voltage [pu]."""
@@ -77,7 +77,7 @@ def static_generation_phasor() -> Model:
     following.follow(m, port, seen.value)
     moving = following.rate(port, seen.value)
 
-    def emf(time: ca.SX) -> Phasor:
+    def emf(time: Expr) -> Phasor:
         return seen.after(time) + Z * (following.current + moving * time)
 
     declare_phasor_outputs(m, port, SourceEmf(behind=emf(-master.size / 2), ahead=emf(master.to_next)), Z)
@@ -97,10 +97,10 @@ def _declare_current(m: ModelBuilder, port: DevicePort) -> Following:
             ("turning", ZERO, "Rate at which the current goes on turning, per ω_0"),
         )
     )
-    return Following(current, turning, 2 * ca.pi * f_0)
+    return Following(current, turning, 2 * pi * f_0)
 
 
 def _wanted(port: DevicePort, v: Phasor) -> Phasor:
     """The current of the operating point [pu, S_n], turned as far as the voltage is."""
-    size = ca.fmax(v.magnitude(), LEAST_VOLTAGE) * port.v_0.magnitude()
+    size = fmax(v.magnitude(), LEAST_VOLTAGE) * port.v_0.magnitude()
     return port.i_0 * v * port.v_0.conjugate() / size

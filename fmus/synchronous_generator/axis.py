@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from functools import reduce
 from operator import add
 
-import casadi as ca
-
-from fmus.toolchain.model_builder import Scalar
 from fmus.toolchain.port import BREAKER_TIME
+from fmus.toolchain.symbols import Expr, Scalar
 
 
 @dataclass(frozen=True)
@@ -18,9 +16,9 @@ class Winding:
 
     ``saturation_current`` [pu] is what iron draws beside the winding's own current."""
 
-    X: ca.SX
-    R: ca.SX
-    psi: ca.SX
+    X: Expr
+    R: Expr
+    psi: Expr
     saturation_current: Scalar = 0.0
 
 
@@ -31,47 +29,47 @@ class Axis:
     ``X_subtransient`` is the reactance of the air gap with every winding a perfect conductor, ``X_between`` that
     between the emf and the bus. An axis without windings has a ``fixed_emf``."""
 
-    X_m: ca.SX
+    X_m: Expr
     windings: tuple[Winding, ...]
-    psi: ca.SX
-    X_subtransient: ca.SX
-    X_between: ca.SX
-    fixed_emf: ca.SX | None = None
+    psi: Expr
+    X_subtransient: Expr
+    X_between: Expr
+    fixed_emf: Expr | None = None
 
     @property
-    def emf(self) -> ca.SX:
+    def emf(self) -> Expr:
         """Flux behind the subtransient reactance [pu]; current and air-gap flux are linear in it and the stator's."""
         if self.fixed_emf is not None:
             return self.fixed_emf
         return reduce(add, (self._weight(winding) * winding.psi for winding in self.windings))
 
     @property
-    def i(self) -> ca.SX:
+    def i(self) -> Expr:
         """Stator current of this axis [pu]."""
         return (self.emf - self.psi) / self.X_between
 
     @property
-    def psi_airgap(self) -> ca.SX:
+    def psi_airgap(self) -> Expr:
         """Flux in the air gap [pu]."""
         return self.emf - self.X_subtransient * self.i
 
-    def current(self, number: int) -> ca.SX:
+    def current(self, number: int) -> Expr:
         """Current of a rotor winding [pu], counted from the slowest, with what iron draws."""
         winding = self.windings[number]
         return (winding.psi - self.psi_airgap) / winding.X + winding.saturation_current
 
-    def current_rate(self, psi_rate: ca.SX, rotor_rates: tuple[ca.SX, ...]) -> ca.SX:
+    def current_rate(self, psi_rate: Expr, rotor_rates: tuple[Expr, ...]) -> Expr:
         """di/dt from the rates of stator flux and windings' fluxes."""
         return (self._emf_rate(rotor_rates) - psi_rate) / self.X_between
 
-    def open_rate(self, rotor_rates: tuple[ca.SX, ...]) -> ca.SX:
+    def open_rate(self, rotor_rates: tuple[Expr, ...]) -> Expr:
         """Rate of the stator flux for which di/dt = −i/τ, as behind an open breaker."""
         return self._emf_rate(rotor_rates) + self.X_between * self.i / BREAKER_TIME
 
-    def _weight(self, winding: Winding) -> ca.SX:
+    def _weight(self, winding: Winding) -> Expr:
         """Part of a winding's flux in the emf."""
         return self.X_subtransient / winding.X
 
-    def _emf_rate(self, rotor_rates: tuple[ca.SX, ...]) -> ca.SX:
+    def _emf_rate(self, rotor_rates: tuple[Expr, ...]) -> Expr:
         parts = [self._weight(w) * rate for w, rate in zip(self.windings, rotor_rates, strict=True)]
-        return reduce(add, parts) if parts else ca.SX(0)
+        return reduce(add, parts) if parts else Expr(0)

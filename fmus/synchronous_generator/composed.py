@@ -4,8 +4,6 @@ A part that is not named is not there: the field voltage and the mechanical torq
 
 from dataclasses import replace
 
-import casadi as ca
-
 from fmus.synchronous_generator.generator import with_controls
 from fmus.synchronous_generator.machine import flux_state
 from fmus.synchronous_generator.parts import NONE, chosen_parts
@@ -15,6 +13,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import phasor_builder
 from fmus.toolchain.port import declare_rating, device_port_of
+from fmus.toolchain.symbols import if_else
 
 S_N, P_0 = 100.0, 0.8
 """Defaults of rating [MVA] and power [pu]."""
@@ -71,6 +70,6 @@ def synchronous_generator_phasor(
     g = parts.machine(m, port, S_n, lambda m, name, start, text: m.algebraic(name))
     with m.scope("machine"):
         with_speed = m.switch("speed_in_emf", not g.at_rated_speed, "Emf is w·e''; else e'', as of rated speed")
-    g = replace(g, emf_speed=ca.if_else(with_speed, g.w, 1))
+    g = replace(g, emf_speed=if_else(with_speed, g.w, 1))
     made = phasor_with_controls(m, port, g, parts.exciter, parts.governor, parts.stabilizer)
     return replace(made, of_parts=True)

@@ -8,7 +8,7 @@ times the reactance X_m: its state exists but has no effect."""
 
 from dataclasses import dataclass
 
-import casadi as ca
+from fmus.toolchain.symbols import Expr, fabs, fmax, fmin, if_else, sqrt
 
 _NOTHING = 1e-9
 """Admittance of a missing branch, as a part of 1/X_m."""
@@ -18,63 +18,63 @@ _NOTHING = 1e-9
 class AxisData:
     """Standard data of one axis; X [pu], T [s], rotor at standstill seen from an open stator."""
 
-    X: ca.SX
-    X1: ca.SX
-    X2: ca.SX
-    X_l: ca.SX
-    T10: ca.SX
-    T20: ca.SX
+    X: Expr
+    X1: Expr
+    X2: Expr
+    X_l: Expr
+    T10: Expr
+    T20: Expr
 
 
 @dataclass(frozen=True)
 class RotorBranches:
     """Leakage reactance and resistance [pu] of the slow (1) and the fast (2) branch."""
 
-    X_1: ca.SX
-    R_1: ca.SX
-    X_2: ca.SX
-    R_2: ca.SX
+    X_1: Expr
+    R_1: Expr
+    X_2: Expr
+    R_2: Expr
 
 
-def classical(a: AxisData, omega_b: ca.SX) -> RotorBranches:
+def classical(a: AxisData, omega_b: Expr) -> RotorBranches:
     """Textbook formulas, which assume that the branches act one after the other."""
     X_m = a.X - a.X_l
-    X_1 = X_m * (a.X1 - a.X_l) / ca.fmax(X_m - a.X1 + a.X_l, _NOTHING * (a.X1 - a.X_l))
+    X_1 = X_m * (a.X1 - a.X_l) / fmax(X_m - a.X1 + a.X_l, _NOTHING * (a.X1 - a.X_l))
     R_1 = (X_m + X_1) / (omega_b * a.T10)
     left = X_m * X_1 - (X_m + X_1) * (a.X2 - a.X_l)
-    X_2 = (a.X2 - a.X_l) * X_m * X_1 / ca.fmax(left, _NOTHING * (a.X2 - a.X_l) * X_1)
+    X_2 = (a.X2 - a.X_l) * X_m * X_1 / fmax(left, _NOTHING * (a.X2 - a.X_l) * X_1)
     R_2 = (X_2 + X_m * X_1 / (X_m + X_1)) / (omega_b * a.T20)
     return RotorBranches(X_1, R_1, X_2, R_2)
 
 
-def exact(a: AxisData, omega_b: ca.SX) -> RotorBranches:
+def exact(a: AxisData, omega_b: Expr) -> RotorBranches:
     """Branches whose operational reactance is exactly X(1+sT')(1+sT'')/((1+sT'_0)(1+sT''_0)).
 
     With T' = T'_0·X'/X and T'' = T''_0·X''/X'. Taking X_l off and inverting leaves the admittance of
     X_m and of both branches; its partial fractions are the branches: s/(ω_b·R + s·X) each."""
     X_m = a.X - a.X_l
     # The time constant of a missing fast branch has no meaning, and must not be taken for that of the slow branch.
-    T20 = ca.if_else(a.X1 - a.X2 <= _NOTHING * a.X, ca.fmin(a.T20, 0.1 * a.T10 * (a.X1 - a.X_l) / X_m), a.T20)
+    T20 = if_else(a.X1 - a.X2 <= _NOTHING * a.X, fmin(a.T20, 0.1 * a.T10 * (a.X1 - a.X_l) / X_m), a.T20)
     T1, T2 = a.T10 * a.X1 / a.X, T20 * a.X2 / a.X1
     # X(s) − X_l = (X_m + n1·s + n2·s²) / ((1 + s·T'_0)(1 + s·T''_0))
     n1 = a.X * (T1 + T2) - a.X_l * (a.T10 + T20)
     n2 = a.X * T1 * T2 - a.X_l * a.T10 * T20
-    root = ca.sqrt(ca.fmax(n1**2 - 4 * n2 * X_m, 1e-12))
+    root = sqrt(fmax(n1**2 - 4 * n2 * X_m, 1e-12))
     slow, fast = (-n1 + root) / (2 * n2), (-n1 - root) / (2 * n2)
     b1 = a.X * (a.T10 + T20 - T1 - T2)
     b2 = a.X * (a.T10 * T20 - T1 * T2)
 
-    def branch(pole: ca.SX, other: ca.SX, sign: int) -> tuple[ca.SX, ca.SX]:
+    def branch(pole: Expr, other: Expr, sign: int) -> tuple[Expr, Expr]:
         residue, least = b1 + b2 * pole, _NOTHING * a.X * a.T10
-        residue = ca.if_else(ca.fabs(residue) <= least, sign * least, residue)
+        residue = if_else(fabs(residue) <= least, sign * least, residue)
         X = X_m * n2 * (pole - other) / residue
         return X, -pole * X / omega_b
 
     return RotorBranches(*branch(slow, fast, 1), *branch(fast, slow, -1))
 
 
-def convert(a: AxisData, omega_b: ca.SX, use_exact: ca.SX) -> RotorBranches:
+def convert(a: AxisData, omega_b: Expr, use_exact: Expr) -> RotorBranches:
     """The branches by one of the two ways, chosen when the FMU is initialised."""
     e, c = exact(a, omega_b), classical(a, omega_b)
     pairs = zip((e.X_1, e.R_1, e.X_2, e.R_2), (c.X_1, c.R_1, c.X_2, c.R_2), strict=True)
-    return RotorBranches(*(ca.if_else(use_exact, one, other) for one, other in pairs))
+    return RotorBranches(*(if_else(use_exact, one, other) for one, other in pairs))

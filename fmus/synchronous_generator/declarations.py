@@ -1,16 +1,15 @@
 """Declarations that exciters, governors and stabilisers share."""
 
-import casadi as ca
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, if_else
 
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
 
-
-def time_constant(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0, *, source: str) -> ca.SX:
+def time_constant(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0, *, source: str) -> Expr:
     """Declare a time constant [s]; where it may be 0, 0 leaves its block out."""
     T = m.parameter(name, value, "s", text, minimum=minimum, source=source)
     if minimum == 0:
         rule = f"{T.name()} must be 0 or longer than half of internal_step"
-        m.require(ca.if_else(T <= 0, 1, T - m.internal_step / 2), rule)
+        m.require(if_else(T <= 0, 1, T - m.internal_step / 2), rule)
     return T
 
 

@@ -11,16 +11,15 @@ bus and no snubber is needed:
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.synchronous_generator.axis import Axis, Winding
 from fmus.synchronous_generator.conversion import AxisData, RotorBranches, convert
 from fmus.synchronous_generator.data import STAMP, MachineData
 from fmus.toolchain.frames import Phasor, power
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
+from fmus.toolchain.symbols import Expr, exp, fmin, if_else, log
 
-FluxDeclaration = Callable[[ModelBuilder, str, ca.SX, str], ca.SX]
+FluxDeclaration = Callable[[ModelBuilder, str, Expr, str], Expr]
 """Declares a flux by its name, start value and description."""
 
 
@@ -29,9 +28,9 @@ class Start:
     """Start values for exciter and governor: |v_t|, field voltage and current, torque; bus voltage and current in the
     rotor's frame."""
 
-    v_t: ca.SX
-    E_fd: ca.SX
-    T_e: ca.SX
+    v_t: Expr
+    E_fd: Expr
+    T_e: Expr
     v: Phasor
     i: Phasor
 
@@ -44,19 +43,19 @@ class Machine:
     a parameter says otherwise, which only a phasor model can have; ``emf_speed``: what e'' is multiplied by there, w
     where it is None."""
 
-    R: ca.SX
-    R_t: ca.SX
-    X_t: ca.SX
-    H: ca.SX
-    D: ca.SX
+    R: Expr
+    R_t: Expr
+    X_t: Expr
+    H: Expr
+    D: Expr
     d: Axis
     q: Axis
-    w: ca.SX
-    delta: ca.SX
+    w: Expr
+    delta: Expr
     start: Start
     salient: bool = True
     at_rated_speed: bool = False
-    emf_speed: ca.SX | None = None
+    emf_speed: Expr | None = None
 
     @property
     def current(self) -> Phasor:
@@ -64,19 +63,19 @@ class Machine:
         return Phasor(self.q.i, -self.d.i)
 
     @property
-    def torque(self) -> ca.SX:
+    def torque(self) -> Expr:
         """Electrical torque [pu]."""
         return self.d.psi * self.q.i - self.q.psi * self.d.i
 
     @property
-    def field_current(self) -> ca.SX:
+    def field_current(self) -> Expr:
         """X_md·i_f: 1 pu gives 1 pu open-circuit voltage; the constant emf where there is no field winding."""
         if self.d.fixed_emf is not None:
             return self.d.fixed_emf
         return self.d.X_m * self.d.current(0)
 
 
-def flux_state(m: ModelBuilder, name: str, start: ca.SX, text: str) -> ca.SX:
+def flux_state(m: ModelBuilder, name: str, start: Expr, text: str) -> Expr:
     """Declare a flux linkage as a state [pu, S_n].
 
     ``start``: its initial value [pu, S_n]."""
@@ -105,7 +104,7 @@ def declare_machine(
     return Machine(R_s + R_t, R_t, X_t, H, D, d, q, w, delta, start)
 
 
-def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
+def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: Expr, P_m: Expr) -> None:
     """Give the derivatives of fluxes, speed and angle.
 
     ``port``: gives the bus voltage; ``E_fd``: field voltage; 1 pu gives 1 pu of voltage on open circuit; ``P_m``:
@@ -116,7 +115,7 @@ def machine_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX
     rotor_equations(m, g, port, E_fd, P_m)
 
 
-def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, P_m: ca.SX) -> None:
+def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: Expr, P_m: Expr) -> None:
     """Give the derivatives of the rotor's fluxes, speed and angle."""
     for axis, rates in zip((g.d, g.q), _rotor_flux_rates(g, port, E_fd), strict=True):
         for winding, rate in zip(axis.windings, rates, strict=True):
@@ -125,7 +124,7 @@ def rotor_equations(m: ModelBuilder, g: Machine, port: DevicePort, E_fd: ca.SX, 
     m.derivative(g.delta, port.omega_b * (g.w - 1))
 
 
-def terminal_voltage(g: Machine, port: DevicePort, E_fd: ca.SX) -> ca.SX:
+def terminal_voltage(g: Machine, port: DevicePort, E_fd: Expr) -> Expr:
     """|v_t| at the machine's terminal: the bus voltage plus the transformer's drop, di/dt included."""
     psi_q, psi_d, d_rotor, q_rotor = _flux_rates(g, port, E_fd)
     rate = Phasor(g.q.current_rate(psi_q, q_rotor), -g.d.current_rate(psi_d, d_rotor))
@@ -134,20 +133,20 @@ def terminal_voltage(g: Machine, port: DevicePort, E_fd: ca.SX) -> ca.SX:
     return (port.through_breaker(port.v.rotated(-g.delta), opened) + drop).magnitude()
 
 
-def terminal_power(g: Machine, port: DevicePort) -> tuple[ca.SX, ca.SX]:
+def terminal_power(g: Machine, port: DevicePort) -> tuple[Expr, Expr]:
     """Electrical power at the machine's terminal [pu, S_n], that at the bus and the transformer's losses; and the same
     at the operating point."""
     losses = g.R_t * g.current.magnitude() ** 2
     P_e = power(port.v.rotated(-g.delta), g.current).re + losses
     P_e_0 = power(port.v_0, port.i_0).re + g.R_t * port.i_0.magnitude() ** 2
-    return ca.SX(P_e), ca.SX(P_e_0)
+    return Expr(P_e), Expr(P_e_0)
 
 
-RotorRates = tuple[ca.SX, ...]
+RotorRates = tuple[Expr, ...]
 """Rates of the fluxes of one axis' rotor windings."""
 
 
-def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ca.SX, RotorRates, RotorRates]:
+def _flux_rates(g: Machine, port: DevicePort, E_fd: Expr) -> tuple[Expr, Expr, RotorRates, RotorRates]:
     """Rates of ψ_q, ψ_d and of the rotor's fluxes, d and q axis.
 
     Behind an open breaker the stator's flux follows the rotor's such that the current fades like that of every open
@@ -157,10 +156,10 @@ def _flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[ca.SX, ca.SX
     closed = Phasor(v.re + g.R * g.q.i - g.w * g.d.psi, -v.im + g.R * g.d.i + g.w * g.q.psi) * port.omega_b
     opened = Phasor(g.q.open_rate(q_rotor), g.d.open_rate(d_rotor))
     psi = port.through_breaker(closed, opened)  # a pair of q and d here, not a complex number
-    return ca.SX(psi.re), ca.SX(psi.im), d_rotor, q_rotor
+    return Expr(psi.re), Expr(psi.im), d_rotor, q_rotor
 
 
-def _rotor_flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[RotorRates, RotorRates]:
+def _rotor_flux_rates(g: Machine, port: DevicePort, E_fd: Expr) -> tuple[RotorRates, RotorRates]:
     """Rates of the rotor's fluxes, d and q axis; the first winding of the d axis is the field."""
     d_rotor, q_rotor = (
         tuple(-port.omega_b * winding.R * axis.current(k) for k, winding in enumerate(axis.windings))
@@ -173,10 +172,10 @@ def _rotor_flux_rates(g: Machine, port: DevicePort, E_fd: ca.SX) -> tuple[RotorR
 
 
 def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, AxisData]:
-    def reactance(name: str, value: float, text: str) -> ca.SX:
+    def reactance(name: str, value: float, text: str) -> Expr:
         return m.parameter(name, value, "pu", text, base="S_n", minimum=0.001, maximum=20, source=data.source)
 
-    def time(name: str, value: float, text: str) -> ca.SX:
+    def time(name: str, value: float, text: str) -> Expr:
         return m.parameter(name, value, "s", text, minimum=1e-3, source=data.source)
 
     X_l = reactance("X_l", data.X_l, "Stator leakage reactance")
@@ -193,8 +192,8 @@ def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, Axis
         if axis == "d":  # without a field winding nothing could excite the machine
             m.require(X - X1, "machine.X_d must exceed machine.X_d1")
         else:
-            m.require(ca.if_else(X1 <= X, 1, -1), "machine.X_q1 must not exceed machine.X_q")
-        m.require(ca.if_else(X2 <= X1, 1, -1), f"machine.X_{axis}2 must not exceed machine.X_{axis}1")
+            m.require(if_else(X1 <= X, 1, -1), "machine.X_q1 must not exceed machine.X_q")
+        m.require(if_else(X2 <= X1, 1, -1), f"machine.X_{axis}2 must not exceed machine.X_{axis}1")
         m.require(X2 - X_l, f"machine.X_{axis}2 must exceed machine.X_l")
         m.require(T10 - T20, f"machine.T_{axis}10 must exceed machine.T_{axis}20")
         axes[axis] = AxisData(X, X1, X2, X_l, T10, T20)
@@ -202,8 +201,8 @@ def _axis_parameters(m: ModelBuilder, data: MachineData) -> tuple[AxisData, Axis
 
 
 def _saturation_factor(
-    m: ModelBuilder, port: DevicePort, data: MachineData, R_s: ca.SX, R_t: ca.SX, X_t: ca.SX, X_l: ca.SX
-) -> ca.SX:
+    m: ModelBuilder, port: DevicePort, data: MachineData, R_s: Expr, R_t: Expr, X_t: Expr, X_l: Expr
+) -> Expr:
     """1 + s(ψ) at the air-gap flux of the operating point, s(ψ) = s(1.0)·ψⁿ through s(1.2); 1 where switched off."""
     on = m.switch("saturation", False, "Divide the magnetising reactances by 1 + s at the operating point")
     s_10 = m.parameter(
@@ -213,22 +212,22 @@ def _saturation_factor(
         "s_12", data.s_12, "1", "Saturation s(1.2) of the open-circuit curve", minimum=1e-6, source=data.source
     )
     psi = (port.v_0 + Phasor(R_s + R_t, X_t + X_l) * port.i_0).magnitude()
-    s = s_10 * ca.exp(ca.log(s_12 / s_10) / ca.log(1.2) * ca.log(psi))
+    s = s_10 * exp(log(s_12 / s_10) / log(1.2) * log(psi))
     return m.calculated("saturation_factor", 1 + on * s, "1", "1 + s(ψ) at the operating point")
 
 
 def _operating_point(
     m: ModelBuilder,
     port: DevicePort,
-    R_s: ca.SX,
-    R_t: ca.SX,
-    X_t: ca.SX,
+    R_s: Expr,
+    R_t: Expr,
+    X_t: Expr,
     d_data: AxisData,
     q_data: AxisData,
-    use_exact: ca.SX,
-    saturation: ca.SX,
+    use_exact: Expr,
+    saturation: Expr,
     stator_flux: FluxDeclaration,
-) -> tuple[Start, Axis, Axis, ca.SX]:
+) -> tuple[Start, Axis, Axis, Expr]:
     """Circuit of both axes, rotor angle and every flux of the steady state."""
     reactances = {}
     for axis, data in {"d": d_data, "q": q_data}.items():
@@ -243,7 +242,7 @@ def _operating_point(
             )
         )
         m.require(
-            ca.fmin(branches.X_1, branches.X_2),
+            fmin(branches.X_1, branches.X_2),
             f"machine: no circuit fits the {axis}-axis data; check X, X', X'' and the time constants",
         )
         X_sub = m.calculated(

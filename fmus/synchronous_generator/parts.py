@@ -5,8 +5,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
-
 from fmus.synchronous_generator.excitation.ac1a import ac1a
 from fmus.synchronous_generator.excitation.ac4a import ac4a
 from fmus.synchronous_generator.excitation.common import Exciter
@@ -30,8 +28,9 @@ from fmus.synchronous_generator.turbines.tgov1 import tgov1
 from fmus.synchronous_generator.variants import Governor, Stabilizer
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
+from fmus.toolchain.symbols import Expr
 
-MachinePart = Callable[[ModelBuilder, DevicePort, ca.SX, FluxDeclaration], Machine]
+MachinePart = Callable[[ModelBuilder, DevicePort, Expr, FluxDeclaration], Machine]
 """Declares a machine at its port: builder, port, rating [MVA], declaration of the stator's fluxes."""
 
 NONE = "none"

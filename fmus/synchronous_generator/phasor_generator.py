@@ -13,8 +13,6 @@ taken from i_q through a short lag, so that the emf follows from states alone; i
 
 from functools import partial
 
-import casadi as ca
-
 from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations, terminal_power
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
@@ -33,6 +31,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import DevicePort, device_port
+from fmus.toolchain.symbols import Expr
 
 
 def synchronous_generator_ac4a_phasor() -> Model:
@@ -97,7 +96,7 @@ def close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> 
     m.close(g.q.psi, g.q.emf - X_q * i_q)
 
 
-def phasor_terminal_voltage(g: Machine, port: DevicePort, emf: Phasor) -> ca.SX:
+def phasor_terminal_voltage(g: Machine, port: DevicePort, emf: Phasor) -> Expr:
     """|v_t|: the bus voltage plus the transformer's drop; the emf behind an open breaker."""
     at_port = port.through_breaker(port.v.rotated(-g.delta), emf)
     return (at_port + Phasor(g.R_t, g.X_t) * g.current).magnitude()

@@ -6,9 +6,8 @@ parameters. Where a block may be left out by a time constant of zero, as the blo
 literature mean it, it passes its input through; its state then follows the input with `BYPASS_TIME`
 and is seen by nobody."""
 
-import casadi as ca
-
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
 
 BYPASS_TIME = 0.01
 """Time constant [s] with which the unused state of a left-out block follows its input."""
@@ -18,7 +17,7 @@ RETURN_TIME = 2e-3
 longest internal step of any model, so that no stage of Runge-Kutta's method lands below the limit again."""
 
 
-def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar = 0.0) -> ca.SX:
+def washout(m: ModelBuilder, name: str, u: Expr, T_W: Scalar, initial: Scalar = 0.0) -> Expr:
     """s·T_W/(1 + s·T_W); its output is 0 in steady state.
 
     ``T_W``: time constant [s]."""
@@ -27,7 +26,7 @@ def washout(m: ModelBuilder, name: str, u: ca.SX, T_W: Scalar, initial: Scalar =
     return u - x
 
 
-def low_pass(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
+def low_pass(m: ModelBuilder, name: str, u: Expr, T: Scalar, initial: Scalar = 0.0) -> Expr:
     """1/(1 + s·T), T > 0: the output is a state, so nothing passes directly.
 
     ``T``: time constant [s]."""
@@ -36,36 +35,36 @@ def low_pass(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 
     return x
 
 
-def low_pass_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T: Scalar, initial: Scalar = 0.0) -> ca.SX:
+def low_pass_or_nothing(m: ModelBuilder, name: str, u: Expr, T: Scalar, initial: Scalar = 0.0) -> Expr:
     """1/(1 + s·T); passed through where T = 0.
 
     ``T``: time constant [s], 0 or more."""
     x = m.state(name, initial, "pu", "first-order lag", base="S_n")
     left_out = _is_zero(T)
-    m.derivative(x, (u - x) / ca.if_else(left_out, BYPASS_TIME, T))
-    return ca.if_else(left_out, u, x)
+    m.derivative(x, (u - x) / if_else(left_out, BYPASS_TIME, T))
+    return if_else(left_out, u, x)
 
 
-def washout_or_nothing(m: ModelBuilder, name: str, u: ca.SX, T_W: ca.SX, initial: Scalar = 0.0) -> ca.SX:
+def washout_or_nothing(m: ModelBuilder, name: str, u: Expr, T_W: Expr, initial: Scalar = 0.0) -> Expr:
     """s·T_W/(1 + s·T_W); passed through where T_W = 0, and then ``initial`` must be 0 or be taken off later.
 
     ``T_W``: time constant [s], 0 or more."""
     left_out = _is_zero(T_W)
-    return ca.if_else(left_out, u, washout(m, name, u, ca.if_else(left_out, BYPASS_TIME, T_W), initial))
+    return if_else(left_out, u, washout(m, name, u, if_else(left_out, BYPASS_TIME, T_W), initial))
 
 
-def lead_lag(m: ModelBuilder, name: str, u: ca.SX, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0) -> ca.SX:
+def lead_lag(m: ModelBuilder, name: str, u: Expr, T_lead: Scalar, T_lag: Scalar, initial: Scalar = 0.0) -> Expr:
     """(1 + s·T_lead)/(1 + s·T_lag); passed through where T_lag = 0.
 
     ``T_lead``, ``T_lag``: time constants [s], 0 or more."""
     x = m.state(name, initial, "pu", "lead/lag", base="S_n")
     left_out = _is_zero(T_lag)
-    T = ca.if_else(left_out, BYPASS_TIME, T_lag)
+    T = if_else(left_out, BYPASS_TIME, T_lag)
     m.derivative(x, (u - x) / T)
-    return ca.if_else(left_out, u, x + (T_lead / T) * (u - x))
+    return if_else(left_out, u, x + (T_lead / T) * (u - x))
 
 
-def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar, K_I: Scalar, initial: Scalar) -> ca.SX:
+def proportional_integral(m: ModelBuilder, name: str, error: Expr, K_P: Scalar, K_I: Scalar, initial: Scalar) -> Expr:
     """K_P + K_I/s.
 
     ``error``: what goes in; 0 in steady state; ``K_P``: proportional gain; ``K_I``: integral gain [1/s, times the unit
@@ -75,18 +74,18 @@ def proportional_integral(m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar,
     return K_P * error + x
 
 
-def limit(u: ca.SX, magnitude: Scalar) -> ca.SX:
-    return ca.fmin(ca.fmax(u, -magnitude), magnitude)
+def limit(u: Expr, magnitude: Scalar) -> Expr:
+    return fmin(fmax(u, -magnitude), magnitude)
 
 
-def clamp(u: Scalar, low: Scalar, high: Scalar) -> ca.SX:
+def clamp(u: Scalar, low: Scalar, high: Scalar) -> Expr:
     """The value, or the limit that it is beyond."""
-    return ca.fmin(ca.fmax(u, low), high)
+    return fmin(fmax(u, low), high)
 
 
 def limited_low_pass(
-    m: ModelBuilder, name: str, u: ca.SX, T: Scalar, low: Scalar, high: Scalar, initial: Scalar = 0.0
-) -> ca.SX:
+    m: ModelBuilder, name: str, u: Expr, T: Scalar, low: Scalar, high: Scalar, initial: Scalar = 0.0
+) -> Expr:
     """1/(1 + s·T) that stops at its limits and leaves them as soon as its input does (non-windup); T = 0: a limiter.
 
     ``T``: time constant [s], 0 or more; ``low``, ``high``: limits of the output."""
@@ -94,35 +93,35 @@ def limited_low_pass(
     return close_limited_low_pass(m, x, u, T, low, high)
 
 
-def close_limited_low_pass(m: ModelBuilder, x: ca.SX, u: ca.SX, T: Scalar, low: Scalar, high: Scalar) -> ca.SX:
+def close_limited_low_pass(m: ModelBuilder, x: Expr, u: Expr, T: Scalar, low: Scalar, high: Scalar) -> Expr:
     """`limited_low_pass` with a state that is declared already, for what the input is fed back from."""
     left_out = _is_zero(T)
-    rate = (u - x) / ca.if_else(left_out, BYPASS_TIME, T)
-    m.derivative(x, ca.if_else(left_out, rate, held_at_limits(x, rate, low, high)))
-    return clamp(ca.if_else(left_out, u, x), low, high)
+    rate = (u - x) / if_else(left_out, BYPASS_TIME, T)
+    m.derivative(x, if_else(left_out, rate, held_at_limits(x, rate, low, high)))
+    return clamp(if_else(left_out, u, x), low, high)
 
 
 def limited_proportional_integral(
-    m: ModelBuilder, name: str, error: ca.SX, K_P: Scalar, K_I: Scalar, low: Scalar, high: Scalar, initial: Scalar
-) -> ca.SX:
+    m: ModelBuilder, name: str, error: Expr, K_P: Scalar, K_I: Scalar, low: Scalar, high: Scalar, initial: Scalar
+) -> Expr:
     """K_P + K_I/s, the output limited; the integrator stops while the output is at a limit (IEEE 421.5, annex E).
 
     ``low``, ``high``: limits of the output; ``initial``: of the integrator, in steady state."""
     x = m.state(name, initial, "pu", "integrator with limits", base="S_n")
     u = K_P * error + x
-    outward = ca.logic_or(ca.logic_and(u > high, error > 0), ca.logic_and(u < low, error < 0))
-    m.derivative(x, ca.if_else(outward, 0, K_I * error))
+    outward = logic_or(logic_and(u > high, error > 0), logic_and(u < low, error < 0))
+    m.derivative(x, if_else(outward, 0, K_I * error))
     return clamp(u, low, high)
 
 
-def held_at_limits(x: ca.SX, rate: Scalar, low: Scalar, high: Scalar) -> ca.SX:
+def held_at_limits(x: Expr, rate: Scalar, low: Scalar, high: Scalar) -> Expr:
     """The rate of a state with non-windup limits: what lies beyond a limit after a step returns to it at once.
 
     ``rate``: its rate without limits; ``low``, ``high``: the limits; use the state through `clamp`."""
-    above = ca.logic_and(x >= high, ca.SX(rate) > 0)
-    below = ca.logic_and(x <= low, ca.SX(rate) < 0)
-    return ca.if_else(above, (high - x) / RETURN_TIME, ca.if_else(below, (low - x) / RETURN_TIME, rate))
+    above = logic_and(x >= high, Expr(rate) > 0)
+    below = logic_and(x <= low, Expr(rate) < 0)
+    return if_else(above, (high - x) / RETURN_TIME, if_else(below, (low - x) / RETURN_TIME, rate))
 
 
-def _is_zero(T: Scalar) -> ca.SX:
-    return ca.SX(T) <= 0
+def _is_zero(T: Scalar) -> Expr:
+    return Expr(T) <= 0

@@ -5,7 +5,6 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from fmus.toolchain.extras import require
 from fmus.toolchain.model import Model
 from fmus.toolchain.notes import noted
 
@@ -35,7 +34,6 @@ def entry_of(name: str) -> EntryPoint:
     found = _entries().get(name)
     if found is None:
         raise KeyError(f"there is no model {name!r}; there are: {', '.join(model_names())}")
-    require(f"the model {name!r} of the catalogue", "casadi")
     return found
 
 

@@ -3,18 +3,17 @@
 Variables are named by their FMI value reference."""
 
 from dataclasses import dataclass
+from functools import partial
+from itertools import accumulate
 
-import casadi as ca
 import numpy as np
-from scipy.sparse import csr_array
 
 from fmus.toolchain.model import Model
+from fmus.toolchain.symbols import Function
 
 MOST = 1_000_000
 """Dependencies of outputs, or of derivatives, that are listed. In a meshed network without states all outputs depend on
 nearly everything, and lists of that would be a hundred times as long as all the rest."""
-
-_SAMPLE = 8  # rows of a pattern from which it is known how long the whole would be
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,37 +38,27 @@ def structure(model: Model) -> Structure:
 
     Where there would be more than `MOST` dependencies, or a network is solved as data, nothing is listed, which means
     in both versions of FMI that there may be any."""
-    np_, nc, nu = len(model.parameters), len(model.calculated), len(model.inputs)
-    nx, ny = len(model.states), len(model.outputs)
-    parameters, inputs = np.arange(np_), np_ + nc + np.arange(nu)
-    states = np_ + nc + nu + np.arange(nx)
-    first_output, first_derivative = np_ + nc + nu + nx, np_ + nc + nu + nx + ny
+    sizes = (len(group) for group in (model.parameters, model.calculated, model.inputs, model.states))
+    first_calculated, first_input, first_state, first_output = accumulate(sizes)
+    p, c, u, x = (partial(_mark, first) for first in (0, first_calculated, first_input, first_state))
+    inputs, states = (1 << first_state) - (1 << first_input), (1 << first_output) - (1 << first_state)
+    c_p, x_p = model.initialise.dependence(p)
 
-    c_p, x_p = _pattern(model.initialise, 0, 0), _pattern(model.initialise, 1, 0)
-
-    def of(function: ca.Function, first: int) -> tuple[tuple[Unknown, ...], tuple[Unknown, ...]]:
+    def of(function: Function, first: int) -> tuple[tuple[Unknown, ...], tuple[Unknown, ...]]:
         """Dependence of a function's rows while it runs, and at the start."""
-        running = start = _all_unknown(first, function.size1_out(0))
-        if model.nodal is None and _length(function, 1) <= MOST:
-            by_x, by_u = _pattern(function, 0, 0), _pattern(function, 0, 1)
-            running = _unknowns(first, [(by_u, inputs), (by_x, states)])
-            if _length(function, 2) <= MOST:
-                by_p = _pattern(function, 0, 2) + by_x @ x_p + _pattern(function, 0, 3) @ c_p
-                start = _unknowns(first, [(by_p, parameters), (by_u, inputs)])
+        running = start = _all_unknown(first, len(function.outputs[0]))
+        if model.nodal is None:
+            (by,) = function.dependence(x, u, p, c)
+            if _count(by, inputs) <= MOST:
+                running = _unknowns(first, [known & (inputs | states) for known in by])
+                if _count(by, (1 << first_calculated) - 1) <= MOST:
+                    start = _unknowns(first, function.dependence(x_p.__getitem__, u, p, c_p.__getitem__)[0])
         return running, start
 
     outputs, first_outputs = of(model.outputs_function, first_output)
-    derivatives, first_derivatives = of(model.derivatives, first_derivative)
-    return Structure(
-        outputs=outputs,
-        derivatives=derivatives,
-        initial=(
-            *_unknowns(np_, [(c_p, parameters)]),
-            *_unknowns(np_ + nc + nu, [(x_p, parameters)]),
-            *first_outputs,
-            *first_derivatives,
-        ),
-    )
+    derivatives, first_derivatives = of(model.derivatives, first_output + len(model.outputs))
+    initial = (*_unknowns(first_calculated, c_p), *_unknowns(first_state, x_p), *first_outputs, *first_derivatives)
+    return Structure(outputs, derivatives, initial)
 
 
 def unlisted(model: Model) -> Structure:
@@ -86,34 +75,19 @@ def _all_unknown(first: int, count: int) -> tuple[Unknown, ...]:
     return tuple(Unknown(first + row, None) for row in range(count))
 
 
-def _length(function: ca.Function, input_: int) -> float:
-    """About how many elements of an input the elements of the output depend on, all together."""
-    rows = function.size1_out(0)
-    if rows * function.size1_in(input_) <= MOST:
-        return 0.0
-    arguments = [ca.SX.sym("a", function.sparsity_in(k)) for k in range(function.n_in())]
-    chosen = np.unique(np.linspace(0, rows - 1, _SAMPLE).astype(int)).tolist()
-    some = ca.Function("some", arguments, [function(*arguments)[chosen]])
-    return float(some.jac_sparsity(0, input_).nnz() * rows / len(chosen))
+def _mark(first: int, element: int) -> int:
+    return 1 << (first + element)
 
 
-def _unknowns(first: int, blocks: list[tuple[csr_array, np.ndarray]]) -> tuple[Unknown, ...]:
-    """One unknown for each row of the patterns, which stand side by side."""
-    for matrix, _ in blocks:
-        matrix.sort_indices()
-    return tuple(
-        Unknown(first + row, tuple(int(i) for matrix, references in blocks for i in references[_columns(matrix, row)]))
-        for row in range(blocks[0][0].shape[0])
-    )
+def _count(marks: list[int], of: int) -> int:
+    return sum((mark & of).bit_count() for mark in marks)
 
 
-def _columns(matrix: csr_array, row: int) -> np.ndarray:
-    columns: np.ndarray = matrix.indices[matrix.indptr[row] : matrix.indptr[row + 1]]
-    return columns
+def _unknowns(first: int, marks: list[int]) -> tuple[Unknown, ...]:
+    """One unknown for each mark, whose bits are the references that it depends on."""
+    return tuple(Unknown(first + row, _references(mark)) for row, mark in enumerate(marks))
 
 
-def _pattern(function: ca.Function, output: int, input_: int) -> csr_array:
-    """Matrix of truth values: whether each element of an output depends on each element of an input."""
-    pattern = function.jac_sparsity(output, input_)
-    rows, columns = pattern.get_triplet()
-    return csr_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=pattern.shape)
+def _references(mark: int) -> tuple[int, ...]:
+    packed = np.frombuffer(mark.to_bytes(mark.bit_length() // 8 + 1, "little"), dtype=np.uint8)
+    return tuple(np.flatnonzero(np.unpackbits(packed, bitorder="little")).tolist())

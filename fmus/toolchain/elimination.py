@@ -2,32 +2,32 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.toolchain.elimination_plan import plan_pattern
 from fmus.toolchain.model import Model
 from fmus.toolchain.plan import Plan
+from fmus.toolchain.symbols import Expr, Function, depends_on, jacobian, symbol, symbols
 
 
 @dataclass(frozen=True)
 class Elimination:
-    """The plan for 1 − γh·A, and a CasADi function (p, c, γh) → values of that matrix."""
+    """The plan for 1 − γh·A, and a function (p, c, γh) → values of that matrix."""
 
     plan: Plan
-    values: ca.Function
+    values: Function
 
 
 def plan_elimination(model: Model) -> Elimination:
     """Plan the factorisation of a model whose implicit part is linear in its states."""
     n = len(model.states)
-    x, u = ca.SX.sym("x", n), ca.SX.sym("u", len(model.inputs))
-    p, c = ca.SX.sym("p", len(model.parameters)), ca.SX.sym("c", len(model.calculated))
-    A = ca.jacobian((model.implicit or model.derivatives)(x, u, p, c), x)
-    if ca.depends_on(A, ca.vertcat(x, u)):
+    x, u = symbols("x", n), symbols("u", len(model.inputs))
+    p, c = symbols("p", len(model.parameters)), symbols("c", len(model.calculated))
+    (rates,) = (model.implicit or model.derivatives).of(x, u, p, c)
+    A = jacobian(rates, x)
+    if depends_on(list(A.values()), [*x, *u]):
         raise ValueError(f"model {model.name} is not linear in its states; the implicit integrator needs that")
-    gh = ca.SX.sym("gh")
-    matrix = ca.SX.eye(n) - gh * A
-    rows, columns = matrix.sparsity().get_triplet()
-    plan = plan_pattern(n, rows, columns)
-    values = ca.vertcat(*[matrix[i, j] for i, j in plan.entries])
-    return Elimination(plan, ca.Function("iteration", [p, c, gh], [ca.densify(values)]))
+    gh = symbol("gh")
+    matrix = {(i, i): Expr(1) for i in range(n)}
+    for place, element in A.items():
+        matrix[place] = matrix.get(place, Expr(0)) - gh * element
+    plan = plan_pattern(n, *zip(*matrix, strict=True))
+    return Elimination(plan, Function("iteration", [p, c, [gh]], [[matrix[place] for place in plan.entries]]))

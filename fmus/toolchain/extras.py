@@ -5,7 +5,6 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 EXTRAS = {
-    "casadi": "build",
     "pythonfmu": "build",
     "ziglang": "build",
     "matpowercaseframes": "networks",

@@ -1,4 +1,4 @@
-"""Complex quantities in rotating frames, written as pairs of CasADi scalars.
+"""Complex quantities in rotating frames, written as pairs of expressions.
 
 The network frame turns at ω_b; a device's own frame leads it by an angle θ. A quantity is
 f = f_re + j·f_im in the network frame and f = f_q − j·f_d in a device's frame."""
@@ -7,14 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import casadi as ca
-
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, atan2, cos, fmax, fmin, sin, sqrt
 
 
 @dataclass(frozen=True)
 class Phasor:
-    """A complex number re + j·im of CasADi expressions."""
+    """A complex number re + j·im of expressions."""
 
     re: Scalar
     im: Scalar
@@ -47,19 +46,19 @@ class Phasor:
         """The phasor, turned ahead by 90°."""
         return Phasor(-self.im, self.re)
 
-    def magnitude(self) -> ca.SX:
-        return ca.sqrt(self.re**2 + self.im**2)
+    def magnitude(self) -> Expr:
+        return sqrt(self.re**2 + self.im**2)
 
-    def angle(self) -> ca.SX:
+    def angle(self) -> Expr:
         """Its angle [rad]."""
-        return ca.atan2(self.im, self.re)
+        return atan2(self.im, self.re)
 
     def rotated(self, angle: Scalar) -> Phasor:
         """The quantity times e^{j·angle}."""
         return self * polar(1.0, angle)
 
     def clamped(self, limit_re: Scalar, limit_im: Scalar) -> Phasor:
-        return Phasor(ca.fmin(ca.fmax(self.re, -limit_re), limit_re), ca.fmin(ca.fmax(self.im, -limit_im), limit_im))
+        return Phasor(fmin(fmax(self.re, -limit_re), limit_re), fmin(fmax(self.im, -limit_im), limit_im))
 
 
 Phases = tuple[Scalar, Scalar, Scalar]  # instantaneous values of phases a, b and c
@@ -69,7 +68,7 @@ ZERO = Phasor(0.0, 0.0)
 
 def polar(magnitude: Scalar, angle: Scalar) -> Phasor:
     """Magnitude and angle [rad] as a complex quantity."""
-    return Phasor(magnitude * ca.cos(angle), magnitude * ca.sin(angle))
+    return Phasor(magnitude * cos(angle), magnitude * sin(angle))
 
 
 def of_phases(values: Phases, angle: Scalar) -> Phasor:
@@ -78,13 +77,13 @@ def of_phases(values: Phases, angle: Scalar) -> Phasor:
     (2/3)·(a + b·e^{j2π/3} + c·e^{−j2π/3})·e^{−j·angle}: a balanced cosine keeps its amplitude. The common part of the
     phases, the zero sequence, is removed."""
     a, b, c = values
-    return Phasor((2 * a - b - c) / 3, (b - c) / ca.sqrt(3)).rotated(-angle)
+    return Phasor((2 * a - b - c) / 3, (b - c) / sqrt(3)).rotated(-angle)
 
 
 def phases(value: Phasor, angle: Scalar) -> Phases:
     """The other way: Re f·e^{j·angle}, and the same 120° and 240° later; without a zero sequence."""
     fixed = value.rotated(angle)
-    half, swing = fixed.re / 2, ca.sqrt(3) / 2 * fixed.im
+    half, swing = fixed.re / 2, sqrt(3) / 2 * fixed.im
     return fixed.re, swing - half, -swing - half
 
 
@@ -102,8 +101,8 @@ def current_of_power(p: Scalar, q: Scalar, voltage: Phasor) -> Phasor:
 class QdState:
     """A complex state of a rotating frame, kept as its q and d components: f = f_q − j·f_d."""
 
-    q: ca.SX
-    d: ca.SX
+    q: Expr
+    d: Expr
 
     @property
     def value(self) -> Phasor:
@@ -135,5 +134,5 @@ def phasor_state(m: ModelBuilder, name: str, initial: Phasor, text: str, base: s
 
 def phasor_derivative(m: ModelBuilder, state: Phasor, rate: Phasor, implicit: Phasor | None = None) -> None:
     """Give a rate; ``implicit`` is its part that is linear in the states, where that is not all of it."""
-    m.derivative(ca.SX(state.re), rate.re, None if implicit is None else implicit.re)
-    m.derivative(ca.SX(state.im), rate.im, None if implicit is None else implicit.im)
+    m.derivative(Expr(state.re), rate.re, None if implicit is None else implicit.re)
+    m.derivative(Expr(state.im), rate.im, None if implicit is None else implicit.im)

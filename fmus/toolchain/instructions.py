@@ -1,35 +1,36 @@
-"""The scalar operations of a CasADi function, in the codes of a tape: the one place that reads them."""
+"""The scalar operations of a function, in the codes of a tape."""
 
 from collections.abc import Iterator
 
-import casadi as ca
+from fmus.toolchain.symbols import Function, Op
+from fmus.toolchain.symbols.operations import UNARY
 
 CODES = {
-    # CasADi's operation -> code of a tape, as `c/tape.c` and `tape_in_python.py` know it
-    **{ca.OP_ADD: 0, ca.OP_SUB: 1, ca.OP_MUL: 2, ca.OP_DIV: 3, ca.OP_POW: 4, ca.OP_CONSTPOW: 4, ca.OP_ATAN2: 5},
-    **{ca.OP_COPYSIGN: 6, ca.OP_FMIN: 7, ca.OP_FMAX: 8, ca.OP_LT: 9, ca.OP_LE: 10, ca.OP_EQ: 11, ca.OP_NE: 12},
-    **{ca.OP_AND: 13, ca.OP_OR: 14, ca.OP_IF_ELSE_ZERO: 15},
-    **{ca.OP_NEG: 16, ca.OP_INV: 17, ca.OP_SQ: 18, ca.OP_TWICE: 19, ca.OP_SQRT: 20, ca.OP_SIN: 21, ca.OP_COS: 22},
-    **{ca.OP_TAN: 23, ca.OP_EXP: 24, ca.OP_LOG: 25, ca.OP_FABS: 26, ca.OP_FLOOR: 27, ca.OP_NOT: 28},
+    # operation -> code of a tape, as `c/tape.c` and `tape_kernel.py` know it
+    **{Op.ADD: 0, Op.SUB: 1, Op.MUL: 2, Op.DIV: 3, Op.POW: 4, Op.CONSTPOW: 4, Op.ATAN2: 5, Op.COPYSIGN: 6},
+    **{Op.FMIN: 7, Op.FMAX: 8, Op.LT: 9, Op.LE: 10, Op.EQ: 11, Op.NE: 12, Op.AND: 13, Op.OR: 14, Op.IF_ELSE_ZERO: 15},
+    **{Op.NEG: 16, Op.INV: 17, Op.SQ: 18, Op.TWICE: 19, Op.SQRT: 20, Op.SIN: 21, Op.COS: 22, Op.TAN: 23, Op.EXP: 24},
+    **{Op.LOG: 25, Op.FABS: 26, Op.FLOOR: 27, Op.NOT: 28},
 }
-ADD, SUB, MUL = (CODES[operation] for operation in (ca.OP_ADD, ca.OP_SUB, ca.OP_MUL))
-INPUT, CONSTANT, OUTPUT, SAME = -1, -2, -3, -4
-"""Codes of what is no operation: an element of an argument, a number, an element of a result, a copy."""
-
-_OTHERS = {ca.OP_INPUT: INPUT, ca.OP_CONST: CONSTANT, ca.OP_OUTPUT: OUTPUT, ca.OP_ASSIGN: SAME}
+ADD, SUB, MUL = (CODES[operation] for operation in (Op.ADD, Op.SUB, Op.MUL))
+INPUT, CONSTANT, OUTPUT = -1, -2, -3
+"""Codes of what is no operation: an element of an argument, a number, an element of a result."""
 
 
-def instructions(function: ca.Function, name: str) -> Iterator[tuple[int, list[int], list[int], float]]:
-    """Code, sources, targets and value of each operation in order, results dense.
+def instructions(function: Function, name: str) -> Iterator[tuple[int, tuple[int, ...], tuple[int, ...], float]]:
+    """Code, sources, targets and value of each operation in order.
 
     Sources and targets are numbers of registers, which are used again and again; of `INPUT` the source, and of
     `OUTPUT` the target, is an argument's or result's number and the element in it. The value is that of `CONSTANT`."""
-    arguments = [ca.SX.sym("a", function.sparsity_in(k)) for k in range(function.n_in())]
-    dense = ca.Function(name, arguments, [ca.densify(result) for result in function.call(arguments)])
-    codes = CODES | _OTHERS
-    for k in range(dense.n_instructions()):
-        code = codes.get(operation := dense.instruction_id(k))
-        if code is None:
-            raise ValueError(f"{name}: operation {operation} of CasADi has no code yet; add it to instructions.py")
-        value = dense.instruction_constant(k) if code == CONSTANT else 0.0
-        yield code, dense.instruction_input(k), dense.instruction_output(k), value
+    for operation, place, a, b, value in function.instructions:
+        match operation:
+            case Op.INPUT:
+                yield INPUT, (a, b), (place,), 0.0
+            case Op.CONST:
+                yield CONSTANT, (), (place,), value
+            case Op.OUTPUT:
+                yield OUTPUT, (b,), (place, a), 0.0
+            case _ if operation in CODES:
+                yield CODES[operation], (a,) if operation in UNARY else (a, b), (place,), 0.0
+            case _:
+                raise ValueError(f"{name}: operation {operation} has no code of a tape yet; add it to instructions.py")

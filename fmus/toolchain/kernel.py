@@ -16,16 +16,18 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
 from collections.abc import Mapping
 from pathlib import Path
 
-import casadi as ca
-
 from fmus.toolchain.elimination import plan_elimination
-from fmus.toolchain.long_functions import cut
 from fmus.toolchain.model import Model
+from fmus.toolchain.symbols import Function
+from fmus.toolchain.symbols.c_code import c_function
+
+LONGEST = 20_000
+"""Operations of a function that is not written in parts."""
 
 _C = Path(__file__).with_name("c")
 
 
-def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> str:
+def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str:
     """The whole C kernel of a model as one translation unit.
 
     ``further``: Functions by name whose code is wanted beside the kernel's own; the enumerator ``NWD`` is the room they
@@ -49,16 +51,12 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
         held = [index for index, state in enumerate(model.states) if state.stepwise]
         sizes["NS"] = len(held)
         tables = f"static const int STEPWISE[] = {{{', '.join(map(str, held or [-1]))}}};"
-    sizes["NW"] = max(1, *(f.sz_w() for f in functions.values()))
+    sizes["NW"] = max(1, *(f.room for f in functions.values()))
     if further:
-        sizes["NWD"] = max(f.sz_w() for f in further.values())
-    generator = ca.CodeGenerator(
-        model.name, {"with_header": False, "main": False, "verbose": False, "with_export": False}
-    )
-    for name, function in (functions | further).items():
-        generator.add(scalar_function(function, f"{name}_code"))
+        sizes["NWD"] = max(1, *(f.room for f in further.values()))
+    code = [c_function(function, f"{name}_code", LONGEST) for name, function in (functions | further).items()]
     enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
-    parts = [cut(str(generator.dump())), enumeration, tables]
+    parts = ["#include <math.h>", *code, enumeration, tables]
     parts += [(_C / name).read_text(encoding="utf-8") for name in ("kernel.c", f"{model.integrator}.c")]
     kept = "IMPLICIT_SIZE" if model.integrator == "sdirk" else "0"
     return "\n".join([*parts, f"KERNEL int workspace_size(void) {{ return {kept}; }}", ""])
@@ -70,7 +68,7 @@ def _tables(lists: Mapping[str, list[int]]) -> str:
     )
 
 
-def kernel_functions(model: Model) -> dict[str, ca.Function]:
+def kernel_functions(model: Model) -> dict[str, Function]:
     """The functions of a kernel by name."""
     return {
         "initialise": model.initialise,
@@ -78,10 +76,3 @@ def kernel_functions(model: Model) -> dict[str, ca.Function]:
         "derivatives": model.derivatives,
         "requirements": model.requirements,
     }
-
-
-def scalar_function(function: ca.Function, name: str) -> ca.Function:
-    """The same function under another name, in scalar operations, with dense outputs."""
-    inputs = [ca.SX.sym("a", function.sparsity_in(k)) for k in range(function.n_in())]
-    outputs = [ca.densify(e) for e in function.call(inputs)]
-    return ca.Function(name, inputs, outputs)

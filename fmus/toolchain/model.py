@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 from fmus.toolchain.plan import Plan
+from fmus.toolchain.symbols import Function
 from fmus.toolchain.variables import CalculatedParameter, Input, Kind, Output, Parameter, State, Variable
 
 Integrator = Literal["runge_kutta", "sdirk"]
 
 FmiVersion = Literal["2.0", "3.0"]
 """FMI versions of a native FMU."""
-
-Function = Any
-"""A ``casadi.Function``. CasADi has no types, and the catalogue can be listed without it."""
 
 
 @dataclass(frozen=True)
@@ -105,19 +103,3 @@ class Model:
         """Name → FMI value reference; ``der(state)`` follows after all others."""
         names = [v.name for v in self.variables] + [f"der({s.name})" for s in self.states]
         return {name: index for index, name in enumerate(names)}
-
-    def jacobians(self) -> Function:
-        """Exact (A, B, C, D) of the continuous model as a function of (x, u, p, c)."""
-        import casadi as ca  # noqa: PLC0415 - of the extra `build`
-
-        if self.nodal is not None:
-            return self.written_out.jacobians()
-        x, u, p, c = (ca.SX.sym(s, n) for s, n in zip("xupc", self._sizes, strict=True))
-        f = self.derivatives(x, u, p, c)
-        y = self.outputs_function(x, u, p, c)
-        blocks = [ca.jacobian(e, v) for e in (f, y) for v in (x, u)]
-        return ca.Function("jacobians", [x, u, p, c], blocks)
-
-    @property
-    def _sizes(self) -> tuple[int, int, int, int]:
-        return len(self.states), len(self.inputs), len(self.parameters), len(self.calculated)

@@ -1,4 +1,4 @@
-"""How a model is written: each declaration returns a CasADi symbol.
+"""How a model is written: each declaration returns a symbol.
 
 A quantity is declared where it is used, and the equations read like the block diagram."""
 
@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
-import casadi as ca
-
 from fmus.toolchain.model import Integrator, Model
 from fmus.toolchain.nodes import Complex, Nodes
+from fmus.toolchain.symbols import Expr, Function, Scalar, depends_on, substitute, symbol, symbols_in
 from fmus.toolchain.variables import (
     UNITS,
     CalculatedParameter,
@@ -22,9 +21,6 @@ from fmus.toolchain.variables import (
     Variable,
     VariableType,
 )
-
-Scalar = ca.SX | float
-"""An operand of equations."""
 
 
 class ModelBuilder:
@@ -46,13 +42,13 @@ class ModelBuilder:
     ) -> None:
         self.name, self.title, self.kind, self._usual = name, title, kind, usual or {}
         self._prefix: list[str] = []
-        self._declared: dict[str, tuple[Variable, ca.SX]] = {}
-        self._expressions: dict[str, ca.SX] = {}
-        self._derivatives: dict[str, ca.SX] = {}
-        self._implicit: dict[str, ca.SX] = {}
-        self._requirements: list[tuple[ca.SX, str]] = []
-        self._opened: list[ca.SX] = []
-        self._algebraic: list[tuple[ca.SX, ca.SX]] = []
+        self._declared: dict[str, tuple[Variable, Expr]] = {}
+        self._expressions: dict[str, Expr] = {}
+        self._derivatives: dict[str, Expr] = {}
+        self._implicit: dict[str, Expr] = {}
+        self._requirements: list[tuple[Expr, str]] = []
+        self._opened: list[Expr] = []
+        self._algebraic: list[tuple[Expr, Expr]] = []
         self._nodes: Nodes | None = None
         self.internal_step = self.parameter(
             "internal_step",
@@ -77,18 +73,18 @@ class ModelBuilder:
     def _full(self, name: str) -> str:
         return ".".join([*self._prefix, name])
 
-    def _declare(self, variable: Variable) -> ca.SX:
+    def _declare(self, variable: Variable) -> Expr:
         if variable.name in self._declared:
             raise ValueError(f"model {self.name}: {variable.name!r} is declared twice")
         if isinstance(variable, Parameter) and variable.name in self._usual:
             variable = replace(variable, usual=self._usual[variable.name])
-        symbol = ca.SX.sym(variable.name)
-        self._declared[variable.name] = (variable, symbol)
-        return symbol
+        made = symbol(variable.name)
+        self._declared[variable.name] = (variable, made)
+        return made
 
     # -- declarations ------------------------------------------------------------------------
 
-    def declare(self, variable: Parameter | Input) -> ca.SX:
+    def declare(self, variable: Parameter | Input) -> Expr:
         """Declare a parameter or an input that is described elsewhere, such as one of the port's."""
         return self._declare(replace(variable, name=self._full(variable.name)))
 
@@ -109,7 +105,7 @@ class ModelBuilder:
         tunable: bool = False,
         type: VariableType = "Real",
         source: str = "",
-    ) -> ca.SX:
+    ) -> Expr:
         """Declare a parameter.
 
         ``name``: without the scope; ``base``: what 1 pu is, such as ``"S_n"``; required where the unit is ``pu``;
@@ -120,19 +116,19 @@ class ModelBuilder:
             Parameter(self._full(name), unit, description, base, float(start), minimum, maximum, tunable, type, source)
         )
 
-    def switch(self, name: str, start: bool, description: str, *, tunable: bool = False) -> ca.SX:
+    def switch(self, name: str, start: bool, description: str, *, tunable: bool = False) -> Expr:
         """Declare a Boolean parameter; in the equations it is 0 or 1."""
         return self.parameter(name, float(start), "1", description, tunable=tunable, type="Boolean")
 
-    def calculated(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> ca.SX:
+    def calculated(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> Expr:
         """Declare a quantity computed at initialisation from fixed parameters.
 
         ``value``: an expression of fixed parameters."""
         full = self._full(name)
-        self._expressions[full] = ca.SX(value)
+        self._expressions[full] = Expr(value)
         return self._declare(CalculatedParameter(full, unit, description, base))
 
-    def input(self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0) -> ca.SX:
+    def input(self, name: str, unit: str, description: str, *, base: str = "", start: float = 0.0) -> Expr:
         """Declare an input.
 
         ``start``: its value until it is set."""
@@ -140,7 +136,7 @@ class ModelBuilder:
 
     def state(
         self, name: str, initial: Scalar, unit: str, description: str, base: str = "", *, stepwise: bool = False
-    ) -> ca.SX:
+    ) -> Expr:
         """Declare a continuous state.
 
         ``initial``: its initial value, an expression of parameters; ``unit``: one of `UNITS`; the same per second must
@@ -149,10 +145,10 @@ class ModelBuilder:
         full = self._full(name)
         if f"{unit}/s" not in UNITS:
             raise ValueError(f"state {full!r} is in {unit!r}; add its rate {unit + '/s'!r} to UNITS as well")
-        self._expressions[full] = ca.SX(initial)
+        self._expressions[full] = Expr(initial)
         return self._declare(State(full, unit, description, base, stepwise))
 
-    def derivative(self, state: ca.SX, rate: Scalar, implicit: Scalar | None = None) -> None:
+    def derivative(self, state: Expr, rate: Scalar, implicit: Scalar | None = None) -> None:
         """Give the time derivative of a declared state.
 
         ``rate``: [unit of the state per second]; ``implicit``: the part of the rate that an implicit integrator solves
@@ -163,25 +159,24 @@ class ModelBuilder:
             raise ValueError(f"model {self.name}: {state.name()!r} is no declared state and can have no derivative")
         if state.name() in self._derivatives:
             raise ValueError(f"model {self.name}: state {state.name()!r} has two derivatives")
-        self._derivatives[state.name()] = ca.SX(rate)
+        self._derivatives[state.name()] = Expr(rate)
         if implicit is not None:
-            self._implicit[state.name()] = ca.SX(implicit)
+            self._implicit[state.name()] = Expr(implicit)
 
     def output(self, name: str, value: Scalar, unit: str, description: str, base: str = "") -> None:
         """Declare an output as a function of states, inputs and parameters.
 
         ``value``: an expression of states, inputs and parameters."""
         full = self._full(name)
-        self._expressions[full] = ca.SX(value)
+        self._expressions[full] = Expr(value)
         self._declare(Output(full, unit, description, base))
 
-    def algebraic(self, name: str) -> ca.SX:
+    def algebraic(self, name: str) -> Expr:
         """Return a symbol for a signal that is used before it can be written; `close` gives its value."""
-        symbol = ca.SX.sym(self._full(name))
-        self._opened.append(symbol)
-        return symbol
+        self._opened.append(symbol(self._full(name)))
+        return self._opened[-1]
 
-    def close(self, symbol: ca.SX, value: Scalar) -> None:
+    def close(self, signal: Expr, value: Scalar) -> None:
         """Give the value of an `algebraic` signal.
 
         Raises
@@ -189,21 +184,21 @@ class ModelBuilder:
         ValueError
             If the value depends on the signal itself: an algebraic loop.
         """
-        value = ca.SX(value)
-        if ca.depends_on(value, symbol):
-            raise ValueError(f"model {self.name}: signal {symbol.name()!r} depends directly on itself")
-        self._algebraic.append((symbol, value))
+        value = Expr(value)
+        if depends_on([value], [signal]):
+            raise ValueError(f"model {self.name}: signal {signal.name()!r} depends directly on itself")
+        self._algebraic.append((signal, value))
 
     def nodes(
         self, elements: Mapping[tuple[int, int], Complex], currents: Sequence[Complex], written_out: Callable[[], Model]
-    ) -> list[tuple[ca.SX, ca.SX]]:
+    ) -> list[tuple[Expr, Expr]]:
         """Let the kernel solve complex nodal equations Y·v = i as data; returns real and imaginary part of each v."""
         self._nodes = Nodes(elements, currents, written_out)
         return self._nodes.voltages
 
     def require(self, positive: Scalar, rule: str) -> None:
         """Refuse to initialise (or to go on, for tunable parameters) unless ``positive`` > 0."""
-        self._requirements.append((ca.SX(positive), rule))
+        self._requirements.append((Expr(positive), rule))
 
     # -- the model ---------------------------------------------------------------------------
 
@@ -216,11 +211,11 @@ class ModelBuilder:
             If a state has no derivative, or a calculated parameter or initial state depends on
             something other than parameters.
         """
-        kinds: dict[type, list[tuple[Variable, ca.SX]]] = {
+        kinds: dict[type, list[tuple[Variable, Expr]]] = {
             kind: [entry for entry in self._declared.values() if type(entry[0]) is kind]
             for kind in (Parameter, CalculatedParameter, Input, State, Output)
         }
-        p, c, u, x, _ = (_stack([symbol for _, symbol in entries]) for entries in kinds.values())
+        p, c, u, x, _ = ([declared for _, declared in entries] for entries in kinds.values())
         algebraic = self._closed_signals()
         self._check_origins(p)
         missing = [s.name for s, _ in kinds[State] if s.name not in self._derivatives]
@@ -231,24 +226,24 @@ class ModelBuilder:
         if integrator == "sdirk" and self._nodes is not None:
             raise ValueError(f"model {self.name}: the implicit integrator solves no nodal equations; take runge_kutta")
 
-        def collect(entries: list[tuple[Variable, ca.SX]], values: dict[str, ca.SX]) -> ca.SX:
-            stacked = _stack([values[variable.name] for variable, _ in entries])
-            for symbol, value in algebraic:
-                stacked = ca.substitute(stacked, symbol, value)
-            return stacked
+        def collect(entries: list[tuple[Variable, Expr]], values: dict[str, Expr]) -> list[Expr]:
+            found = [values[variable.name] for variable, _ in entries]
+            for signal, value in algebraic:
+                found = substitute(found, [signal], [value])
+            return found
 
         c_value = self._calculate(kinds[CalculatedParameter], c)
-        x_value = ca.substitute(collect(kinds[State], self._expressions), c, c_value)
-        r_value = _stack([value for value, _ in self._requirements])
+        x_value = substitute(collect(kinds[State], self._expressions), c, c_value)
+        r_value = [value for value, _ in self._requirements]
         arguments = [x, u, p, c]
         nodal = None
         if self._nodes is not None:
             nodal = self._nodes.equations(x, u, p, c)
-            arguments.append(self._nodes.symbol)
+            arguments.append(self._nodes.symbols)
         implicit = None
         if self._implicit:
             rates = collect(kinds[State], self._derivatives | self._implicit)
-            implicit = ca.Function("implicit", arguments, [rates])
+            implicit = Function("implicit", arguments, [rates])
         return Model(
             name=self.name,
             title=self.title,
@@ -257,10 +252,10 @@ class ModelBuilder:
             inputs=tuple(v for v, _ in kinds[Input]),  # type: ignore[misc]
             states=tuple(v for v, _ in kinds[State]),  # type: ignore[misc]
             outputs=tuple(v for v, _ in kinds[Output]),  # type: ignore[misc]
-            initialise=ca.Function("initialise", [p], [c_value, x_value]),
-            derivatives=ca.Function("derivatives", arguments, [collect(kinds[State], self._derivatives)]),
-            outputs_function=ca.Function("outputs", arguments, [collect(kinds[Output], self._expressions)]),
-            requirements=ca.Function("requirements", [p, c], [r_value]),
+            initialise=Function("initialise", [p], [c_value, x_value]),
+            derivatives=Function("derivatives", arguments, [collect(kinds[State], self._derivatives)]),
+            outputs_function=Function("outputs", arguments, [collect(kinds[Output], self._expressions)]),
+            requirements=Function("requirements", [p, c], [r_value]),
             requirement_texts=tuple(text for _, text in self._requirements),
             integrator=integrator,
             implicit=implicit,
@@ -268,23 +263,21 @@ class ModelBuilder:
             kind=self.kind,
         )
 
-    def _calculate(self, entries: list[tuple[Variable, ca.SX]], c: ca.SX) -> ca.SX:
+    def _calculate(self, entries: list[tuple[Variable, Expr]], c: list[Expr]) -> list[Expr]:
         """Express every calculated parameter by parameters alone; each may use those declared before it."""
-        tunable = ca.vertcat(*[s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable])
-        values: list[ca.SX] = []
+        tunable = [s for v, s in self._declared.values() if isinstance(v, Parameter) and v.tunable]
+        values: list[Expr] = []
         for index, (variable, _) in enumerate(entries):
-            value = self._expressions[variable.name]
-            if values:
-                value = ca.substitute(value, c[:index], ca.vertcat(*values))
-            if tunable.numel() and ca.depends_on(value, tunable):
+            (value,) = substitute([self._expressions[variable.name]], c[:index], values)
+            if depends_on([value], tunable):
                 raise ValueError(
                     f"model {self.name}: {variable.name!r} is computed once, at initialisation, "
                     "and must not depend on a tunable parameter"
                 )
             values.append(value)
-        return _stack(values)
+        return values
 
-    def _closed_signals(self) -> list[tuple[ca.SX, ca.SX]]:
+    def _closed_signals(self) -> list[tuple[Expr, Expr]]:
         """Algebraic signals in an order in which each can be substituted once and for all.
 
         Raises
@@ -292,40 +285,35 @@ class ModelBuilder:
         ValueError
             If one was never closed, or several depend on one another in a circle.
         """
-        declared = ca.vertcat(*self._opened) if self._opened else ca.SX(0, 1)
         closed = [symbol.name() for symbol, _ in self._algebraic]
         never = [symbol.name() for symbol in self._opened if symbol.name() not in closed]
         if never:
             raise ValueError(f"model {self.name}: signal {', '.join(never)} is used but never closed")
         waiting = list(self._algebraic)
-        ordered: list[tuple[ca.SX, ca.SX]] = []
+        ordered: list[tuple[Expr, Expr]] = []
         for _ in range(len(waiting)):
-            for symbol, given in list(waiting):
+            for signal, given in list(waiting):
                 value = given
                 for other, known in ordered:
-                    value = ca.substitute(value, other, known)
-                if not ca.depends_on(value, declared):
-                    ordered.append((symbol, value))
-                    waiting = [entry for entry in waiting if entry[0].name() != symbol.name()]
+                    (value,) = substitute([value], [other], [known])
+                if not depends_on([value], self._opened):
+                    ordered.append((signal, value))
+                    waiting = [entry for entry in waiting if entry[0].name() != signal.name()]
         if waiting:
             names = ", ".join(symbol.name() for symbol, _ in waiting)
             raise ValueError(f"model {self.name}: signals {names} depend on one another in a circle")
         return ordered
 
-    def _check_origins(self, p: ca.SX) -> None:
+    def _check_origins(self, p: list[Expr]) -> None:
         """Calculated parameters and initial states come from parameters (and calculated ones) alone."""
-        allowed = {s.name() for s in ca.symvar(p)} | {
+        allowed = {s.name() for s in p} | {
             v.name for v, _ in self._declared.values() if isinstance(v, CalculatedParameter)
         }
         for variable, _ in self._declared.values():
             if isinstance(variable, CalculatedParameter | State):
-                others = {s.name() for s in ca.symvar(self._expressions[variable.name])} - allowed
+                others = {s.name() for s in symbols_in([self._expressions[variable.name]])} - allowed
                 if others:
                     raise ValueError(
                         f"model {self.name}: {variable.name!r} must follow from parameters at initialisation, "
                         f"but depends on {', '.join(sorted(others))}"
                     )
-
-
-def _stack(entries: list[ca.SX]) -> ca.SX:
-    return ca.SX(ca.vertcat(*entries)) if entries else ca.SX(0, 1)

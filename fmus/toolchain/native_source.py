@@ -2,13 +2,13 @@
 
 One translation unit per version of FMI, with nothing in it but the C library."""
 
+from itertools import chain, islice
 from pathlib import Path
-
-import casadi as ca
 
 from fmus.toolchain.c_text import c_number, c_string
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import FmiVersion, Model
+from fmus.toolchain.symbols import Expr, Function, jtimes, jtimes_transposed, symbols
 
 _C = Path(__file__).with_name("c")
 _SHORTEST_TEXT = 640  # room for a message [bytes] beside the longest rule or name it may quote
@@ -26,18 +26,18 @@ def native_source(model: Model, version: FmiVersion) -> str:
     return "\n".join(parts)
 
 
-def derivative_functions(model: Model) -> dict[str, ca.Function]:
+def derivative_functions(model: Model) -> dict[str, Function]:
     """Products of the exact Jacobians with a direction, and of their transposes with a seed.
 
     ``direction`` and ``adjoint`` are of (ẋ, y) by (x, u, p, c); ``start_direction`` and ``start_adjoint`` of the
     initialisation (c, x) by p."""
     x, u, p, c = (
-        ca.SX.sym(name, len(group))
+        symbols(name, len(group))
         for name, group in (("x", model.states), ("u", model.inputs), ("p", model.parameters), ("c", model.calculated))
     )
     known = [x, u, p, c]
-    follows = [model.derivatives(*known), model.outputs_function(*known)]
-    start = list(model.initialise.call([p]))
+    follows = [*model.derivatives.of(*known), *model.outputs_function.of(*known)]
+    start = model.initialise.of(p)
     return {
         "direction": _direction("direction", known, follows),
         "adjoint": _adjoint("adjoint", known, follows),
@@ -46,20 +46,16 @@ def derivative_functions(model: Model) -> dict[str, ca.Function]:
     }
 
 
-def _direction(name: str, known: list[ca.SX], follows: list[ca.SX]) -> ca.Function:
-    directions = [ca.SX.sym("d", symbol.shape) for symbol in known]
-    point, along = ca.vertcat(*known), ca.vertcat(*directions)
-    return ca.Function(name, [*known, *directions], [ca.jtimes(value, point, along) for value in follows])
+def _direction(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
+    directions = [symbols("d", len(vector)) for vector in known]
+    point, along = list(chain(*known)), list(chain(*directions))
+    return Function(name, [*known, *directions], [jtimes(values, point, along) for values in follows])
 
 
-def _adjoint(name: str, known: list[ca.SX], follows: list[ca.SX]) -> ca.Function:
-    seeds = [ca.SX.sym("a", value.shape) for value in follows]
-    point = ca.vertcat(*known)
-    total = ca.jtimes(ca.vertcat(*follows), point, ca.vertcat(*seeds), True)
-    edges = [0]
-    for symbol in known:
-        edges.append(edges[-1] + symbol.numel())
-    return ca.Function(name, [*known, *seeds], ca.vertsplit(total, edges))
+def _adjoint(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
+    seeds = [symbols("a", len(vector)) for vector in follows]
+    total = iter(jtimes_transposed(list(chain(*follows)), list(chain(*known)), list(chain(*seeds))))
+    return Function(name, [*known, *seeds], [list(islice(total, len(vector))) for vector in known])
 
 
 def _data(model: Model) -> str:

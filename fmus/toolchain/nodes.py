@@ -4,12 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import casadi as ca
-
 from fmus.toolchain.elimination_plan import plan_pattern
 from fmus.toolchain.model import Model, NodalEquations
+from fmus.toolchain.symbols import Expr, Function, Scalar, Vector, symbols, symbols_in
 
-Complex = tuple[ca.SX | float, ca.SX | float]  # real and imaginary part
+Complex = tuple[Scalar, Scalar]  # real and imaginary part
 
 LARGEST_REST = 1e-6  # part of its terms that a row of Y·v = i may leave over; with more, no voltage is finite
 
@@ -25,27 +24,27 @@ class Nodes:
     written_out: Callable[[], Model]
 
     @cached_property
-    def symbol(self) -> ca.SX:
+    def symbols(self) -> list[Expr]:
         """All voltages: real parts, then imaginary parts."""
-        return ca.SX.sym("v", 2 * len(self.currents))
+        return symbols("v", 2 * len(self.currents))
 
     @property
-    def voltages(self) -> list[tuple[ca.SX, ca.SX]]:
+    def voltages(self) -> list[tuple[Expr, Expr]]:
         """Symbols for real and imaginary part of each v."""
-        parts, n = ca.vertsplit(self.symbol), len(self.currents)
-        return list(zip(parts[:n], parts[n:], strict=True))
+        n = len(self.currents)
+        return list(zip(self.symbols[:n], self.symbols[n:], strict=True))
 
-    def equations(self, x: ca.SX, u: ca.SX, p: ca.SX, c: ca.SX) -> NodalEquations:
+    def equations(self, x: Vector, u: Vector, p: Vector, c: Vector) -> NodalEquations:
         """The equations as functions, with the plan of their solution."""
         rows, columns = zip(*self.elements, strict=True)
         plan = plan_pattern(len(self.currents), rows, columns)
         ordered = [self.elements[place] for place in plan.entries]
-        values = ca.Function("nodal_values", [u, p, c], [_parts(ordered)])
-        _, given = values.jac_sparsity(0, 0).get_triplet()
-        currents = ca.Function("nodal_currents", [x, u, p, c], [_parts(self.currents)])
-        return NodalEquations(plan, values, currents, tuple(sorted(set(given))), self.written_out)
+        values = Function("nodal_values", [u, p, c], [_parts(ordered)])
+        number = {symbol: k for k, symbol in enumerate(u)}
+        given = sorted(number[symbol] for symbol in symbols_in(values.outputs[0]) if symbol in number)
+        currents = Function("nodal_currents", [x, u, p, c], [_parts(self.currents)])
+        return NodalEquations(plan, values, currents, tuple(given), self.written_out)
 
 
-def _parts(entries: Sequence[Complex]) -> ca.SX:
-    parts = [ca.SX(re) for re, _ in entries] + [ca.SX(im) for _, im in entries]
-    return ca.SX(ca.vertcat(*parts))
+def _parts(entries: Sequence[Complex]) -> list[Expr]:
+    return [Expr(re) for re, _ in entries] + [Expr(im) for _, im in entries]

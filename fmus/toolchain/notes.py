@@ -21,7 +21,7 @@ from fmus.toolchain.extras import installed_version
 
 _OWN = ("fmus", "gfor_fmu")
 _ENDINGS = {".py", ".c", ".h"}
-_LIBRARIES = ("gfor-cosim", "casadi", "numpy", "pythonfmu", "scipy", "ziglang")
+_LIBRARIES = ("gfor-cosim", "numpy", "pythonfmu", "scipy", "ziglang")
 
 
 def noted(entry: EntryPoint, asked: str, find: Callable[[], Any]) -> Any:

@@ -7,12 +7,11 @@ a solver that fed it back would have an algebraic loop."""
 from dataclasses import dataclass
 from typing import Any
 
-import casadi as ca
-
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs
 from fmus.toolchain.port_variables import SYSTEM_BASE
+from fmus.toolchain.symbols import Expr
 
 INTERNAL_STEP, LONGEST_STEP = 1e-3, 2e-3
 """Internal step [s], default and maximum: parameters allow time constants of 1 ms, and Runge-Kutta of order 4 needs
@@ -38,11 +37,11 @@ class SourceEmf:
 class MasterStep:
     """Communication step of the master [s], 0 if it is not told, and how many steps its voltages are late."""
 
-    size: ca.SX
-    late: ca.SX
+    size: Expr
+    late: Expr
 
     @property
-    def to_next(self) -> ca.SX:
+    def to_next(self) -> Expr:
         """Time from the last voltage's arrival to the middle of the step for which an emf is given [s]."""
         return (self.late + 0.5) * self.size
 
@@ -84,7 +83,7 @@ def motion(m: ModelBuilder, name: str, value: Phasor, start: Phasor, text: str) 
     return Phasor(moving[0], -moving[1])
 
 
-def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: ca.SX) -> SourceEmf:
+def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: Expr, rate: Expr) -> SourceEmf:
     """Declare the master's step and delay as parameters; return the emf in the middle of the last step and of the next
     step.
 
@@ -98,7 +97,7 @@ def source_emf(m: ModelBuilder, emf: Phasor, start: Phasor, angle: ca.SX, rate: 
     with m.scope("source"):
         change = motion(m, "e", emf, start, "Emf")
 
-    def moved(time: ca.SX) -> Phasor:
+    def moved(time: Expr) -> Phasor:
         return (emf + change * time).rotated(angle + rate * time)
 
     return SourceEmf(behind=moved(-master.size / 2), ahead=moved(master.to_next))

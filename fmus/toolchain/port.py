@@ -7,12 +7,12 @@ A breaker at the port is open where ``connected`` is false. Its phases interrupt
 of its current; here the current fades with `BREAKER_TIME`, di/dt = −i/τ, whatever the voltages are."""
 
 from dataclasses import dataclass, replace
-
-import casadi as ca
+from math import pi
 
 from fmus.toolchain import port_variables
 from fmus.toolchain.frames import Phasor, current_of_power, polar, power
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr
 
 BREAKER_TIME = 1e-3  # time constant τ [s] with which the current of an open breaker fades
 
@@ -24,7 +24,7 @@ class OperatingPoint:
     # v_0, i_0: bus voltage and injected current of the power flow, network frame [pu, S_n].
     v_0: Phasor
     i_0: Phasor
-    omega_b: ca.SX  # base angular frequency [rad/s]
+    omega_b: Expr  # base angular frequency [rad/s]
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class DevicePort(OperatingPoint):
 
     v: Phasor  # bus voltage, network frame [pu]
     # device current [pu, S_n] times this is the current in the port's unit: mostly pu on the system base.
-    current_scale: ca.SX
-    connected: ca.SX  # 1 where the breaker is closed, 0 where it is open
+    current_scale: Expr
+    connected: Expr  # 1 where the breaker is closed, 0 where it is open
 
     def through_breaker(self, closed: Phasor, opened: Phasor) -> Phasor:
         """The first value behind a closed breaker, the second behind an open one."""
@@ -46,19 +46,19 @@ def device_port(m: ModelBuilder, S_n: float, P_0: float) -> DevicePort:
     return device_port_of(m, declare_rating(m, S_n), P_0)
 
 
-def device_port_of(m: ModelBuilder, rating: ca.SX, P_0: float) -> DevicePort:
+def device_port_of(m: ModelBuilder, rating: Expr, P_0: float) -> DevicePort:
     """`device_port` of a device that has declared its rating [MVA], because its data depend on it."""
     system = m.declare(port_variables.S_BASE)
     v = Phasor(m.declare(port_variables.V_RE), m.declare(port_variables.V_IM))
     return port_at(m, v, P_0, rating / system)
 
 
-def declare_rating(m: ModelBuilder, S_n: float) -> ca.SX:
+def declare_rating(m: ModelBuilder, S_n: float) -> Expr:
     """Declare the rating [MVA]."""
     return m.declare(replace(port_variables.S_N, start=float(S_n)))
 
 
-def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: ca.SX) -> DevicePort:
+def port_at(m: ModelBuilder, v: Phasor, P_0: float, current_scale: Expr) -> DevicePort:
     """Declare the power-flow start values of a device at a bus voltage.
 
     ``v``: Bus voltage, network frame [pu].
@@ -75,7 +75,7 @@ def declare_operating_point(m: ModelBuilder, P_0: float) -> OperatingPoint:
     v_0, theta_0 = m.declare(port_variables.V_0), m.declare(port_variables.THETA_0)
     p_0, q_0 = m.declare(replace(port_variables.P_0, start=float(P_0))), m.declare(port_variables.Q_0)
     bus = polar(v_0, theta_0)
-    return OperatingPoint(bus, current_of_power(p_0, q_0, bus), 2 * ca.pi * f_n)
+    return OperatingPoint(bus, current_of_power(p_0, q_0, bus), 2 * pi * f_n)
 
 
 def declare_port_outputs(m: ModelBuilder, port: DevicePort, current: Phasor) -> None:

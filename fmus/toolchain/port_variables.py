@@ -1,7 +1,7 @@
 """The variables of a device's port and the system base: names, units, texts and limits as plain data.
 
 Models declare their port from them, and the orchestrator gives a bound foreign FMU the same port. Therefore this module
-imports no CasADi."""
+imports no symbols."""
 
 from fmus.toolchain.variables import Input, Output, Parameter, Usual
 

@@ -13,13 +13,12 @@ from array import array
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-import casadi as ca
-
 from fmus.toolchain.elimination import plan_elimination
-from fmus.toolchain.instructions import CONSTANT, INPUT, OUTPUT, SAME, instructions
+from fmus.toolchain.instructions import CONSTANT, INPUT, OUTPUT, instructions
 from fmus.toolchain.model import Model
 from fmus.toolchain.nodes import LARGEST_REST
 from fmus.toolchain.plan import Plan
+from fmus.toolchain.symbols import Function
 from fmus.toolchain.tape_order import Operation, runs_of, with_pairs
 
 MAGIC, VERSION = b"gfortape", 1
@@ -82,11 +81,11 @@ class _Values:
         self.fixed = set(range(sizes["p"] + sizes["c"]))
         self._known: dict[Operation, int] = {}
 
-    def read(self, function: ca.Function, name: str, groups: str) -> list[int]:
+    def read(self, function: Function, name: str, groups: str) -> list[int]:
         """The values of a function's results, one after the other."""
         edges = [0]
-        for k in range(function.n_out()):
-            edges.append(edges[-1] + function.numel_out(k))
+        for vector in function.outputs:
+            edges.append(edges[-1] + len(vector))
         results, register = [-1] * edges[-1], dict[int, int]()
         for code, source, target, value in instructions(function, name):
             if code >= 0:
@@ -97,8 +96,6 @@ class _Values:
                 register[target[0]] = self._number(struct.pack("<d", value))
             elif code == OUTPUT:
                 results[edges[target[0]] + target[1]] = register[source[0]]
-            elif code == SAME:
-                register[target[0]] = register[source[0]]
         return results
 
     def _number(self, bits: bytes) -> int:

@@ -6,12 +6,11 @@ are phase quantities: the frame's angle brings them to the standing frame, 1 pu 
 from dataclasses import dataclass
 from typing import Literal
 
-import casadi as ca
-
 from fmus.toolchain.frames import Phasor, of_phases, phases, power
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, declare_rating, device_port_of
+from fmus.toolchain.symbols import Expr, fmax, fmin, sqrt
 
 FilterKind = Literal["L", "LC", "LCL"]
 BridgeKind = Literal["modulation", "voltage"]
@@ -37,8 +36,8 @@ class _Branches:
 
     z_s: Phasor
     z_g: Phasor
-    B_c: ca.SX | None
-    R_d: ca.SX | None
+    B_c: Expr | None
+    R_d: Expr | None
 
     def capacitor_voltage(self, u: Phasor) -> Phasor:
         """Behind the damping resistor, at rest."""
@@ -55,8 +54,8 @@ def converter_circuit(name: str, filter_kind: FilterKind, bridge: BridgeKind) ->
     rating = declare_rating(m, S_N)
     port = device_port_of(m, rating, P_0)
     V_n = m.parameter("V_n", V_N, "kV", "Rated voltage at the filter, line to line, rms", minimum=1e-3)
-    volt = m.calculated("base.voltage", V_n * ca.sqrt(2 / 3), "kV", "Amplitude of the rated phase voltage")
-    m.calculated("base.current", rating / V_n * ca.sqrt(2 / 3), "kA", "Amplitude of the rated current")
+    volt = m.calculated("base.voltage", V_n * sqrt(2 / 3), "kV", "Amplitude of the rated phase voltage")
+    m.calculated("base.current", rating / V_n * sqrt(2 / 3), "kA", "Amplitude of the rated current")
     branches = _declare_branches(m, filter_kind)
     angle = m.state(ANGLE, 0.0, "rad", "Angle of the network frame")
     m.derivative(angle, port.omega_b)
@@ -90,7 +89,7 @@ def _declare_branches(m: ModelBuilder, kind: FilterKind) -> _Branches:
     return _Branches(z_s, z_g, B_c, R_d)
 
 
-def _bridge_voltage(m: ModelBuilder, kind: BridgeKind, volt: ca.SX, angle: ca.SX) -> Phasor:
+def _bridge_voltage(m: ModelBuilder, kind: BridgeKind, volt: Expr, angle: Expr) -> Phasor:
     """The averaged bridge [pu]: half the DC voltage times the modulation, which cannot exceed its limit."""
     V_dc = m.parameter("V_dc", 1.2, "kV", "DC voltage, held by a stiff source", minimum=1e-3)
     largest = m.parameter("m_max", 1.15, "1", "Limit of the modulation; 1.15 with a third harmonic", minimum=0.1)
@@ -98,19 +97,19 @@ def _bridge_voltage(m: ModelBuilder, kind: BridgeKind, volt: ca.SX, angle: ca.SX
     given = [m.input(name, unit, f"{text} of phase {name[-1]}") for name in BRIDGE]
     half = V_dc / 2
     wanted = [signal * half for signal in given] if kind == "modulation" else given
-    a, b, c = (ca.fmin(ca.fmax(v, -largest * half), largest * half) / volt for v in wanted)
+    a, b, c = (fmin(fmax(v, -largest * half), largest * half) / volt for v in wanted)
     return of_phases((a, b, c), angle)
 
 
 def _equations(m: ModelBuilder, port: DevicePort, z: _Branches, e: Phasor) -> tuple[Phasor, Phasor, Phasor]:
     """Declare states and their rates; return bridge current, filter voltage and current into the grid."""
 
-    def complex_state(name: str, initial: Phasor, text: str) -> tuple[Phasor, tuple[ca.SX, ca.SX]]:
+    def complex_state(name: str, initial: Phasor, text: str) -> tuple[Phasor, tuple[Expr, Expr]]:
         re = m.state(f"{name}_re", initial.re, "pu", f"{text}, real part, network frame", base="S_n")
         im = m.state(f"{name}_im", initial.im, "pu", f"{text}, imaginary part, network frame", base="S_n")
         return Phasor(re, im), (re, im)
 
-    def rate(state: tuple[ca.SX, ca.SX], value: Phasor) -> None:
+    def rate(state: tuple[Expr, Expr], value: Phasor) -> None:
         m.derivative(state[0], value.re)
         m.derivative(state[1], value.im)
 
@@ -134,7 +133,7 @@ def _equations(m: ModelBuilder, port: DevicePort, z: _Branches, e: Phasor) -> tu
     return i_s, u, i_g
 
 
-def _measurements(m: ModelBuilder, quantities: dict[str, Phasor], angle: ca.SX) -> None:
+def _measurements(m: ModelBuilder, quantities: dict[str, Phasor], angle: Expr) -> None:
     texts = {"u": "Voltage at the filter", "v": "Voltage at the bus", "i_s": "Current of the bridge",
              "i_g": "Current into the grid"}  # fmt: skip
     for name, value in quantities.items():

@@ -137,7 +137,7 @@ def export_dll(
     MissingLibraryError
         If the extra that builds FMUs is not installed.
     """
-    require("writing a DLL", "casadi", "ziglang")
+    require("writing a DLL", "ziglang")
     from fmus.control_dll import export  # noqa: PLC0415 - needs the extra `build`
 
     place = path_of(folder, "folder", "folder")

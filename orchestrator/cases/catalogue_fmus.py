@@ -31,7 +31,7 @@ def plan_fmu(
     model: str, network: Network | None = None, native: bool = False, parts: tuple[tuple[str, str], ...] = ()
 ) -> PlannedFmu:
     """FMU of a catalogue's model, described and not yet built."""
-    require(f"building the FMU {model!r} of the catalogue", "casadi", "ziglang" if native else "pythonfmu")
+    require(f"building the FMU {model!r} of the catalogue", "ziglang" if native else "pythonfmu")
     from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
 
     place = known(entry_of(model), _asked(model, network, native, parts))
@@ -46,7 +46,7 @@ def plan_fmu(
 
 def _sketch(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> tuple[str, str]:
     """Name of an FMU that is not there, and its description as far as it is known without equations."""
-    from fmus.toolchain.description import model_description  # noqa: PLC0415 - imports CasADi
+    from fmus.toolchain.description import model_description  # noqa: PLC0415 - imports what writes equations
 
     sketch = sketch_model(model, **_arguments(network, parts))
     return sketch.name, model_description(sketch, _TO_COME, sketch.name, "", native=native, listed=False).decode()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orchestrator.results.storage import versions_of
 
-_LIBRARIES = ("numpy", "scipy", "fmpy", "casadi", "xarray", "scikit-rf")
+_LIBRARIES = ("numpy", "scipy", "fmpy", "xarray", "scikit-rf")
 _ROOT = Path(__file__).parents[2]
 
 

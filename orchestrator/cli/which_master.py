@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _build(options: argparse.Namespace) -> int:
-    require("building the probe FMUs", "casadi", "ziglang")
+    require("building the probe FMUs", "ziglang")
     from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above
 

@@ -54,7 +54,7 @@ def as_fmu(path: Path) -> Path:
     """The FMU of a DLL or of a device's file; every other path stays as it is."""
     if not is_vendor_file(path):
         return path
-    require("building the FMU of a vendor's DLL", "casadi", "ziglang")
+    require("building the FMU of a vendor's DLL", "ziglang")
     from fmus.vendor_dll.device import DeviceFileError, device_of, read_device_file  # noqa: PLC0415 - needs `build`
     from fmus.vendor_dll.fmu import DllError, dll_members, read_dll  # noqa: PLC0415 - as above
 

@@ -28,7 +28,7 @@ _CSV_ROWS = 10_000  # rows of a table that are written at a time
 
 def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
     """What a result was made from: case text, values, versions, FMU guids, step and schedule."""
-    packages = ("gfor-cosim", "casadi", "fmpy", "numpy", "pythonfmu", "scipy")
+    packages = ("gfor-cosim", "fmpy", "numpy", "pythonfmu", "scipy")
     fmus = {name: plan.description for name, plan in prepared.system.components.items()}
     tolerance = prepared.schedule.tolerance
     return {

@@ -2,7 +2,6 @@
 
 import zipfile
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -10,6 +9,7 @@ from fmus.toolchain import native_source
 from fmus.toolchain.compiler import host_platform
 from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
+from fmus.toolchain.symbols import Function
 from orchestrator.analysis.component_linearization import linearize_by_derivatives
 from orchestrator.analysis.linearization import Blocks, compose, continuous
 from orchestrator.analysis.modes import eigenvalues
@@ -77,10 +77,10 @@ def lag_with_wrong_derivatives(folder, monkeypatch, state=1.0, entry=1.0, *, set
 
     def wrong(of):
         functions = right(of)
-        known = [ca.SX.sym(f"k{i}", *functions["direction"].size_in(i)) for i in range(functions["direction"].n_in())]
+        known = functions["direction"].inputs
         scaled = list(known)
-        scaled[4], scaled[5] = state * known[4], entry * known[5]  # x, u, p, c, then the same as directions
-        return functions | {"direction": ca.Function("direction", known, functions["direction"].call(scaled))}
+        scaled[4], scaled[5] = [state * d for d in known[4]], [entry * d for d in known[5]]  # directions of x and u
+        return functions | {"direction": Function("direction", known, functions["direction"].of(*scaled))}
 
     monkeypatch.setattr(native_source, "derivative_functions", wrong)
     path = export(NativeFmu(model), folder / "made", (host_platform(),))

@@ -1,12 +1,12 @@
 """FMUs that are not linear where they are linearised: the modes that they move are questioned, with the component."""
 
-import casadi as ca
 import numpy as np
 import pytest
 
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
+from fmus.toolchain.symbols import fabs, fmax, fmin, sin
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import find_modes
@@ -25,11 +25,11 @@ H = 1e-3
 SHAPES = {
     "straight": lambda u: u,
     "smooth": lambda u: u + 3 * u**2 - 5 * u**3,
-    "limit": lambda u: ca.fmin(u, 0.0),
-    "dead_band": lambda u: u - ca.fmax(-1.5e-5, ca.fmin(1.5e-5, u)),
-    "saturated": lambda u: ca.fmax(-3e-7, ca.fmin(3e-7, u)),
-    "rough": lambda u: u + 1e-7 * ca.sin(1e6 * u),
-    "one_way_lead": lambda u: u + 0.02 * ca.fabs(u),
+    "limit": lambda u: fmin(u, 0.0),
+    "dead_band": lambda u: u - fmax(-1.5e-5, fmin(1.5e-5, u)),
+    "saturated": lambda u: fmax(-3e-7, fmin(3e-7, u)),
+    "rough": lambda u: u + 1e-7 * sin(1e6 * u),
+    "one_way_lead": lambda u: u + 0.02 * fabs(u),
 }
 
 

@@ -7,6 +7,7 @@ from fmus.toolchain.catalogue import build_model
 from orchestrator.black_box.bench import Bench
 from orchestrator.cases.case import load_case
 from orchestrator.fmi.description import read_description
+from tests.support.jacobians import jacobians
 
 H = 1e-4
 
@@ -31,7 +32,7 @@ def continuous(scenario):
     model = build_model("gfor")
     p = np.array([float(bench.parameters.get(v.name, v.start)) for v in model.parameters])
     c, x = model.initialise(p)
-    A, B, C, D = (np.array(block) for block in model.jacobians()(x, bench.rest, p, c))
+    A, B, C, D = (np.array(block) for block in jacobians(model)(x, bench.rest, p, c))
     rows = [[o.name for o in model.outputs].index(name) for name in bench.outputs]
     assert not D[rows].any()
     return A, B, C[rows]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-HEAVY = {"casadi", "dask", "h5py", "matplotlib", "pandapower", "pandas", "pint", "xarray"}
+HEAVY = {"dask", "h5py", "matplotlib", "pandapower", "pandas", "pint", "xarray"}
 
 
 @pytest.mark.parametrize("case", ["two_area", "ieee39"])

@@ -3,12 +3,11 @@
 from functools import cache
 from math import ceil
 
-import casadi as ca
-
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
+from fmus.toolchain.symbols import sqrt
 from orchestrator.fmi.description import FmuDescription, read_description
 
 
@@ -87,7 +86,7 @@ def root() -> Model:
     m = ModelBuilder("small_root", "Square root")
     offset = m.parameter("offset", 0.0, "1", "Added to what the root is taken of", tunable=True)
     u = m.input("u", "1", "Input")
-    m.output("y", ca.sqrt(0.05 + offset - u), "1", "Root")
+    m.output("y", sqrt(0.05 + offset - u), "1", "Root")
     return m.build()
 
 

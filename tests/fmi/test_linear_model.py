@@ -21,6 +21,7 @@ from orchestrator.fmi.description import read_description
 from orchestrator.fmi.linear_model import FOLDER, NAME, read_embedded_model
 from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.study.modes import compute_modes
+from tests.support.jacobians import jacobians
 
 H = 1e-4
 
@@ -63,7 +64,7 @@ def exact(model):
     u = np.array([model.inputs[i.name] for i in equations.inputs])
     assert np.array(x).ravel() == pytest.approx(list(model.states.values()), abs=1e-12)
     assert np.array(equations.derivatives(x, u, p, c)).ravel() == pytest.approx(np.zeros(x.shape[0]), abs=1e-9)
-    return [np.array(block) for block in equations.jacobians()(x, u, p, c)]
+    return [np.array(block) for block in jacobians(equations)(x, u, p, c)]
 
 
 def test_the_matrices_are_the_equations_jacobians(fmu):

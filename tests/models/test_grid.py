@@ -9,6 +9,7 @@ from fmus.grid.grid import grid
 from fmus.grid.network import Line, Load, Network, Port, Shunt
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
+from tests.support.jacobians import jacobians
 
 LINES = (
     Line("ab", "a", "b", X=0.1, R=0.01, B=0.04),
@@ -83,14 +84,14 @@ class Running:
 
     def settle(self, seconds, step=2e-5):
         """L-stable implicit Euler steps to a steady state or, with short steps, along the way to it."""
-        A, B = (np.array(block) for block in self.model.jacobians()(self.x, self.u, self.p, self.c)[:2])
+        A, B = (np.array(block) for block in jacobians(self.model)(self.x, self.u, self.p, self.c)[:2])
         advance = np.linalg.inv(np.eye(len(A)) - step * A)
         for _ in range(round(seconds / step)):
             self.x = advance @ (self.x + step * B @ self.u)
 
     def stand(self):
         """The steady state for the present parameters and inputs."""
-        A, B = (np.array(block) for block in self.model.jacobians()(self.x, self.u, self.p, self.c)[:2])
+        A, B = (np.array(block) for block in jacobians(self.model)(self.x, self.u, self.p, self.c)[:2])
         self.x = np.linalg.solve(A, -B @ self.u)
 
     @property
@@ -115,7 +116,7 @@ def test_the_power_flow_is_the_steady_state_and_both_fit_the_literatures_admitta
     flow = flow_of(opened)
     assert flow.residual <= 1e-9
     running = Running(flow, **{f"{name}.connected": 0.0 for name in opened})
-    fastest = np.abs(np.array(running.model.jacobians()(running.x, running.u, running.p, running.c)[0])).max()
+    fastest = np.abs(np.array(jacobians(running.model)(running.x, running.u, running.p, running.c)[0])).max()
     assert np.abs(running.rates).max() < 1e-12 * fastest * 10  # [pu/s]; rounding times the fastest rate
     v = np.array([flow.voltages[bus] for bus in BUSES])
     injected = np.zeros(5, complex)

@@ -2,7 +2,6 @@
 
 from cmath import exp
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -12,6 +11,7 @@ from fmus.synchronous_generator.stabilization.norm631 import pss2a
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr
 from tests.support.evaluated import Evaluated
 
 UNEQUAL = {
@@ -99,7 +99,7 @@ def test_the_stabiliser_damps_the_swing():
 
 # -- the exciters -------------------------------------------------------------------------------
 
-START = Start(ca.SX(1.01), ca.SX(2.2), ca.SX(0.7), Phasor(1.0, 0.0), Phasor(0.7, -0.1))
+START = Start(Expr(1.01), Expr(2.2), Expr(0.7), Phasor(1.0, 0.0), Phasor(0.7, -0.1))
 
 
 def excited(exciter, values):
@@ -160,7 +160,7 @@ def test_a_raised_reference_raises_the_field_voltage(name):
 def stabiliser(**values):
     m = ModelBuilder("alone", "The stabiliser alone")
     speed, power = m.input("speed", "pu", "w − 1", base="f_n"), m.input("power", "pu", "P_e", base="S_n", start=0.8)
-    m.output("v_s", pss2a(m, speed, power, ca.SX(0.8)), "pu", "Signal", base="S_n")
+    m.output("v_s", pss2a(m, speed, power, Expr(0.8)), "pu", "Signal", base="S_n")
     return Evaluated(m.build(), {f"pss.{name}": value for name, value in values.items()})
 
 

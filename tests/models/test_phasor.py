@@ -11,6 +11,7 @@ from fmus.toolchain.catalogue import build_model
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent
+from tests.support.jacobians import jacobians
 
 GENERATORS = [f"synchronous_generator_{exciter}" for exciter in ("ac4a", "st1", "st4b")]
 DEVICES = ["gfor", "gfl", *GENERATORS]
@@ -37,7 +38,7 @@ class Evaluated:
 
     def response(self, s, u, outputs):
         """Transfer matrix from (v_re, v_im) at s [1/s]."""
-        A, B, C, D = (np.array(block) for block in self.model.jacobians()(self.x, u, self.p, self.c))
+        A, B, C, D = (np.array(block) for block in jacobians(self.model)(self.x, u, self.p, self.c))
         rows = [[o.name for o in self.model.outputs].index(name) for name in outputs]
         return (C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)[rows]
 

@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-import casadi as ca
 import numpy as np
 import pytest
 
 from fmus.synchronous_generator.conversion import AxisData, exact
+from fmus.toolchain.symbols import Expr
 from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.study.modes import compute_modes
 from tests.reference.multi_machine import hertz_and_percent
@@ -52,8 +52,8 @@ def converted_exactly(system):
 
     def of_axis(X, X1, X2, X_l, T1, T2):
         omega_b = 120 * np.pi
-        b = exact(AxisData(*(ca.SX(x) for x in (X, X1, X2, X_l, T1, T2))), ca.SX(omega_b))
-        X_1, R_1, X_2, R_2 = (float(ca.evalf(x)) for x in (b.X_1, b.R_1, b.X_2, b.R_2))
+        b = exact(AxisData(*(Expr(x) for x in (X, X1, X2, X_l, T1, T2))), Expr(omega_b))
+        X_1, R_1, X_2, R_2 = (float(x) for x in (b.X_1, b.R_1, b.X_2, b.R_2))
         X_m = X - X_l
         both = X_m * X_1 / (X_m + X_1)
         return X_l + both, (X_m + X_1) / (omega_b * R_1), (X_2 + both) / (omega_b * R_2)

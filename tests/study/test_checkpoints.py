@@ -192,7 +192,7 @@ def test_another_value_is_named(tmp_path, said):
         resumed(prepared_scenario(values={"gfor.P_0": 0.5}), tmp_path, said)
 
 
-@pytest.mark.parametrize("library", ["numpy", "scipy", "casadi"])
+@pytest.mark.parametrize("library", ["numpy", "scipy"])
 def test_another_version_of_a_library_is_named(tmp_path, said, monkeypatch, library):
     interrupted(prepared_scenario(), tmp_path, said, 0.4)
     versions = checkpoint_mark.library_versions()

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +11,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.port import declare_rating, port_at
+from fmus.toolchain.symbols import Expr
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
@@ -51,8 +51,8 @@ def converter_at_grid() -> Model:
         (v, (converter.current - line - Phasor(0.0, B) * v) * (port.omega_b / B)),
     )
     for state, rate in rates:
-        m.derivative(ca.SX(state.re), rate.re)
-        m.derivative(ca.SX(state.im), rate.im)
+        m.derivative(Expr(state.re), rate.re)
+        m.derivative(Expr(state.im), rate.im)
     s = power(v, converter.current)
     m.output("v", v.magnitude(), "pu", "Bus voltage magnitude", base="bus")
     m.output("p", s.re, "pu", "Active power into the bus", base="S_n")

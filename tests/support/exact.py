@@ -8,6 +8,7 @@ from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.model import Model
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
+from tests.support.jacobians import jacobians
 
 
 def network_of(case: Case, scenario: str, overrides: dict | None = None) -> Network:
@@ -24,7 +25,7 @@ def exact_continuous(prepared: PreparedScenario, network: Network | None = None)
     inputs = _inputs(prepared, parts)
     blocks = {}
     for name, (model, p, c, x) in parts.items():
-        blocks[name] = [np.array(block) for block in model.jacobians()(x, inputs[name], p, c)]
+        blocks[name] = [np.array(block) for block in jacobians(model)(x, inputs[name], p, c)]
         rates = np.array(model.derivatives(x, inputs[name], p, c))
         assert np.abs(rates).max(initial=0) < 1e-6, f"{name} is not in steady state"  # [1/s]
     return _interconnect(prepared, parts, blocks)
@@ -97,7 +98,7 @@ def exact_step_map(prepared: PreparedScenario, network: Network | None = None) -
     inputs = _inputs(prepared, parts)
     step = {}
     for name, (model, p, c, x) in parts.items():
-        A, B, C, D = (np.array(block) for block in model.jacobians()(x, inputs[name], p, c))
+        A, B, C, D = (np.array(block) for block in jacobians(model)(x, inputs[name], p, c))
         n, m = B.shape
         held = np.zeros((n + m, n + m))
         held[:n, :n], held[:n, n:] = A, B

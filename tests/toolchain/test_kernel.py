@@ -8,10 +8,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from fmus.toolchain import symbols
 from fmus.toolchain.compiler import compile_library, host_platform
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.tape import tape_of
+from tests.support.jacobians import jacobians
 from tests.support.kernels import KERNELS, compiled, in_python, vector
 
 
@@ -197,12 +199,12 @@ def test_a_model_may_have_a_single_calculated_parameter():
     m, x = builder()
     m.derivative(x, -x)
     m.calculated("c", 2.0, "1", "Two")
-    assert float(m.build().initialise([1e-4])[0]) == 2.0
+    assert m.build().initialise([1e-4])[0] == [2.0]
 
 
 def test_jacobians_are_exact():
     model = lag()
-    A, B, C, D = (float(block) for block in model.jacobians()([0.3], [0.1], [1e-4, 3.0, 0.05], [1.5, 0.75]))
+    A, B, C, D = (block.item() for block in jacobians(model)([0.3], [0.1], [1e-4, 3.0, 0.05], [1.5, 0.75]))
     assert (A, B, C, D) == (-1 / 0.05, 3.0 / 0.05, 1.0, 1.0)
 
 
@@ -211,41 +213,46 @@ def test_jacobians_are_exact():
 # 0.25, −0.75 and so on: both signs, both orders, equal arguments, and zero.
 POINTS = [(0.25, 0.5), (0.5, 0.25), (-0.75, 0.5), (0.75, -0.5), (-0.75, -0.5), (0.5, 0.5), (0.0, 0.5), (0.0, -0.0)]
 OPERATIONS = {
-    "add": lambda a, b: a + b,
-    "sub": lambda a, b: a - b,
-    "mul": lambda a, b: a * b,
-    "div": lambda a, b: a / (b + 2),
-    "neg": lambda a, b: -a,
-    "inv": lambda a, b: 1 / (a + 2),
-    "sq": lambda a, b: a**2,
-    "twice": lambda a, b: a + a,
-    "constpow": lambda a, b: (a + 2) ** 2.5,
-    "cube": lambda a, b: a**3,
-    "pow": lambda a, b: (a + 2) ** b,
-    "fmin": ca.fmin,
-    "fmax": ca.fmax,
-    "lt": lambda a, b: a < b,
-    "le": lambda a, b: a <= b,
-    "gt": lambda a, b: a > b,
-    "ge": lambda a, b: a >= b,
-    "eq": lambda a, b: a == b,
-    "ne": lambda a, b: a != b,
-    "and": lambda a, b: ca.logic_and(a > 0, b > 0),
-    "or": lambda a, b: ca.logic_or(a > 0, b > 0),
-    "not": lambda a, b: ca.logic_not(a > 0),
-    "if_else": lambda a, b: ca.if_else(a > b, a + 1, b - 1),
-    "if_else_number": lambda a, b: ca.if_else(a, 2.0, b),
-    "atan2": ca.atan2,
-    "copysign": ca.copysign,
-    "sqrt": lambda a, b: ca.sqrt(a + 1),
-    "sin": lambda a, b: ca.sin(a),
-    "cos": lambda a, b: ca.cos(a),
-    "tan": lambda a, b: ca.tan(a),
-    "exp": lambda a, b: ca.exp(a),
-    "log": lambda a, b: ca.log(a + 2),
-    "fabs": lambda a, b: ca.fabs(a),
-    "floor": lambda a, b: ca.floor(4.1 * a),
+    "add": lambda f, a, b: a + b,
+    "sub": lambda f, a, b: a - b,
+    "mul": lambda f, a, b: a * b,
+    "div": lambda f, a, b: a / (b + 2),
+    "neg": lambda f, a, b: -a,
+    "inv": lambda f, a, b: 1 / (a + 2),
+    "sq": lambda f, a, b: a**2,
+    "twice": lambda f, a, b: a + a,
+    "constpow": lambda f, a, b: (a + 2) ** 2.5,
+    "cube": lambda f, a, b: a**3,
+    "pow": lambda f, a, b: (a + 2) ** b,
+    "fmin": lambda f, a, b: f.fmin(a, b),
+    "fmax": lambda f, a, b: f.fmax(a, b),
+    "lt": lambda f, a, b: a < b,
+    "le": lambda f, a, b: a <= b,
+    "gt": lambda f, a, b: a > b,
+    "ge": lambda f, a, b: a >= b,
+    "eq": lambda f, a, b: a == b,
+    "ne": lambda f, a, b: a != b,
+    "and": lambda f, a, b: f.logic_and(a > 0, b > 0),
+    "or": lambda f, a, b: f.logic_or(a > 0, b > 0),
+    "not": lambda f, a, b: f.logic_not(a > 0),
+    "if_else": lambda f, a, b: f.if_else(a > b, a + 1, b - 1),
+    "if_else_number": lambda f, a, b: f.if_else(a, 2.0, b),
+    "atan2": lambda f, a, b: f.atan2(a, b),
+    "copysign": lambda f, a, b: f.copysign(a, b),
+    "sqrt": lambda f, a, b: f.sqrt(a + 1),
+    "sin": lambda f, a, b: f.sin(a),
+    "cos": lambda f, a, b: f.cos(a),
+    "tan": lambda f, a, b: f.tan(a),
+    "exp": lambda f, a, b: f.exp(a),
+    "log": lambda f, a, b: f.log(a + 2),
+    "fabs": lambda f, a, b: f.fabs(a),
+    "floor": lambda f, a, b: f.floor(4.1 * a),
 }
+
+
+def in_casadi(name, a, b):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    return float(ca.Function("f", [x, y], [OPERATIONS[name](ca, x, y)])(a, b))
 
 
 def algebra(expressions):
@@ -254,7 +261,7 @@ def algebra(expressions):
     x = m.state("unused", 0.0, "1", "A state that nothing depends on")
     m.derivative(x, 0.0)
     for name, expression in expressions.items():
-        m.output(name, expression(a, b), "1", name)
+        m.output(name, expression(symbols, a, b), "1", name)
     return m.build()
 
 
@@ -265,8 +272,7 @@ def test_python_kernel_computes_what_casadi_computes(name):
     for a, b in POINTS:
         z = vector(model, a=a, b=b)
         code.outputs(z)
-        expected = float(model.outputs_function([0.0], [a, b], [1e-4], []))
-        assert z[model.value_references[name]] == pytest.approx(expected, rel=1e-15, abs=0.0), (a, b)
+        assert z[model.value_references[name]] == pytest.approx(in_casadi(name, a, b), rel=1e-15, abs=0.0), (a, b)
 
 
 @pytest.mark.parametrize("kernel", ["compiled", "tape"])
@@ -276,22 +282,22 @@ def test_kernels_in_c_compute_what_casadi_computes(kernel):
     for a, b in POINTS:
         z = vector(model, a=a, b=b)
         code.outputs(z)
-        expected = np.array(model.outputs_function([0.0], [a, b], [1e-4], [])).ravel()
+        expected = [in_casadi(name, a, b) for name in OPERATIONS]
         got = [z[model.value_references[name]] for name in OPERATIONS]
         np.testing.assert_allclose(got, expected, rtol=1e-15, err_msg=f"{a}, {b}")
 
 
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_the_branch_not_taken_may_be_undefined(kernel):
-    model = algebra({"y": lambda a, b: ca.if_else(a > 0, 1 / a, b)})
+    model = algebra({"y": lambda f, a, b: f.if_else(a > 0, 1 / a, b)})
     code, z = KERNELS[kernel](model), vector(model, a=0.0, b=7.0)
     code.outputs(z)
     assert z[model.value_references["y"]] == 7.0
 
 
 def test_an_operation_without_a_code_is_refused_by_number():
-    with pytest.raises(ValueError, match=f"outputs: operation {ca.OP_ERF} of CasADi has no code"):
-        tape_of(algebra({"y": lambda a, b: ca.erf(a)}))
+    with pytest.raises(ValueError, match=f"outputs: operation {symbols.Op.ATAN} has no code of a tape yet"):
+        tape_of(algebra({"y": lambda f, a, b: f.atan(a)}))
 
 
 def test_an_unknown_platform_is_refused_with_those_there_are():
@@ -375,8 +381,8 @@ def test_an_algebraic_signal_is_replaced_by_its_value():
     m.output("y", w + 1, "1", "Output")
     m.close(w, 3 * x)
     model = m.build()
-    assert float(model.derivatives([2.0], [], [1e-4], [])) == -6.0
-    assert float(model.outputs_function([2.0], [], [1e-4], [])) == 7.0
+    assert model.derivatives([2.0], [], [1e-4], [])[0][0] == -6.0
+    assert model.outputs_function([2.0], [], [1e-4], [])[0][0] == 7.0
 
 
 def test_algebraic_signals_may_be_closed_in_any_order():
@@ -385,7 +391,7 @@ def test_algebraic_signals_may_be_closed_in_any_order():
     m.close(a, 3 * x)
     m.close(b, a + 1)
     m.derivative(x, -b)
-    assert float(m.build().derivatives([2.0], [], [1e-4], [])) == -7.0
+    assert m.build().derivatives([2.0], [], [1e-4], [])[0][0] == -7.0
 
 
 def test_a_loop_through_two_algebraic_signals_is_named():
@@ -437,8 +443,8 @@ def turning_frame():
     angle = m.state("angle", 0.5, "rad", "Angle of the frame", stepwise=True)
     x = m.state("x", 0.0, "1", "Lag")
     m.derivative(angle, rate + x)
-    m.derivative(x, u * ca.cos(angle) - x)
-    m.output("seen", u * ca.cos(angle), "1", "Input in the frame")
+    m.derivative(x, u * symbols.cos(angle) - x)
+    m.output("seen", u * symbols.cos(angle), "1", "Input in the frame")
     return m
 
 

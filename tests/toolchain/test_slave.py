@@ -272,7 +272,7 @@ BARE = """
 import importlib, json, math, sys
 resources, name = sys.argv[1:]
 sys.path.insert(0, resources)
-for missing in ("numpy", "casadi"):
+for missing in ("numpy", "fmus"):
     try:
         importlib.import_module(missing)
     except ImportError:
@@ -316,7 +316,7 @@ def on_a_bare_interpreter(directory, name, kernel):
 
 @pytest.mark.parametrize("name", ["gfor", GENERATOR, "two_area_grid"])
 @pytest.mark.parametrize("kernel", ["", "python"], ids=["compiled", "python"])
-def test_the_slave_runs_where_there_is_neither_numpy_nor_casadi(name, kernel, open_host, extracted):
+def test_the_slave_runs_where_there_is_neither_numpy_nor_this_package(name, kernel, open_host, extracted):
     compiled, bare = on_a_bare_interpreter(extracted(name), name, kernel)
     here = np.array([np.frombuffer(row) for row in open_host(name).initialise().run(50)])
     assert compiled is (kernel == "")

@@ -6,7 +6,6 @@ import struct
 import zipfile
 import zlib
 
-import casadi as ca
 import numpy as np
 import pytest
 
@@ -15,6 +14,7 @@ from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.exporter import export
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.python_fmu import PythonFmu
+from fmus.toolchain.symbols import if_else
 from fmus.toolchain.tape import tape_of
 from fmus.toolchain.tape_kernel import Kernel
 from orchestrator.errors import ComponentError
@@ -83,7 +83,7 @@ def ratio():
     x = m.state("x", 1.0, "1", "State")
     m.derivative(x, u / k * (1 / (k * k)) - x)
     m.output("y", 1 / k, "1", "Fixed by the parameter")
-    m.output("larger", u * ca.if_else(k > 1, 3.0, -0.0), "1", "Chosen by it")
+    m.output("larger", u * if_else(k > 1, 3.0, -0.0), "1", "Chosen by it")
     m.require(k + 5, "k must exceed -5")
     return m.build()
 

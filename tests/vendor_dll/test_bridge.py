@@ -1,10 +1,10 @@
 """The averaged bridge: it follows what is asked of it up to its limit, on both sides."""
 
-import casadi as ca
 import numpy as np
 import pytest
 
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Function, symbols_in
 from fmus.vendor_dll.circuit import BRIDGE, _bridge_voltage
 
 V_DC, M_MAX, VOLT = 1.2, 1.15, 0.5
@@ -13,10 +13,10 @@ V_DC, M_MAX, VOLT = 1.2, 1.15, 0.5
 def bridge(kind, demanded):
     """The bridge's phases [pu] at an angle of 0, for three demanded signals."""
     m = ModelBuilder("small_bridge", "A bridge")
-    e = _bridge_voltage(m, kind, ca.SX(VOLT), ca.SX(0.0))
+    e = _bridge_voltage(m, kind, Expr(VOLT), Expr(0.0))
     given = dict(zip(BRIDGE, demanded, strict=True)) | {"V_dc": V_DC, "m_max": M_MAX}
-    names = [s.name() for s in ca.symvar(ca.vertcat(e.re, e.im))]
-    return ca.Function("e", ca.symvar(ca.vertcat(e.re, e.im)), [e.re, e.im])(*(given[name] for name in names))
+    known = symbols_in([e.re, e.im])
+    return Function("e", [known], [[e.re, e.im]])([given[symbol.name()] for symbol in known])[0]
 
 
 @pytest.mark.parametrize("kind", ["modulation", "voltage"])

@@ -35,7 +35,7 @@ static int32_t check(struct dll_instance *s, double *z) {
         if (!(z[i] >= LEAST[i] && z[i] <= MOST[i])) return fails(s, OUT_OF_BOUNDS[i]);
     const double *arg[] = {z};
     double *res[] = {z + C, start}, w[NW];
-    initialise_code(arg, res, 0, w, 0);
+    initialise_code(arg, res, w);
     requirements(z, margins);
     for (int i = 0; i < NR; ++i)
         if (!(margins[i] > 0)) return fails(s, RULE[i]);
@@ -57,7 +57,7 @@ static int32_t follow_parameters(struct dll_instance *s, double *z) {
     }
     const double *arg[] = {z};
     double *res[] = {z + C, start};
-    initialise_code(arg, res, 0, w, 0);
+    initialise_code(arg, res, w);
     return SAID_NOTHING;
 }
 

@@ -4,8 +4,6 @@ V_ref + V_S − v_m − V_F → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A), held within 
 T_E·dV_E/dt = V_R − V_FE,  V_E ≥ 0,  V_FE = (K_E + S_E(V_E))·V_E + K_D·I_FD
 E_fd = V_E·F_EX(K_C·I_FD/V_E),  V_F = s·K_F/(1+sT_F)·V_FE"""
 
-import casadi as ca
-
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
     TerminalVoltage,
@@ -20,7 +18,8 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, held_at_limits, limited_low_pass
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax
 
 _MOST = 1e9
 """No upper limit of V_E [pu]."""
@@ -30,8 +29,8 @@ _LEAST = 1e-3
 
 
 def ac1a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 400.0, "Gain", 1e-3), time(m, "T_A", 0.02, "Amplifier; 0 leaves the lag out")
@@ -46,11 +45,11 @@ def ac1a(
         require_within(m, V_R0, A_low, A_high, ("exciter.V_AMIN", "exciter.V_AMAX"))
         require_within(m, V_R0, R_low, R_high, ("exciter.V_RMIN", "exciter.V_RMAX"))
         x = m.state("V_E", V_E0, "pu", "Voltage before the rectifier", base="E_fd")
-        V_E = ca.fmax(x, 0)
+        V_E = fmax(x, 0)
         V_FE = K_E * V_E + curve.part(V_E) + K_D * I_fd
         V_F, _ = rate_feedback(m, V_FE, V_R0, 0.03, 1.0)
         measured = Measurement(m, start, terminal_voltage, I_fd)
         error = lead_lag_stage(m, measured.error(V_R0 / K_A, v_s) - V_F, V_R0 / K_A)
         V_A = limited_low_pass(m, "amplifier", K_A * error, T_A, A_low, A_high, V_R0)
         m.derivative(x, held_at_limits(x, (clamp(V_A, R_low, R_high) - V_FE) / T_E, 0.0, _MOST))
-        return measured.close(V_E * rectifier(K_C * I_fd / ca.fmax(V_E, _LEAST)))
+        return measured.close(V_E * rectifier(K_C * I_fd / fmax(V_E, _LEAST)))

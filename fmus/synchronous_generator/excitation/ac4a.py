@@ -3,8 +3,6 @@
 V_IMIN ≤ V_ref + V_S − v_m ≤ V_IMAX → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A) = E_fd,
 held within V_RMIN and V_RMAX − K_C·I_FD"""
 
-import casadi as ca
-
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
     TerminalVoltage,
@@ -15,12 +13,13 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, limited_low_pass
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax
 
 
 def ac4a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.015, "Amplifier; 0 leaves the lag out")
@@ -33,5 +32,5 @@ def ac4a(
         measured = Measurement(m, start, terminal_voltage, I_fd)
         error = clamp(measured.error(V_I0, v_s), I_low, I_high)
         compensated = lead_lag_stage(m, error, V_I0, lead=1.0)
-        ceiling = ca.fmax(high - K_C * I_fd, low)
+        ceiling = fmax(high - K_C * I_fd, low)
         return measured.close(limited_low_pass(m, "amplifier", K_A * compensated, T_A, low, ceiling, start.E_fd))

@@ -6,15 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Protocol
 
-import casadi as ca
-
 from fmus.synchronous_generator.declarations import require_between, time_constant
 from fmus.synchronous_generator.machine import Start
 from fmus.synchronous_generator.saturation import require_rising, saturated_part
 from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, if_else, logic_and, sqrt
 
-TerminalVoltage = Callable[[ca.SX], ca.SX]
+TerminalVoltage = Callable[[Expr], Expr]
 """|v_t| [pu, S_n] for an E_fd [pu]; it depends, weakly, on E_fd because of the transformer in series."""
 
 SOURCE = "typical data, IEEE 421.5"
@@ -26,12 +25,12 @@ class Exciter(Protocol):
     """Declares an excitation system and returns (E_fd, |v_t|) [pu]; ``v_s`` is a stabiliser's signal [pu]."""
 
     def __call__(
-        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-    ) -> tuple[ca.SX, ca.SX]:
+        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+    ) -> tuple[Expr, Expr]:
         """Declare the exciter; returns (E_fd, |v_t|) [pu]."""
 
 
-def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
+def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> Expr:
     """Declare a gain or limit per unit of the field voltage."""
     return m.parameter(name, value, "pu", text, base=E_FD, minimum=minimum, source=SOURCE)
 
@@ -45,32 +44,32 @@ class Measurement:
     ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
     field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly."""
 
-    def __init__(self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX) -> None:
+    def __init__(self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr) -> None:
         self._m, self._v_t, self._start = m, terminal_voltage, start
         T_R = time(m, "T_R", 0.01, "Voltage measurement; 0 leaves it out")
         self._left_out = T_R <= 0
-        self._T_R = ca.if_else(self._left_out, BYPASS_TIME, T_R)
+        self._T_R = if_else(self._left_out, BYPASS_TIME, T_R)
         self._state = m.state("v_m", start.v_t, "pu", "Measured terminal voltage", base="S_n")
         self.nearly = terminal_voltage(I_fd)
         """|v_t| [pu] for an E_fd that equals the field current, as it does in steady state."""
 
-    def error(self, at_start: Scalar, v_s: Scalar) -> ca.SX:
+    def error(self, at_start: Scalar, v_s: Scalar) -> Expr:
         """Reference and stabiliser's signal less the measured voltage [pu, S_n]; ``at_start`` in steady state."""
         m = self._m
         V_ref = m.calculated(
             "V_ref", self._start.v_t + at_start, "pu", "Voltage reference of the operating point", base="S_n"
         )
         delta = m.parameter("delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True)
-        return V_ref + delta + v_s - ca.if_else(self._left_out, self.nearly, self._state)
+        return V_ref + delta + v_s - if_else(self._left_out, self.nearly, self._state)
 
-    def close(self, E_fd: ca.SX) -> tuple[ca.SX, ca.SX]:
+    def close(self, E_fd: Expr) -> tuple[Expr, Expr]:
         """(E_fd, |v_t|) of the exciter."""
         v_t = self._v_t(E_fd)
         self._m.derivative(self._state, (v_t - self._state) / self._T_R)
         return E_fd, v_t
 
 
-def lead_lag_stage(m: ModelBuilder, u: ca.SX, initial: Scalar, mark: str = "", lead: float = 0.0) -> ca.SX:
+def lead_lag_stage(m: ModelBuilder, u: Expr, initial: Scalar, mark: str = "", lead: float = 0.0) -> Expr:
     """(1 + s·T_C)/(1 + s·T_B), passed through where T_B = 0, which needs T_C = 0.
 
     ``u``, ``initial``: what goes in, and its value in steady state; ``mark``: follows C and B in the parameters' names;
@@ -78,14 +77,14 @@ def lead_lag_stage(m: ModelBuilder, u: ca.SX, initial: Scalar, mark: str = "", l
     T_C = time(m, f"T_C{mark}", lead, f"Lead T_C{mark}")
     T_B = time(m, f"T_B{mark}", 10.0 if lead else 0.0, f"Lag T_B{mark}; 0 leaves the stage out")
     m.require(
-        ca.if_else(ca.logic_and(T_B <= 0, T_C > 0), -1, 1), f"exciter.T_B{mark} = 0 needs exciter.T_C{mark} = 0 as well"
+        if_else(logic_and(T_B <= 0, T_C > 0), -1, 1), f"exciter.T_B{mark} = 0 needs exciter.T_C{mark} = 0 as well"
     )
     return lead_lag(m, f"lead_lag{mark}", u, T_C, T_B, initial)
 
 
 def rate_feedback(
-    m: ModelBuilder, u: ca.SX, initial: Scalar, K_F: float = 0.0, T_F: float = 1.0, name: str = "feedback"
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, u: Expr, initial: Scalar, K_F: float = 0.0, T_F: float = 1.0, name: str = "feedback"
+) -> tuple[Expr, Expr]:
     """s·K_F/(1 + s·T_F) of a signal, and K_F."""
     gain_F = gain(m, "K_F", K_F, "Rate feedback; 0 leaves it out", 0)
     lag = m.parameter("T_F", T_F, "s", "Lag of the rate feedback", minimum=1e-3, source=SOURCE)
@@ -119,25 +118,25 @@ def exciter_saturation(m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E
 class ExciterSaturation:
     """S_E(E)·E through two points."""
 
-    def __init__(self, points: tuple[tuple[ca.SX, ca.SX], tuple[ca.SX, ca.SX]]) -> None:
+    def __init__(self, points: tuple[tuple[Expr, Expr], tuple[Expr, Expr]]) -> None:
         self._points = points
 
-    def part(self, E: ca.SX) -> ca.SX:
+    def part(self, E: Expr) -> Expr:
         """S_E(E)·E [pu]; 0 for a negative voltage."""
         return saturated_part(E, *self._points)
 
 
-def rectifier(I_N: ca.SX) -> ca.SX:
+def rectifier(I_N: Expr) -> Expr:
     """F_EX(I_N) of a rectifier bridge (IEEE 421.5, annex D), I_N = K_C·I_FD/V_E."""
-    middle = ca.sqrt(ca.fmax(0.75 - I_N**2, 0))
-    upper = ca.if_else(I_N < 0.75, middle, ca.fmax(1.732 * (1 - I_N), 0))
-    return ca.if_else(I_N <= 0, 1, ca.if_else(I_N <= 0.433, 1 - 0.577 * I_N, upper))
+    middle = sqrt(fmax(0.75 - I_N**2, 0))
+    upper = if_else(I_N < 0.75, middle, fmax(1.732 * (1 - I_N), 0))
+    return if_else(I_N <= 0, 1, if_else(I_N <= 0.433, 1 - 0.577 * I_N, upper))
 
 
-def voltage_before_rectifier(E: ca.SX, loading: ca.SX) -> ca.SX:
+def voltage_before_rectifier(E: Expr, loading: Expr) -> Expr:
     """V_E [pu] for which V_E·F_EX(loading/V_E) = E, loading = K_C·I_FD."""
     first = E + 0.577 * loading
-    second = ca.sqrt((E**2 + loading**2) / 0.75)
+    second = sqrt((E**2 + loading**2) / 0.75)
     third = E / 1.732 + loading
-    later = ca.if_else(loading < 0.75 * second, second, third)
-    return ca.if_else(loading <= 0.433 * first, first, later)
+    later = if_else(loading < 0.75 * second, second, third)
+    return if_else(loading <= 0.433 * first, first, later)

@@ -8,8 +8,6 @@ IEEET1 has no stage (1+sT_C)/(1+sT_B)."""
 
 from functools import partial
 
-import casadi as ca
-
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
     TerminalVoltage,
@@ -22,18 +20,19 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import limited_low_pass
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar
 
 
 def dc1a(
     m: ModelBuilder,
     start: Start,
     terminal_voltage: TerminalVoltage,
-    I_fd: ca.SX,
+    I_fd: Expr,
     v_s: Scalar = 0.0,
     *,
     compensated: bool = True,
-) -> tuple[ca.SX, ca.SX]:
+) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu].
 
     ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B)."""

@@ -2,16 +2,15 @@
 
 E_fd = E_fd,0 + delta_E_fd"""
 
-import casadi as ca
-
 from fmus.synchronous_generator.excitation.common import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar
 
 
 def manual(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         E_0 = m.calculated("E_fd_0", start.E_fd, "pu", "Field voltage of the operating point", base="E_fd")

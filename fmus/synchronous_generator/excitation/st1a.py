@@ -6,8 +6,6 @@
 
 The ceilings take v_t from two fixed-point passes, because v_t, behind the transformer, depends weakly on E_fd."""
 
-import casadi as ca
-
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
     TerminalVoltage,
@@ -19,12 +17,13 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, close_limited_low_pass
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, if_else, logic_and
 
 
 def st1a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.0, "Amplifier; 0 leaves the lag out")
@@ -36,12 +35,12 @@ def st1a(
         K_LR = gain(m, "K_LR", 0.0, "Gain of the field current's limiter; 0 leaves it out", 0)
         I_LR = gain(m, "I_LR", 0.0, "Field current where the limiter starts")
 
-        def relieved(field_current: ca.SX) -> ca.SX:
-            return K_LR * ca.fmax(field_current - I_LR, 0)
+        def relieved(field_current: Expr) -> Expr:
+            return K_LR * fmax(field_current - I_LR, 0)
 
-        def held(signal: ca.SX, v_t: ca.SX) -> ca.SX:
+        def held(signal: Expr, v_t: Expr) -> Expr:
             floor = v_t * low
-            return clamp(signal - relieved(I_fd), floor, ca.fmax(v_t * high - K_C * I_fd, floor))
+            return clamp(signal - relieved(I_fd), floor, fmax(v_t * high - K_C * I_fd, floor))
 
         V_A0 = start.E_fd + relieved(start.E_fd)
         V_I0 = V_A0 / K_A
@@ -52,7 +51,7 @@ def st1a(
         measured = Measurement(m, start, terminal_voltage, I_fd)
         amplifier = m.state("amplifier", V_A0, "pu", "first-order lag with limits", base="E_fd")
         V_F, K_F = rate_feedback(m, held(clamp(amplifier, A_low, A_high), measured.nearly), start.E_fd)
-        m.require(ca.if_else(ca.logic_and(K_F > 0, T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0")
+        m.require(if_else(logic_and(K_F > 0, T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0")
         error = clamp(measured.error(V_I0, v_s) - V_F, I_low, I_high)
         error = lead_lag_stage(m, error, V_I0)
         error = lead_lag_stage(m, error, V_I0, mark="1")

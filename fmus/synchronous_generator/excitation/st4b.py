@@ -10,8 +10,6 @@ limit. Two fixed-point passes close the loop through v_t."""
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
     TerminalVoltage,
@@ -22,24 +20,25 @@ from fmus.synchronous_generator.excitation.common import (
 )
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, limited_proportional_integral, low_pass_or_nothing
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
 
 
 @dataclass(frozen=True)
 class _Inner:
     """The inner controller: gains, limits, and its value in steady state."""
 
-    K_G: ca.SX
-    K_PM: ca.SX
-    K_IM: ca.SX
-    low: ca.SX
-    high: ca.SX
-    at_start: ca.SX
+    K_G: Expr
+    K_PM: Expr
+    K_IM: Expr
+    low: Expr
+    high: Expr
+    at_start: Expr
 
 
 def st4b(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_PR = gain(m, "K_PR", 3.15, "Proportional gain", 0)
@@ -48,15 +47,15 @@ def st4b(
         T_A = time(m, "T_A", 0.02, "Bridge; 0 leaves the lag out")
         source = _source(m)
         inner = _inner(m, start.E_fd / source(start.v_t, start.E_fd))
-        V_A0 = ca.if_else(inner.K_IM > 0, 0, inner.at_start / ca.fmax(inner.K_PM, 1e-9)) + inner.K_G * start.E_fd
+        V_A0 = if_else(inner.K_IM > 0, 0, inner.at_start / fmax(inner.K_PM, 1e-9)) + inner.K_G * start.E_fd
         require_within(m, V_A0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
         measured = Measurement(m, start, terminal_voltage, I_fd)
         error = measured.error(0.0, v_s)
         V_R = limited_proportional_integral(m, "regulator", error, K_PR, K_IR, low, high, V_A0)
         V_A = low_pass_or_nothing(m, "bridge", V_R, T_A, V_A0)
-        x = m.state("inner", ca.if_else(inner.K_IM > 0, inner.at_start, 0), "pu", "integrator with limits", base="E_fd")
+        x = m.state("inner", if_else(inner.K_IM > 0, inner.at_start, 0), "pu", "integrator with limits", base="E_fd")
 
-        def field_voltage(v_t: ca.SX) -> ca.SX:
+        def field_voltage(v_t: Expr) -> Expr:
             V_B = source(v_t, I_fd)
             free = (inner.K_PM * V_A + x) / (1 + V_B * inner.K_PM * inner.K_G)
             return V_B * clamp(free, inner.low, inner.high)
@@ -64,26 +63,26 @@ def st4b(
         E_fd = field_voltage(terminal_voltage(field_voltage(measured.nearly)))
         rest = V_A - inner.K_G * E_fd
         free = inner.K_PM * rest + x
-        outward = ca.logic_or(ca.logic_and(free > inner.high, rest > 0), ca.logic_and(free < inner.low, rest < 0))
+        outward = logic_or(logic_and(free > inner.high, rest > 0), logic_and(free < inner.low, rest < 0))
         without = -x / BYPASS_TIME  # no integrator, and no eigenvalue of 0
-        m.derivative(x, ca.if_else(inner.K_IM > 0, ca.if_else(outward, 0, inner.K_IM * rest), without))
+        m.derivative(x, if_else(inner.K_IM > 0, if_else(outward, 0, inner.K_IM * rest), without))
         return measured.close(E_fd)
 
 
-def _source(m: ModelBuilder) -> Callable[[ca.SX, ca.SX], ca.SX]:
+def _source(m: ModelBuilder) -> Callable[[Expr, Expr], Expr]:
     """V_B [pu] of |v_t| and field current."""
     K_P = gain(m, "K_P", 6.5, "Potential source gain", 0.1)
     K_C = gain(m, "K_C", 0.08, "Rectifier loading factor", 0)
     V_BMAX = gain(m, "V_BMAX", 8.0, "Upper limit of V_B", 0.1)
 
-    def V_B(v_t: ca.SX, field_current: ca.SX) -> ca.SX:
-        V_E = ca.fmax(K_P * v_t, 1e-3)
-        return ca.fmin(V_E * rectifier(K_C * field_current / V_E), V_BMAX)
+    def V_B(v_t: Expr, field_current: Expr) -> Expr:
+        V_E = fmax(K_P * v_t, 1e-3)
+        return fmin(V_E * rectifier(K_C * field_current / V_E), V_BMAX)
 
     return V_B
 
 
-def _inner(m: ModelBuilder, V_M0: ca.SX) -> _Inner:
+def _inner(m: ModelBuilder, V_M0: Expr) -> _Inner:
     inner = _Inner(
         gain(m, "K_G", 0.0, "Feedback of E_fd", 0),
         gain(m, "K_PM", 1.0, "Proportional gain of the inner controller", 0),

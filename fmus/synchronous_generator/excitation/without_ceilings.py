@@ -3,21 +3,20 @@
 Each takes the machine's terminal voltage as a function of its own E_fd, because the transformer in
 series makes |v_t| depend, weakly, on E_fd itself; returned are E_fd and the |v_t| that belongs to it."""
 
-import casadi as ca
-
 from fmus.synchronous_generator.data import NTS631, PAPER, STAMP
 from fmus.synchronous_generator.excitation.common import TerminalVoltage
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import lead_lag, low_pass, proportional_integral
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, if_else, logic_and
 
 LOOP_PASSES = 4
 """Fixed-point passes for the algebraic loop of ST4B; each shrinks its error more than fiftyfold."""
 
 
 def ac4a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
     """(1+sT_C)/(1+sT_B) → K_A/(1+sT_A).
 
     ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
@@ -33,8 +32,8 @@ def ac4a(
 
 
 def st1(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
     """(1+sT_C)/(1+sT_B) → K_A: as AC4A, with an amplifier that has no lag."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=NTS631)
@@ -44,8 +43,8 @@ def st1(
 
 
 def st4b(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: ca.SX, v_s: Scalar = 0.0
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
     """PI → 1/(1+sT_A) → × K_P·|v_t|·f_ex, fed from the machine's own terminal through a rectifier."""
     with m.scope("exciter"):
         K_PR = m.parameter("K_PR", 3.15, "pu", "Proportional gain", base="E_fd", minimum=0, source=NTS631)
@@ -54,7 +53,7 @@ def st4b(
         K_P = m.parameter("K_P", 6.5, "pu", "Potential source gain", base="E_fd", minimum=0.1, source=NTS631)
         K_C = m.parameter("K_C", -0.08, "pu", "Rectifier loading factor", base="E_fd", source=NTS631)
 
-        def bridge(v_t: ca.SX, field_current: ca.SX) -> ca.SX:
+        def bridge(v_t: Expr, field_current: Expr) -> Expr:
             f_ex = 1 - 0.577 * K_C * field_current / (K_P * v_t)
             return K_P * v_t * f_ex
 
@@ -69,8 +68,8 @@ def st4b(
 
 
 def _measured_error(
-    m: ModelBuilder, v_t_0: ca.SX, V_ref_0: Scalar, v_s: Scalar, *, T_R: float, source: str
-) -> tuple[tuple[ca.SX, ca.SX], ca.SX]:
+    m: ModelBuilder, v_t_0: Expr, V_ref_0: Scalar, v_s: Scalar, *, T_R: float, source: str
+) -> tuple[tuple[Expr, Expr], Expr]:
     """Declare the voltage measurement and the reference; return the measurement (state, T_R) and the error."""
     T = m.parameter("T_R", T_R, "s", "Voltage measurement", minimum=1e-3, source=source)
     V_ref = m.calculated("V_ref", V_ref_0, "pu", "Voltage reference of the operating point", base="S_n")
@@ -79,16 +78,16 @@ def _measured_error(
     return (v_m, T), V_ref + delta + v_s - v_m
 
 
-def _transient_gain_reduction(m: ModelBuilder, error: ca.SX, initial: Scalar, source: str) -> ca.SX:
+def _transient_gain_reduction(m: ModelBuilder, error: Expr, initial: Scalar, source: str) -> Expr:
     T_C = m.parameter("T_C", 1.0, "s", "Transient gain reduction, lead", minimum=0, source=source)
     T_B = m.parameter("T_B", 10.0, "s", "Transient gain reduction, lag", minimum=0, source=source)
-    m.require(ca.if_else(ca.logic_and(T_B <= 0, T_C > 0), -1, 1), "exciter.T_B = 0 needs exciter.T_C = 0 as well")
+    m.require(if_else(logic_and(T_B <= 0, T_C > 0), -1, 1), "exciter.T_B = 0 needs exciter.T_C = 0 as well")
     return lead_lag(m, "lead_lag", error, T_C, T_B, initial)
 
 
 def _close_measurement(
-    m: ModelBuilder, measurement: tuple[ca.SX, ca.SX], E_fd: ca.SX, terminal_voltage: TerminalVoltage
-) -> tuple[ca.SX, ca.SX]:
+    m: ModelBuilder, measurement: tuple[Expr, Expr], E_fd: Expr, terminal_voltage: TerminalVoltage
+) -> tuple[Expr, Expr]:
     v_m, T_R = measurement
     v_t = terminal_voltage(E_fd)
     m.derivative(v_m, (v_t - v_m) / T_R)

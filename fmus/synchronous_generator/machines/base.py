@@ -4,9 +4,8 @@ Data sheets give reactances, H and D on ratings of their own; networks on 100 MV
 
 from dataclasses import dataclass
 
-import casadi as ca
-
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, if_else
 
 SOURCE = "typical data of a steam turbine's generator, Kundur 1994, example 12.6"
 
@@ -17,15 +16,15 @@ SN = "S_n"
 class Common:
     """Transformer, stator resistance, inertia constant and damping on S_n; ``scale`` carries a reactance to S_n."""
 
-    R_t: ca.SX
-    X_t: ca.SX
-    R_s: ca.SX
-    H: ca.SX
-    D: ca.SX
-    scale: ca.SX
+    R_t: Expr
+    X_t: Expr
+    R_s: Expr
+    H: Expr
+    D: Expr
+    scale: Expr
 
 
-def declare_common(m: ModelBuilder, S_n: ca.SX, H: float = 6.5) -> Common:
+def declare_common(m: ModelBuilder, S_n: Expr, H: float = 6.5) -> Common:
     """Declare transformer, base, resistance and motion; in steady state speed is 1.
 
     ``S_n``: rating [MVA]; ``H``: default of the inertia constant [s]."""
@@ -36,18 +35,18 @@ def declare_common(m: ModelBuilder, S_n: ca.SX, H: float = 6.5) -> Common:
         S_data = m.parameter(
             "S_data", 0.0, "MVA", "Base of the machine's data (X, R_s, H, D); 0: they are on S_n", minimum=0
         )
-        scale = m.calculated("scale", ca.if_else(S_data > 0, S_n / S_data, 1), "1", "S_n over the data's base")
+        scale = m.calculated("scale", if_else(S_data > 0, S_n / S_data, 1), "1", "S_n over the data's base")
         R_s = m.parameter("R_s", 0.0025, "pu", "Stator resistance", base="S_data", minimum=0, source=SOURCE)
         inertia = m.parameter("H", H, "s", "Inertia constant, on S_data", minimum=0.01, source=SOURCE)
         D = m.parameter("D", 0.0, "pu", "Damping torque per speed deviation", base="S_data", minimum=0)
         return Common(R_t, X_t, scale * R_s, inertia / scale, D / scale, scale)
 
 
-def reactance(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
+def reactance(m: ModelBuilder, name: str, value: float, text: str) -> Expr:
     """Declare a reactance on the data's base."""
     return m.parameter(name, value, "pu", text, base="S_data", minimum=1e-4, source=SOURCE)
 
 
-def time(m: ModelBuilder, name: str, value: float, text: str) -> ca.SX:
+def time(m: ModelBuilder, name: str, value: float, text: str) -> Expr:
     """Declare an open-circuit time constant [s]."""
     return m.parameter(name, value, "s", text, minimum=1e-3, source=SOURCE)

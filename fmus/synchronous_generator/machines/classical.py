@@ -5,17 +5,16 @@
 
 The emf's angle is the rotor's. There is no field winding, so no exciter can act."""
 
-import casadi as ca
-
 from fmus.synchronous_generator.axis import Axis
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine, Start
 from fmus.synchronous_generator.machines.base import declare_common, reactance
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
+from fmus.toolchain.symbols import Expr
 
 
-def classical(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
+def classical(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
     """Declare the machine.
 
     ``port``: gives the operating point; ``S_n``: rating [MVA]; ``stator_flux``: declares the stator's fluxes: as
@@ -32,7 +31,7 @@ def classical(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDe
         d_flux = stator_flux(m, "psi_d", psi_d, "Flux of stator and transformer, d axis")
         q_flux = stator_flux(m, "psi_q", psi_q, "Flux of stator and transformer, q axis")
         d = Axis(X_1, (), d_flux, X_1, X, fixed_emf=emf)
-        q = Axis(X_1, (), q_flux, X_1, X, fixed_emf=ca.SX(0))
+        q = Axis(X_1, (), q_flux, X_1, X, fixed_emf=Expr(0))
         w = m.state("omega", 1.0, "pu", "Rotor speed", base="f_n")
         delta = m.state("delta", delta_0, "rad", "Angle of the emf in the network frame")
     v_t = port.v_0 + Phasor(common.R_t, common.X_t) * port.i_0

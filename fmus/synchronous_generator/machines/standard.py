@@ -11,8 +11,6 @@ that the slow winding of the q axis is missing."""
 
 from dataclasses import replace
 
-import casadi as ca
-
 from fmus.synchronous_generator.conversion import AxisData
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.base import Common, declare_common, reactance, time
@@ -20,6 +18,7 @@ from fmus.synchronous_generator.machines.windings import Saturation, WoundAxis, 
 from fmus.synchronous_generator.saturation import require_rising, saturated_part
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
+from fmus.toolchain.symbols import Expr, if_else
 
 _FIELD = ("psi_f", "Field flux")
 _DAMPER = ("psi_1d", "Damper flux, d axis")
@@ -30,7 +29,7 @@ _NO_TIME = 1e-3
 """Stands for the time constant [s] of a fast winding that a machine does not have."""
 
 
-def two_axis(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
+def two_axis(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
     """Declare the machine of fourth order (Sauer and Pai). It has no saturation."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
@@ -42,7 +41,7 @@ def two_axis(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDec
     return declare_wound_machine(m, port, common, d, q, stator_flux, salient=True)
 
 
-def gensal(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
+def gensal(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
     """Declare the machine of fifth order, one with salient poles. E'_q saturates the d axis."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
@@ -57,7 +56,7 @@ def gensal(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDecla
     )
 
 
-def genrou(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
+def genrou(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
     """Declare the machine of sixth order, one with a round rotor. Its subtransient flux saturates both axes.
 
     ``port``: gives the operating point; ``S_n``: rating [MVA]; ``stator_flux``: declares the stator's fluxes: as
@@ -70,7 +69,7 @@ def genrou(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDecla
         k = common.scale
         q = AxisData(k * X_q, k * X_q1, k * X_2, k * X_l, T_q10, T_q20)
         _require_order(m, d, q, "X_q1")
-        m.require(ca.if_else(q.X2 <= q.X1, 1, -1), "machine.X_d2, which is X''_q too, must not exceed machine.X_q1")
+        m.require(if_else(q.X2 <= q.X1, 1, -1), "machine.X_d2, which is X''_q too, must not exceed machine.X_q1")
         m.require(T_q10 - T_q20, "machine.T_q10 must exceed machine.T_q20")
         saturation = _saturation(m, both_axes=True)
     return declare_wound_machine(
@@ -78,38 +77,38 @@ def genrou(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDecla
     )
 
 
-def genrou_rated_speed(m: ModelBuilder, port: DevicePort, S_n: ca.SX, stator_flux: FluxDeclaration) -> Machine:
+def genrou_rated_speed(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
     """Declare `genrou` with the emf e'' instead of w·e'', as most stability programs have it."""
     return replace(genrou(m, port, S_n, stator_flux), at_rated_speed=True)
 
 
-def _synchronous(m: ModelBuilder, axis: str) -> ca.SX:
+def _synchronous(m: ModelBuilder, axis: str) -> Expr:
     return reactance(m, f"X_{axis}", {"d": 1.8, "q": 1.7}[axis], f"Synchronous reactance, {axis} axis")
 
 
-def _transient(m: ModelBuilder, axis: str) -> ca.SX:
+def _transient(m: ModelBuilder, axis: str) -> Expr:
     return reactance(m, f"X_{axis}1", {"d": 0.3, "q": 0.55}[axis], f"Transient reactance X'_{axis}")
 
 
-def _time_1(m: ModelBuilder, axis: str) -> ca.SX:
+def _time_1(m: ModelBuilder, axis: str) -> Expr:
     value = {"d": 8.0, "q": 0.4}[axis]
     return time(m, f"T_{axis}10", value, f"Open-circuit transient time constant T'_{axis}0")
 
 
-def _one_winding(common: Common, X: ca.SX, X1: ca.SX, T_0: ca.SX, X_l: ca.SX | float = 0.0) -> AxisData:
+def _one_winding(common: Common, X: Expr, X1: Expr, T_0: Expr, X_l: Expr | float = 0.0) -> AxisData:
     """Data of an axis with one winding, whose leakage reactance cannot be seen from outside."""
     k = common.scale
-    return AxisData(k * X, k * X1, k * X1, ca.SX(k * X_l), T_0, ca.SX(_NO_TIME))
+    return AxisData(k * X, k * X1, k * X1, Expr(k * X_l), T_0, Expr(_NO_TIME))
 
 
-def _d_axis(m: ModelBuilder, common: Common) -> tuple[ca.SX, ca.SX, AxisData]:
+def _d_axis(m: ModelBuilder, common: Common) -> tuple[Expr, Expr, AxisData]:
     """X_l and X'' as they are given, and the data of the d axis on S_n."""
     X_l = reactance(m, "X_l", 0.2, "Stator leakage reactance")
     X, X1 = _synchronous(m, "d"), _transient(m, "d")
     X2 = reactance(m, "X_d2", 0.25, "Subtransient reactance X''_d = X''_q")
     T_10 = _time_1(m, "d")
     T_20 = time(m, "T_d20", 0.03, "Open-circuit subtransient time constant T''_d0")
-    m.require(ca.if_else(X2 <= X1, 1, -1), "machine.X_d2 must not exceed machine.X_d1")
+    m.require(if_else(X2 <= X1, 1, -1), "machine.X_d2 must not exceed machine.X_d1")
     m.require(X2 - X_l, "machine.X_d2 must exceed machine.X_l")
     m.require(T_10 - T_20, "machine.T_d10 must exceed machine.T_d20")
     k = common.scale
@@ -118,7 +117,7 @@ def _d_axis(m: ModelBuilder, common: Common) -> tuple[ca.SX, ca.SX, AxisData]:
 
 def _require_order(m: ModelBuilder, d: AxisData, q: AxisData, lower: str) -> None:
     m.require(d.X - d.X1, "machine.X_d must exceed machine.X_d1")
-    m.require(ca.if_else(q.X1 <= q.X, 1, -1), f"machine.{lower} must not exceed machine.X_q")
+    m.require(if_else(q.X1 <= q.X, 1, -1), f"machine.{lower} must not exceed machine.X_q")
 
 
 def _saturation(m: ModelBuilder, *, both_axes: bool) -> Saturation:

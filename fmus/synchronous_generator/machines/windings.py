@@ -8,8 +8,6 @@ current of the iron, S·ψ/X_md, beside the slowest winding of an axis:
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import casadi as ca
-
 from fmus.synchronous_generator.axis import Axis, Winding
 from fmus.synchronous_generator.conversion import AxisData, RotorBranches
 from fmus.synchronous_generator.conversion import classical as classical_branches
@@ -18,6 +16,7 @@ from fmus.synchronous_generator.machines.base import Common
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
+from fmus.toolchain.symbols import Expr, fmax, if_else
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class Saturation:
     ``both_axes``: of the subtransient flux, on both axes by its parts (GENROU); otherwise of E'_q on the d axis
     (GENSAL)."""
 
-    part: Callable[[ca.SX], ca.SX]
+    part: Callable[[Expr], Expr]
     both_axes: bool
 
 
@@ -45,10 +44,10 @@ class Saturation:
 class _Circuit:
     """Reactances of an axis: magnetising, of its windings, of the air gap, and between emf and bus."""
 
-    X_m: ca.SX
-    branches: tuple[tuple[ca.SX, ca.SX], ...]
-    X_sub: ca.SX
-    X_between: ca.SX
+    X_m: Expr
+    branches: tuple[tuple[Expr, Expr], ...]
+    X_sub: Expr
+    X_between: Expr
 
 
 def declare_wound_machine(
@@ -71,8 +70,8 @@ def declare_wound_machine(
         circuits = {name: _circuit(m, port, name, axis, common.X_t) for name, axis in (("d", d), ("q", q))}
         dc, qc = circuits["d"], circuits["q"]
         R, X_l = common.R_s + common.R_t, d.data.X_l
-        has_slow_q = ca.if_else(q.data.X - q.data.X1 > 1e-9, 1, 0)
-        S_q = ca.SX(0)  # saturation of the q axis, S
+        has_slow_q = if_else(q.data.X - q.data.X1 > 1e-9, 1, 0)
+        S_q = Expr(0)  # saturation of the q axis, S
         if saturation and saturation.both_axes:
             flux = (port.v_0 + Phasor(R, dc.X_between) * port.i_0).magnitude()
             S = m.calculated("saturation_0", saturation.part(flux) / flux, "1", "S(ψ'') at the operating point")
@@ -80,16 +79,16 @@ def declare_wound_machine(
         X_q = qc.X_between + (q.data.X - X_l - qc.X_sub) / (1 + S_q * qc.X_m / dc.X_m)
         delta_0 = (port.v_0 + Phasor(R, X_q) * port.i_0).angle()
         i, v = port.i_0.rotated(-delta_0), port.v_0.rotated(-delta_0)
-        i_q, i_d = ca.SX(i.re), ca.SX(-i.im)
+        i_q, i_d = Expr(i.re), Expr(-i.im)
         psi_d, psi_q = v.re + R * i_q, v.im - R * i_d
         gap_d, gap_q = psi_d + (common.X_t + X_l) * i_d, psi_q + (common.X_t + X_l) * i_q
         axis_d = _axis(m, d, dc, stator_flux, ("psi_d", psi_d), gap_d, i_d)
         axis_q = _axis(m, q, qc, stator_flux, ("psi_q", psi_q), gap_q, i_q)
-        iron = ca.SX(0)  # S·ψ_d at the operating point
+        iron = Expr(0)  # S·ψ_d at the operating point
         if saturation and saturation.both_axes:
             iron = S * (psi_d + dc.X_between * i_d)
             now = (axis_d.emf**2 + axis_q.emf**2) ** 0.5
-            factor = saturation.part(now) / ca.fmax(now, 1e-6)
+            factor = saturation.part(now) / fmax(now, 1e-6)
             axis_q = _with_iron(axis_q, has_slow_q * factor * axis_q.emf / dc.X_m)
             axis_d = _with_iron(axis_d, factor * axis_d.emf / dc.X_m)
         elif saturation:
@@ -104,7 +103,7 @@ def declare_wound_machine(
     return Machine(R, common.R_t, common.X_t, common.H, common.D, axis_d, axis_q, w, delta, start, salient)
 
 
-def _circuit(m: ModelBuilder, port: DevicePort, name: str, axis: WoundAxis, X_t: ca.SX) -> _Circuit:
+def _circuit(m: ModelBuilder, port: DevicePort, name: str, axis: WoundAxis, X_t: Expr) -> _Circuit:
     data = axis.data
     X_m = m.calculated(f"X_m{name}", data.X - data.X_l, "pu", f"Magnetising reactance, {name} axis", "S_n")
     b: RotorBranches = classical_branches(data, port.omega_b)
@@ -126,9 +125,9 @@ def _axis(
     axis: WoundAxis,
     circuit: _Circuit,
     stator_flux: FluxDeclaration,
-    stator: tuple[str, ca.SX],
-    gap: ca.SX,
-    i: ca.SX,
+    stator: tuple[str, Expr],
+    gap: Expr,
+    i: Expr,
 ) -> Axis:
     """Declare the fluxes of an axis; in steady state its slowest winding alone has a current."""
     name, psi = stator
@@ -140,6 +139,6 @@ def _axis(
     return Axis(circuit.X_m, tuple(windings), stator_psi, circuit.X_sub, circuit.X_between)
 
 
-def _with_iron(axis: Axis, current: ca.SX) -> Axis:
+def _with_iron(axis: Axis, current: Expr) -> Axis:
     slow, *others = axis.windings
     return replace(axis, windings=(replace(slow, saturation_current=current), *others))

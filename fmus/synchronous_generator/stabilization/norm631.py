@@ -9,17 +9,16 @@
 
 A washout or lag whose time constant is 0 is left out."""
 
-import casadi as ca
-
 from fmus.synchronous_generator.data import NTS631
 from fmus.toolchain.blocks import lead_lag, limit, low_pass, low_pass_or_nothing, washout
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, if_else
 
 RAMP_LAGS = 5
 """M of the ramp-tracking filter; N is 1."""
 
 
-def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX) -> ca.SX:
+def pss2a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
     ``delta_omega``: w − 1 [pu]; ``P_e``, ``P_e_0``: electrical power at the terminal [pu, S_n], and at the operating
@@ -27,10 +26,10 @@ def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX) -> ca.S
     with m.scope("pss"):
         enabled = m.switch("enabled", True, "Adds the stabiliser's signal to the voltage reference", tunable=True)
 
-        def time(name: str, value: float, text: str, minimum: float = 1e-3) -> ca.SX:
+        def time(name: str, value: float, text: str, minimum: float = 1e-3) -> Expr:
             return m.parameter(name, value, "s", text, minimum=minimum, source=NTS631)
 
-        def gain(name: str, value: float, text: str) -> ca.SX:
+        def gain(name: str, value: float, text: str) -> Expr:
             return m.parameter(name, value, "pu", text, base="S_n", minimum=0, source=NTS631)
 
         speed = washout(m, "washout_1", delta_omega, time("T_w1", 2.0, "First washout of the speed"))
@@ -54,7 +53,7 @@ def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX) -> ca.S
         return enabled * limit(signal, gain("limit", 0.1, "Limit of the signal"))
 
 
-def _second_washout(m: ModelBuilder, u: ca.SX, T: ca.SX) -> ca.SX:
+def _second_washout(m: ModelBuilder, u: Expr, T: Expr) -> Expr:
     """s·T/(1 + s·T); passed through where T = 0."""
-    used = ca.if_else(T <= 0, 1.0, T)
-    return ca.if_else(T <= 0, u, washout(m, "washout_4", u, used))
+    used = if_else(T <= 0, 1.0, T)
+    return if_else(T <= 0, u, washout(m, "washout_4", u, used))

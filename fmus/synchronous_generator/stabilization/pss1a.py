@@ -3,14 +3,13 @@
 w − 1 → 1/(1+sT_6) → K_S·s·T_5/(1+sT_5) → 1/(1 + A_1·s + A_2·s²)
 → (1+sT_1)/(1+sT_2) → (1+sT_3)/(1+sT_4) → V_STMIN ≤ V_S ≤ V_STMAX"""
 
-import casadi as ca
-
 from fmus.synchronous_generator.stabilization.common import SOURCE, gain, limited_output, stage, time
 from fmus.toolchain.blocks import BYPASS_TIME, low_pass_or_nothing, washout
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and, logic_or, sqrt
 
 
-def pss1a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX) -> ca.SX:
+def pss1a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu]."""
     with m.scope("pss"):
         K_S = gain(m, "K_S", 20.0, "Gain")
@@ -23,24 +22,21 @@ def pss1a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX) -> ca.S
         return limited_output(m, signal)
 
 
-def _filter(m: ModelBuilder, u: ca.SX) -> ca.SX:
+def _filter(m: ModelBuilder, u: Expr) -> Expr:
     """1/(1 + A_1·s + A_2·s²); A_2 = 0 leaves one lag, A_1 = 0 as well none."""
     A_1 = m.parameter("A_1", 0.0, "s", "Filter, first order", minimum=0, source=SOURCE)
     A_2 = m.parameter("A_2", 0.0, "1", "Filter, second order [s²]; 0: first order alone", minimum=0, source=SOURCE)
-    m.require(ca.if_else(ca.logic_and(A_2 > 0, A_1 <= 0), -1, 1), "pss.A_2 > 0 needs pss.A_1 > 0")
+    m.require(if_else(logic_and(A_2 > 0, A_1 <= 0), -1, 1), "pss.A_2 > 0 needs pss.A_1 > 0")
     shortest = m.internal_step / 2
     m.require(
-        ca.if_else(ca.logic_or(A_2 > 0, A_1 <= 0), 1, A_1 - shortest),
-        "pss.A_1 must be 0 or exceed half of internal_step",
+        if_else(logic_or(A_2 > 0, A_1 <= 0), 1, A_1 - shortest), "pss.A_1 must be 0 or exceed half of internal_step"
     )
-    m.require(
-        ca.if_else(A_2 <= 0, 1, A_2 / ca.fmax(A_1, 1e-9) - shortest), "pss.A_2/A_1 must exceed half of internal_step"
-    )
+    m.require(if_else(A_2 <= 0, 1, A_2 / fmax(A_1, 1e-9) - shortest), "pss.A_2/A_1 must exceed half of internal_step")
     second = A_2 > 0
-    root = ca.sqrt(ca.if_else(second, A_2, 1))
+    root = sqrt(if_else(second, A_2, 1))
     x = m.state("filter", 0.0, "pu", "filter", base="S_n")
     y = m.state("filter_rate", 0.0, "pu", "filter, its rate times the square root of A_2", base="S_n")
-    first = (u - x) / ca.if_else(A_1 > 0, A_1, BYPASS_TIME)
-    m.derivative(x, ca.if_else(second, y / root, first))
-    m.derivative(y, ca.if_else(second, (u - x - A_1 * y / root) / root, -y / BYPASS_TIME))
-    return ca.if_else(ca.logic_or(second, A_1 > 0), x, u)
+    first = (u - x) / if_else(A_1 > 0, A_1, BYPASS_TIME)
+    m.derivative(x, if_else(second, y / root, first))
+    m.derivative(y, if_else(second, (u - x - A_1 * y / root) / root, -y / BYPASS_TIME))
+    return if_else(logic_or(second, A_1 > 0), x, u)

@@ -10,15 +10,14 @@ from the operating point. A block whose time constant is 0 is left out. M = 5 an
 
 from functools import partial
 
-import casadi as ca
-
 from fmus.synchronous_generator.stabilization.common import gain, limited_output, stage, time
 from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
 from fmus.toolchain.blocks import clamp, lead_lag, low_pass_or_nothing, washout_or_nothing
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, if_else, logic_and
 
 
-def pss2a(m: ModelBuilder, delta_omega: ca.SX, P_e: ca.SX, P_e_0: ca.SX, *, newer: bool = False) -> ca.SX:
+def pss2a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr, *, newer: bool = False) -> Expr:
     """Declare the stabiliser and return its signal to the voltage regulator [pu].
 
     ``newer``: whether it has what PSS2B has beyond PSS2A."""
@@ -49,16 +48,16 @@ pss2b = partial(pss2a, newer=True)
 """PSS2A with limited inputs and a third stage."""
 
 
-def _input_limits(m: ModelBuilder, number: str, text: str) -> tuple[ca.SX, ca.SX]:
+def _input_limits(m: ModelBuilder, number: str, text: str) -> tuple[Expr, Expr]:
     low = m.parameter(f"V_SI{number}MIN", -2.0, "pu", f"Lower limit of the {text}", base="S_n", maximum=0)
     high = m.parameter(f"V_SI{number}MAX", 2.0, "pu", f"Upper limit of the {text}", base="S_n", minimum=0)
     return low, high
 
 
-def _ramp_filter(m: ModelBuilder, u: ca.SX) -> ca.SX:
+def _ramp_filter(m: ModelBuilder, u: Expr) -> Expr:
     T_8 = time(m, "T_8", 0.5, "Ramp-tracking filter, lead")
     T_9 = time(m, "T_9", 0.1, "Ramp-tracking filter, each of its five lags; 0 leaves it out")
-    m.require(ca.if_else(ca.logic_and(T_9 <= 0, T_8 > 0), -1, 1), "pss.T_9 = 0 needs pss.T_8 = 0 as well")
+    m.require(if_else(logic_and(T_9 <= 0, T_8 > 0), -1, 1), "pss.T_9 = 0 needs pss.T_8 = 0 as well")
     u = lead_lag(m, "ramp_1", u, T_8, T_9)
     for number in range(2, RAMP_LAGS + 1):
         u = low_pass_or_nothing(m, f"ramp_{number}", u, T_9)

@@ -3,15 +3,14 @@
 from collections.abc import Callable
 from functools import partial
 
-import casadi as ca
-
 from fmus.synchronous_generator.declarations import require_between, time_constant
-from fmus.toolchain.model_builder import ModelBuilder, Scalar
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, if_else
 
 SOURCE = "typical data, IEEE PES-TR1"
 
 
-def power(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> ca.SX:
+def power(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> Expr:
     """Declare a gain or limit per unit of the rating."""
     return m.parameter(name, value, "pu", text, base="S_n", minimum=minimum, source=SOURCE)
 
@@ -19,20 +18,20 @@ def power(m: ModelBuilder, name: str, value: float, text: str, minimum: float | 
 time = partial(time_constant, source=SOURCE)
 
 
-def power_reference(m: ModelBuilder, P_ref_0: Scalar) -> ca.SX:
+def power_reference(m: ModelBuilder, P_ref_0: Scalar) -> Expr:
     """Declare the power reference of the operating point and its change; return their sum [pu, S_n]."""
     P_ref = m.calculated("P_ref", P_ref_0, "pu", "Power reference of the operating point", base="S_n")
     return P_ref + m.parameter("delta_P_ref", 0.0, "pu", "Change of the power reference", base="S_n", tunable=True)
 
 
-def read_either_way(governor: Callable[[ModelBuilder, ca.SX, ca.SX], ca.SX]) -> Callable[..., ca.SX]:
+def read_either_way(governor: Callable[[ModelBuilder, Expr, Expr], Expr]) -> Callable[..., Expr]:
     """The same governor whose output is the mechanical power, or, by a parameter, the mechanical torque."""
 
-    def declare(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
+    def declare(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         output = governor(m, w, P_m_0)
         with m.scope("governor"):
             is_torque = m.switch("output_is_torque", False, "The output is the mechanical torque, not the power")
-        return output * ca.if_else(is_torque, w, 1)
+        return output * if_else(is_torque, w, 1)
 
     return declare
 

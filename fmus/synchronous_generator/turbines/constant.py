@@ -5,19 +5,18 @@
 
 Between them lies a damping of P_0 per unit of speed: 1/(4H)·P_0 of the swing's decay."""
 
-import casadi as ca
-
 from fmus.synchronous_generator.turbines.common import power_reference
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr
 
 
-def constant_power(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
+def constant_power(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
     """Declare it and return the mechanical power [pu, S_n]; parameters as `tgov1.tgov1`."""
     with m.scope("governor"):
         return power_reference(m, P_m_0)
 
 
-def constant_torque(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
+def constant_torque(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
     """Declare it and return the mechanical power [pu, S_n]; parameters as `tgov1.tgov1`."""
     with m.scope("governor"):
         return power_reference(m, P_m_0) * w

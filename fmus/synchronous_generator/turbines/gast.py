@@ -4,14 +4,13 @@ low value of P_ref − (w − 1)/R and A_T + K_T·(A_T − T_exh)
 → 1/(1+sT_1), held within V_MIN and V_MAX → 1/(1+sT_2) → fuel
 P_m = fuel − D_turb·(w − 1),   T_exh = fuel/(1+sT_3)"""
 
-import casadi as ca
-
 from fmus.synchronous_generator.turbines.common import SOURCE, power, power_reference, require_within, time
 from fmus.toolchain.blocks import limited_low_pass, low_pass
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, fmin
 
 
-def gast(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
+def gast(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
     """Declare governor and turbine and return the mechanical power [pu, S_n]."""
     with m.scope("governor"):
         R = power(m, "R", 0.05, "Droop", 1e-4)
@@ -29,7 +28,7 @@ def gast(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
             "or the rating S_n, or lower the generator's active power",
         )
         exhaust = m.state("exhaust", P_m_0, "pu", "Measured temperature of the exhaust", base="S_n")
-        wanted = ca.fmin(power_reference(m, P_m_0) - (w - 1) / R, A_T + K_T * (A_T - exhaust))
+        wanted = fmin(power_reference(m, P_m_0) - (w - 1) / R, A_T + K_T * (A_T - exhaust))
         valve = limited_low_pass(m, "valve", wanted, T_1, low, high, P_m_0)
         fuel = low_pass(m, "combustion", valve, T_2, P_m_0)
         m.derivative(exhaust, (fuel - exhaust) / T_3)

@@ -6,17 +6,16 @@
 
 In steady state h = 1 and g = q = P_m/A_t + q_NL."""
 
-import casadi as ca
-
 from fmus.synchronous_generator.turbines.common import SOURCE, power, power_reference, require_within, time
 from fmus.toolchain.blocks import clamp, limited_proportional_integral
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, fmax
 
 _LEAST_GATE = 1e-3
 """Smallest gate [pu] that the flow is divided by."""
 
 
-def hygov(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
+def hygov(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
     """Declare governor and turbine and return the mechanical power [pu, S_n]."""
     with m.scope("governor"):
         R = power(m, "R", 0.05, "Permanent droop", 1e-4)
@@ -31,7 +30,7 @@ def hygov(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
         D_turb = power(m, "D_turb", 0.5, "Damping of the turbine", 0)
         q_NL = power(m, "q_NL", 0.08, "Flow at no load", 0)
 
-        def gate_for(P: ca.SX) -> ca.SX:
+        def gate_for(P: Expr) -> Expr:
             return P / A_t + q_NL
 
         g_0 = gate_for(P_m_0)
@@ -43,7 +42,7 @@ def hygov(m: ModelBuilder, w: ca.SX, P_m_0: ca.SX) -> ca.SX:
         m.close(c, limited_proportional_integral(m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low, high, g_0))
         x = m.state("gate", g_0, "pu", "Gate", base="S_n")
         m.derivative(x, clamp((c - x) / T_g, -VELM, VELM))
-        gate = ca.fmax(x, _LEAST_GATE)
+        gate = fmax(x, _LEAST_GATE)
         q = m.state("q", g_0, "pu", "Flow", base="S_n")
         h = (q / gate) ** 2
         m.derivative(q, (1 - h) / T_W)

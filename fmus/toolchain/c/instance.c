@@ -353,11 +353,11 @@ static void evaluate_directions(struct instance *s, double *d, double *w) {
     if (s->phase < STEPPING) {
         const double *arg[] = {s->z, d};
         double *res[] = {d + C, d + X};
-        start_direction_code(arg, res, 0, w, 0);
+        start_direction_code(arg, res, w);
     }
     const double *arg[] = {s->z + X, s->z + U, s->z, s->z + C, d + X, d + U, d, d + C};
     double *res[] = {d + DX, d + Y};
-    direction_code(arg, res, 0, w, 0);
+    direction_code(arg, res, w);
 }
 
 /* The transposed: seeds on what follows go in, what is known comes out. */
@@ -365,13 +365,13 @@ static void evaluate_adjoint(struct instance *s, double *d, double *w) {
     double *x = w + NWD, *p = x + NX, *c = p + NP, *more = c + NC; /* behind the code's own room */
     const double *arg[] = {s->z + X, s->z + U, s->z, s->z + C, d + DX, d + Y};
     double *res[] = {x, d + U, p, c};
-    adjoint_code(arg, res, 0, w, 0);
+    adjoint_code(arg, res, w);
     if (s->phase < STEPPING) { /* states and calculated parameters follow from the parameters here */
         for (int i = 0; i < NC; ++i) c[i] += d[C + i];
         for (int i = 0; i < NX; ++i) x[i] += d[X + i];
         const double *start_arg[] = {s->z, c, x};
         double *start_res[] = {more};
-        start_adjoint_code(start_arg, start_res, 0, w, 0);
+        start_adjoint_code(start_arg, start_res, w);
         for (int i = 0; i < NP; ++i) p[i] += more[i];
     }
     memcpy(d + X, x, NX * sizeof(double));

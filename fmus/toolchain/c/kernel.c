@@ -1,4 +1,4 @@
-/* Functions of a kernel around the code that CasADi generates. Every quantity of an instance lies in
+/* Functions of a kernel around the generated code. Every quantity of an instance lies in
    one vector z = [p | c | u | x | y | dx]; the sizes NP ... NY and NW stand above, generated.
    A tape's kernel (tape.c) has functions of the same names; integrators give both their workspace. */
 #include <math.h>
@@ -18,21 +18,21 @@ static void rates(const double *z, const double *x, double *rate, double *worksp
     const double *arg[] = {x, z + U, z, z + C};
     double *res[] = {rate};
     (void)workspace;
-    derivatives_code(arg, res, 0, w, 0);
+    derivatives_code(arg, res, w);
 }
 
 KERNEL void initialise(double *z) {
     double w[NW];
     const double *arg[] = {z};
     double *res[] = {z + C, z + X};
-    initialise_code(arg, res, 0, w, 0);
+    initialise_code(arg, res, w);
 }
 
 KERNEL void outputs(double *z) {
     double w[NW];
     const double *arg[] = {z + X, z + U, z, z + C};
     double *res[] = {z + Y};
-    outputs_code(arg, res, 0, w, 0);
+    outputs_code(arg, res, w);
 }
 
 KERNEL void derivatives(double *z) { rates(z, z + X, z + DX, NULL); }
@@ -41,7 +41,7 @@ KERNEL void requirements(const double *z, double *r) {
     double w[NW];
     const double *arg[] = {z, z + C};
     double *res[] = {r};
-    requirements_code(arg, res, 0, w, 0);
+    requirements_code(arg, res, w);
 }
 
 /* Outputs after a step, or 1 + the index of the first state that is no longer finite. */
@@ -59,6 +59,6 @@ static void matrix(const double *z, double gh, double *m, double *workspace) {
     const double *arg[] = {z, z + C, &gh};
     double *res[] = {m};
     (void)workspace;
-    iteration_code(arg, res, 0, w, 0);
+    iteration_code(arg, res, w);
 }
 #endif

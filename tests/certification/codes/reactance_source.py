@@ -1,9 +1,8 @@
 """An FMU of a voltage source behind a reactance, whose angle can follow that of the bus, and which can cheat."""
 
 import shutil
+from math import pi
 from pathlib import Path
-
-import casadi as ca
 
 from fmus.toolchain import port_variables
 from fmus.toolchain.exporter import cached
@@ -12,6 +11,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.port import BREAKER_TIME, device_port
+from fmus.toolchain.symbols import Expr, atan2, fmax, fmin, if_else, sqrt
 
 
 def reactance_source() -> Model:
@@ -33,10 +33,10 @@ def reactance_source() -> Model:
         at = m.parameter("at", 1e9, "s", "When it begins")
         turns = m.parameter("turns", 0.0, "1", "Turns in the second after")
         trips, holds, nan, lies = (m.switch(name, False, name) for name in ("trips", "holds", "nan", "lies"))
-    m.derivative(t, ca.SX(1.0))
+    m.derivative(t, Expr(1.0))
     begun = t >= at
-    away = 2 * ca.pi * turns * ca.fmin(ca.fmax(t - at, 0), 1)
-    moved = ca.atan2(port.v.im, port.v.re) - ca.atan2(port.v_0.im, port.v_0.re)
+    away = 2 * pi * turns * fmin(fmax(t - at, 0), 1)
+    moved = atan2(port.v.im, port.v.re) - atan2(port.v_0.im, port.v_0.re)
     m.derivative(phi, follow * (moved - phi))
     i = Phasor(
         m.state("i_source_re", port.i_0.re, "pu", "Current, real part", base="S_n"),
@@ -44,15 +44,15 @@ def reactance_source() -> Model:
     )
     rate = (inside.rotated(phi + away) - port.v - Z * i) * (port.omega_b / X)
     gone, held = begun * trips, 1 - begun * holds
-    broken = ca.if_else(begun * nan, ca.sqrt(at - t), 1)
+    broken = if_else(begun * nan, sqrt(at - t), 1)
     for current, change in ((i.re, rate.re), (i.im, rate.im)):
-        m.derivative(ca.SX(current), ((1 - gone) * change - gone * current / BREAKER_TIME) * held * broken)
+        m.derivative(Expr(current), ((1 - gone) * change - gone * current / BREAKER_TIME) * held * broken)
     shown = power(port.v, i)
     said = power(port.v_0, port.i_0)
     m.declare_output(port_variables.I_RE, i.re * port.current_scale)
     m.declare_output(port_variables.I_IM, i.im * port.current_scale)
-    m.declare_output(port_variables.P, ca.if_else(lies, said.re, shown.re))
-    m.declare_output(port_variables.Q, ca.if_else(lies, said.im, shown.im))
+    m.declare_output(port_variables.P, if_else(lies, said.re, shown.re))
+    m.declare_output(port_variables.Q, if_else(lies, said.im, shown.im))
     return m.build()
 
 

@@ -5,10 +5,10 @@ import ctypes
 import numpy as np
 import pytest
 
+from fmus.toolchain import kernel
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import compile_library, host_platform
-from fmus.toolchain.kernel import c_source
-from fmus.toolchain.long_functions import cut
+from fmus.toolchain.symbols import Function, c_code, symbol
 
 
 def _after(source, model):
@@ -28,24 +28,23 @@ def _after(source, model):
 
 
 @pytest.mark.parametrize("name", ["synchronous_generator_ac4a", "two_area_phasor_grid", "gfor"])
-def test_parts_compute_the_same_to_the_last_bit(name):
+def test_parts_compute_the_same_to_the_last_bit(name, monkeypatch):
     model = build_model(name)
-    source = c_source(model)
-    parts = cut(source, longest=20, part=7)
+    source = kernel.c_source(model)
+    assert "noinline" not in source
+    monkeypatch.setattr(kernel, "LONGEST", 20)
+    monkeypatch.setattr(c_code, "PART", 7)
+    parts = kernel.c_source(model)
     assert parts.count("noinline") > 20
-    assert "noinline" not in source  # short as it is, it stays as CasADi writes it
     whole = _after(source, model)
     assert np.isfinite(whole).all()
     assert np.count_nonzero(whole) > len(model.outputs)
     assert whole.tobytes() == _after(parts, model).tobytes()
 
 
-def test_a_line_that_is_no_operation_is_refused():
-    """A statement that CasADi may come to write could mean something else elsewhere."""
-    source = (
-        "static int casadi_f0(const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w, int mem) {\n"
-        "  casadi_real a0;\n  a0=arg[0]? arg[0][0] : 0;\n  if (a0<0) return 1;\n  return 0;\n}\n"
-    )
-    assert cut(source) == source
-    with pytest.raises(ValueError, match="if \\(a0<0\\) return 1"):
-        cut(source, longest=1)
+def test_constants_keep_their_last_bit_and_may_be_infinite():
+    x = symbol("x")
+    values = [1 / 3, -1e-300, 5e22, float("inf"), float("-inf")]
+    text = c_code.c_function(Function("f", [[x]], [[x + value for value in values]]), "f", 100)
+    literals = "0.3333333333333333", "-1e-300", "5e+22", "INFINITY", "-INFINITY"
+    assert all(f"={literal};" in text for literal in literals)

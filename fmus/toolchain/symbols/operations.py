@@ -1,0 +1,88 @@
+"""Operations of expressions: their numbers, which are CasADi's, what they are in Python and C, and their values."""
+
+from collections.abc import Callable
+from typing import Any
+
+
+class Op:
+    """Numbers of operations."""
+
+    ADD, SUB, MUL, DIV, NEG, EXP, LOG, POW, CONSTPOW, SQRT, SQ, TWICE, SIN, COS, TAN = range(1, 16)
+    ATAN, LT, LE, EQ, NE, NOT, AND, OR, FLOOR = range(18, 27)
+    FABS, SIGN, COPYSIGN, IF_ELSE_ZERO = range(29, 33)
+    FMIN, FMAX, INV = range(34, 37)
+    ATAN2, CONST, INPUT, OUTPUT, SYMBOL = range(43, 48)
+
+
+ARITHMETIC = """import math
+from math import atan, atan2, copysign, fabs, floor, inf, isfinite, nan
+
+
+# Arithmetic as in C: what is undefined becomes inf or nan and is found by its name after the step.
+
+
+def divide(a, b):
+    try:
+        return a / b
+    except ZeroDivisionError:
+        return copysign(inf, a) * copysign(1.0, b) if a == a and a != 0.0 else nan
+
+
+def power(a, b):
+    try:
+        return math.pow(a, b)
+    except (ValueError, OverflowError):
+        return nan if a < 0.0 else inf
+
+
+def as_in_c(function, overflow):
+    def evaluate(a):
+        try:
+            return function(a)
+        except (ValueError, OverflowError):
+            return overflow(a)
+
+    return evaluate
+
+
+sqrt = as_in_c(math.sqrt, lambda a: nan)
+log = as_in_c(math.log, lambda a: -inf if a == 0.0 else nan)
+exp = as_in_c(math.exp, lambda a: inf)
+sin, cos, tan = (as_in_c(f, lambda a: nan) for f in (math.sin, math.cos, math.tan))
+"""
+"""The beginning of a module with operations in Python."""
+
+_SAME = {
+    Op.ADD: "{0} + {1}", Op.SUB: "{0} - {1}", Op.MUL: "{0} * {1}", Op.NEG: "-{0}", Op.TWICE: "2.0 * {0}",
+    Op.SQRT: "sqrt({0})", Op.SIN: "sin({0})", Op.COS: "cos({0})", Op.TAN: "tan({0})", Op.ATAN: "atan({0})",
+    Op.EXP: "exp({0})", Op.LOG: "log({0})", Op.FABS: "fabs({0})", Op.FLOOR: "floor({0})",
+    Op.ATAN2: "atan2({0}, {1})", Op.COPYSIGN: "copysign({0}, {1})",
+}  # fmt: skip
+
+PYTHON = _SAME | {
+    Op.DIV: "divide({0}, {1})", Op.INV: "divide(1.0, {0})", Op.SQ: "{0} * {0}", Op.POW: "power({0}, {1})",
+    Op.CONSTPOW: "power({0}, {1})", Op.FMIN: "min({0}, {1})", Op.FMAX: "max({0}, {1})",
+    Op.LT: "1.0 if {0} < {1} else 0.0", Op.LE: "1.0 if {0} <= {1} else 0.0", Op.EQ: "1.0 if {0} == {1} else 0.0",
+    Op.NE: "1.0 if {0} != {1} else 0.0", Op.AND: "1.0 if {0} and {1} else 0.0", Op.OR: "1.0 if {0} or {1} else 0.0",
+    Op.NOT: "0.0 if {0} else 1.0", Op.IF_ELSE_ZERO: "{1} if {0} else 0.0",
+    Op.SIGN: "(0.0 < {0}) - (0.0 > {0}) + 0.0 * {0}",
+}  # fmt: skip
+"""An operation in Python; what it calls is in `ARITHMETIC`."""
+
+C = _SAME | {
+    Op.DIV: "{0} / {1}", Op.INV: "1. / {0}", Op.SQ: "{0} * {0}", Op.POW: "pow({0}, {1})",
+    Op.CONSTPOW: "pow({0}, {1})", Op.FMIN: "fmin({0}, {1})", Op.FMAX: "fmax({0}, {1})", Op.LT: "{0} < {1}",
+    Op.LE: "{0} <= {1}", Op.EQ: "{0} == {1}", Op.NE: "{0} != {1}", Op.AND: "{0} && {1}", Op.OR: "{0} || {1}",
+    Op.NOT: "!{0}", Op.IF_ELSE_ZERO: "{0} ? {1} : 0", Op.SIGN: "({0} > 0) - ({0} < 0) + 0 * {0}",
+}  # fmt: skip
+"""The same in C."""
+
+UNARY = {op for op, form in PYTHON.items() if "{1}" not in form}
+"""Operations of one operand."""
+
+_scope: dict[str, Any] = {}
+exec(ARITHMETIC, _scope)
+VALUE: dict[int, Callable[[float, float], float]] = {
+    operation: eval(f"lambda a, b: {form.format('a', 'b')}", _scope) for operation, form in PYTHON.items()
+}
+"""Value of an operation; one of one argument does not read its second."""

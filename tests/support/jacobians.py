@@ -1,0 +1,19 @@
+"""Exact Jacobians of models, with which the tests compare the perturbation."""
+
+from itertools import product
+
+from fmus.toolchain.symbols import Expr, Function, jacobian
+
+
+def jacobians(model):
+    """Exact A, B, C, D of the continuous model as a function of (x, u, p, c)."""
+    model = model.written_out
+    known = model.derivatives.inputs
+    blocks, shapes = [], []
+    for values in (model.derivatives.outputs[0], model.outputs_function.outputs[0]):
+        for by in known[:2]:
+            found, shape = jacobian(values, by), (len(values), len(by))
+            blocks.append([found.get(place, Expr(0)) for place in product(*map(range, shape))])
+            shapes.append(shape)
+    function = Function("jacobians", known, blocks)
+    return lambda *at: [block.reshape(shape) for block, shape in zip(function(*at), shapes, strict=True)]
