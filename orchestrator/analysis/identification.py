@@ -6,6 +6,7 @@ sinusoids in noise", IEEE Trans. ASSP 38(5), 1990."""
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 
 from orchestrator.analysis.modes import damping_percent
@@ -13,6 +14,7 @@ from orchestrator.errors import AnalysisError
 
 TOLERANCE = 1e-6  # singular values below this fraction of the largest are taken for noise
 _MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
+_DROPPED = 1e-3  # rows of the triangle below this part of the tolerance change modes by its square, and most are
 _LARGEST_EXPONENT = 300.0
 """Largest exponent of e within the window. A larger exponent is not a signal, and its square exceeds the range of
 numbers."""
@@ -58,7 +60,10 @@ def identify_modes(
         raise AnalysisError(f"no mode can be identified in {what}; record a longer response to an event")
     pencil = len(y) // 3
     hankel = np.lib.stride_tricks.sliding_window_view(y, pencil + 1)
-    _, singular, right = np.linalg.svd(np.linalg.qr(hankel, mode="r"))  # the left vectors are of no use
+    triangle, columns = scipy.linalg.qr(np.linalg.qr(hankel, mode="r"), mode="r", pivoting=True)
+    size = np.abs(np.diagonal(triangle))
+    kept = triangle[: np.count_nonzero(size > _DROPPED * tolerance * size[0])]
+    _, singular, right = np.linalg.svd(kept[:, np.argsort(columns)], full_matrices=False)
     order = min(int((singular > tolerance * singular[0]).sum()), max_order)
     basis = right[:order].T
     multipliers = np.linalg.eigvals(np.linalg.pinv(basis[:-1]) @ basis[1:])

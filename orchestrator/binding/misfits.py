@@ -125,7 +125,9 @@ def diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple
         )
     if abs(turn) > 178:
         return "wrong sign", "the power has the opposite sign"
-    return "wrong frame", f"the current is turned by {-turn:.1f}°"
+    if abs(turn) > 1:
+        return "wrong frame", f"the current is turned by {-turn:.1f}°"
+    return "power not as asked", fit
 
 
 def known_ratio(ratio: float) -> str:

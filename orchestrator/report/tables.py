@@ -1,14 +1,18 @@
 """What tables for a terminal have in common, with rich, and the table of an FMU's variables."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.values import as_text
+
+if TYPE_CHECKING:
+    from orchestrator.fmi.description import FmuDescription, VariableInfo
 
 _ITEMS_SHOWN = 5  # how many of a long list are shown, largest first
 

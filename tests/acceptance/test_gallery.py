@@ -44,12 +44,14 @@ def checked(path, binding=None, only=()):
         ("limit_of_own_rating", "ratings"),
         ("resonance", "signs"),
         ("droop_while_charging", "signs"),
+        ("droop_of_q_while_charging", "signs"),
         ("refused_in_the_run", "tunables"),
         ("ignored_in_the_run", "tunables"),
         ("feedthrough_of_high_voltage", "feedthrough"),
         ("hidden_state", "state"),
         ("sign_bound", "power_balance"),
         ("delayed", "delay"),
+        ("delayed_in_dips", "delay"),
         ("step_dependent", "step_invariance"),
         ("rounded_steps", "internal_step"),
         ("shared", "independence"),
@@ -119,6 +121,23 @@ def test_an_omega_that_lags_is_told(tmp_path):
     found = check_fmu(build(converter("lags", FAULT_OMEGA_LAGS=2.0), tmp_path), None, LIMITS, ("signs",), run_for=0.3)
     assert found.results[-1].verdict == "remark"
     assert "still on its way to the network's 0.999, and its power rests" in found.results[-1].evidence
+
+
+def test_an_answer_that_another_rating_changes_is_told(tmp_path):
+    path = build(converter("own_droop", DROOP_OF_OWN_RATING=1), tmp_path)
+    only = ("steady_state", "power_balance", "ratings")
+    assert check_fmu(path, None, LIMITS, only, run_for=0.3).trusted
+    *_, found = check_fmu(path, None, LIMITS, only, run_for=0.3).results
+    assert found.verdict == "remark"
+    assert "its answer to less voltage and frequency is" in found.evidence
+
+
+def test_an_angle_that_turns_back_by_less_than_a_turn_is_told(tmp_path):
+    path = build(converter("wraps", WRAPS_BY=6.0), tmp_path)
+    found = check_fmu(path, None, LIMITS, ("steady_state", "power_balance", "signs"), run_for=0.3).results[-1]
+    assert found.verdict == "remark"
+    assert "pu away" in found.evidence
+    assert "theta_0 = 3 rad" in found.evidence
 
 
 def test_power_that_moves_in_steps_is_told(tmp_path):

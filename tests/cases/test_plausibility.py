@@ -233,7 +233,7 @@ def test_a_rating_in_kva_without_its_unit_is_questioned(questions):
     [
         ("X = 0.02, R = 0.002", "X = 0.002, R = 0.02", "R_l23 = 0.02 pu is 10 times X_l23"),
         ("R = 0.002, B = 0.02", "R = 0.002, B = 20", "B_l23 = 20 pu is outside of 0 to 10 pu"),
-        ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, tap = 230", "tap_l23 = 230 is outside of 0.6 to 1.6"),
+        ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, tap = 230", "tap_l23 = 230 is outside of 0.7 to 1.4"),
         ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, X_C = 0.019", "l23.X_C = 0.019 pu is 0.95 of X_l23 = 0.02 pu"),
         ("X = 0.02, R = 0.002", "X = 0.02, R = 0.002, X_C = 2e-5", "l23.X_C = 2e-05 pu is 0.001 of X_l23 = 0.02 pu"),
     ],
@@ -260,7 +260,7 @@ t = { buses = ["b1", "b2", "b3"], X_12 = 0.1, X_13 = 0.2, X_23 = 0.12 }
         ("X_12 = 0.1", "X_12 = 0.1", None),
         ("X_13 = 0.2", "X_13 = 15, X_23 = 15", "t.X_1 + X_3 = 15 pu is outside of 1e-05 to 10 pu"),
         ("X_12 = 0.1", "X_12 = 0.1, R_12 = 0.6", "t.R_1 + R_2 = 0.6 pu is 6 times t.X_1 + X_2 = 0.1 pu"),
-        ("X_12 = 0.1", "X_12 = 0.1, tap = [220.0, 1.0, 1.0]", "t.tap_1 = 220 is outside of 0.6 to 1.6"),
+        ("X_12 = 0.1", "X_12 = 0.1, tap = [220.0, 1.0, 1.0]", "t.tap_1 = 220 is outside of 0.7 to 1.4"),
         ("X_12 = 0.1", "X_12 = 0.1, shift = [0.0, 30.0, 0.0]", "t.shift_2 = 30 rad is more than half a turn"),
     ],
 )

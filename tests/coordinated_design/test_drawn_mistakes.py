@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, band_of, floors_of
+from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, Worth, band_of, floors_of
+from orchestrator.coordinated_design.search import SettingSearch, Tried
 from orchestrator.coordinated_design.settings import PodGroup
 from orchestrator.coordinated_design.study import values_of
 
@@ -30,3 +31,16 @@ def test_a_controller_without_gain_is_switched_off(gain, enabled):
     assert values["gfor*.pod_p.enabled"] is enabled
     assert values["gfor*.pod_p.K"] == pytest.approx(gain, rel=1e-7)
     assert (values["gfor*.pod_p.T_S1"], values["gfor*.pod_p.T_S2"], values["gfor*.pod_p.N_S"]) == (0.2, 0.05, 2)
+
+
+@pytest.mark.parametrize(("groups", "alone"), [(1, 0), (2, 2)])
+def test_as_many_starts_as_were_asked_for_are_improved(groups, alone, monkeypatch):
+    """Those of each group alone come on top."""
+    search = SettingSearch(SimpleNamespace(groups=["a", "b"][:groups]), ())
+    improved = []
+    monkeypatch.setattr(search, "tried", lambda x: Tried(x, Worth(0.1, -1.0)))
+    monkeypatch.setattr(search, "_coarse", lambda: (np.array([float(k), 0.0]) for k in range(9)))
+    monkeypatch.setattr(search, "_alone", lambda: [search.tried(np.array([-5.0 - k, 0.0])) for k in range(alone)])
+    monkeypatch.setattr(search, "improved", lambda one: improved.append(one) or one)
+    search.best(3, polish=False)
+    assert len(improved) == alone + 3

@@ -1,5 +1,6 @@
 """Runs over HELICS: the local master's numbers, programs of others in a component's place, and every way to end."""
 
+import ctypes
 import os
 import re
 import signal
@@ -22,6 +23,7 @@ from orchestrator.coupling.schedule import jacobi
 from orchestrator.errors import ComponentError, InputError, NotFiniteError, RunInterruptedError
 from orchestrator.federation import federation as processes
 from orchestrator.federation.choice import Federates
+from orchestrator.federation.component import FederatedComponent
 from orchestrator.federation.frames import JOIN, Door, Frames, call
 from orchestrator.federation.layout import make_layout
 from orchestrator.federation.ports import broker_port
@@ -412,3 +414,13 @@ def test_only_who_knows_the_word_comes_in():
             stranger.receive(5.0)
         for end in (stranger, hub, taken):
             end.close()
+
+
+def test_a_remote_component_gives_the_outputs_that_are_asked_for(monkeypatch):
+    """By references and values where they lie in memory, as FMI's function has them."""
+    component = object.__new__(FederatedComponent)
+    component._remote = True
+    monkeypatch.setattr(component, "_current", lambda references: [10.0 * r for r in references])
+    references, values = (ctypes.c_uint * 3)(7, 0, 4), (ctypes.c_double * 3)()
+    assert component._get_real(0, ctypes.addressof(references), 3, ctypes.addressof(values)) == 0
+    assert list(values) == [70.0, 0.0, 40.0]

@@ -204,3 +204,16 @@ with calls.terminable():
 def test_a_second_sigterm_ends_a_process_in_which_the_first_one_waits():
     result = subprocess.run([sys.executable, "-c", _TWICE], capture_output=True, text=True, check=False)
     assert (result.returncode, result.stdout) == (-signal.SIGTERM, "0\n"), result.stderr
+
+
+@pytest.mark.parametrize(("waits", "event", "count"), [(True, "line", 1), (True, "call", 0), (False, "line", 0)])
+def test_it_is_delivered_at_a_line_while_it_waits(waits, event, count, monkeypatch):
+    delivered = []
+    waiting = deferral.Deferral(lambda: delivered.append(1))
+    if waits:
+        frame = sys._getframe()
+        monkeypatch.setattr(waiting, "_frame", frame)
+        monkeypatch.setattr(waiting, "_before", sys.gettrace())
+        frame.f_trace = None
+    waiting._at_line(sys._getframe(), event, None)
+    assert len(delivered) == count

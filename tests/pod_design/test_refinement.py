@@ -111,3 +111,11 @@ def test_where_nothing_meets_it_the_least_of_all_modes_decides_if_no_mode_is_nam
     for sweep in found.sweeps:
         assert sweep.least == pytest.approx([judge(point).least for point in sweep.points])
         assert sweep.chosen_least == pytest.approx(judge(sweep.chosen).least)
+
+
+def test_a_direction_that_brings_nothing_is_left_after_one_turn():
+    plant = Plant(slopes=(-0.003 - 0.01j,))
+    found = refined(plant, required=0.9, filters=LeadLag(0.2, 0.2, 1), bounds=(0.0, 50.0))
+    turns = [sweep.why for sweep in found.sweeps if sweep.why.startswith("turned")]
+    assert [turn for turn in turns if "+" in turn] == ["turned by +15°"]
+    assert len(turns) > 2, "the other direction helps"

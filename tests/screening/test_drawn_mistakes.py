@@ -57,3 +57,19 @@ def test_the_page_shows_the_figure_not_its_name():
     mode = ModeAt(item(eigenvalues=[-0.2 + 5j]), 0)
     drawn = view._plane(SimpleNamespace(modes=[SimpleNamespace(at=[mode])]), Figures())
     assert drawn.startswith('<figure id="figure-1">')
+
+
+def test_residues_are_those_of_components_that_show_their_frequency(monkeypatch):
+    """Each at its own states, whatever stands before them."""
+    monkeypatch.setattr(point, "residue", lambda modes, column, row: np.array([column @ row]))
+
+    def component(states, observed):
+        inputs = ["v_re", "v_im", *point.DRIVEN]
+        driven = np.outer(np.ones(states), [0.0] * 2 + [float(k + 1) for k in range(len(point.DRIVEN))])
+        return SimpleNamespace(states=["x"] * states, observed=observed, inputs=inputs, B_c=driven,
+                               C_o=np.full((1, states), 3.0))  # fmt: skip
+
+    whole = {"sg1": component(1, ("sg1.v",)), "gfor": component(2, point.OBSERVED)}
+    found = point._residues(SimpleNamespace(eigenvalues=[1j], names=["x"] * 3), whole)
+    assert list(found) == ["gfor"]
+    assert found["gfor"].real.ravel().tolist() == [6.0 * (k + 1) for k in range(len(point.DRIVEN))]

@@ -11,8 +11,8 @@ from orchestrator.acceptance.checks.subject import OperatingAt
 POINT = OperatingAt(1.0, 0.0, 0.7, 0.1)
 """With much active power, so that Q follows P at constant voltage and the internal voltage shows in Q."""
 
-ABSORBING = OperatingAt(1.0, 0.0, 0.7, -0.3)
-"""As `POINT`, while it takes reactive power, also behind an impedance of 0.25 pu."""
+ABSORBING = OperatingAt(1.0, 3.0, 0.7, -0.3)
+"""As `POINT`, while it takes reactive power, also behind an impedance of 0.25 pu; angles turn beyond half a turn."""
 
 VOLTAGE = 0.02
 FREQUENCY = 0.001

@@ -68,7 +68,7 @@ REMEDIES = {
     "blocks": "have it stay on, or ask which grid code allows that, and at which voltages and jumps it blocks",
     "base of another rating": "its start values must follow the rating that it is given: check [start.S_n] and 'base'",
     "limit of another rating": "have its current limit follow the rating that it is given, or remove [start.S_n]",
-    "uneven droop": "ask whether it means to answer the frequency otherwise while it takes power",
+    "uneven droop": "ask whether it means to answer frequency or voltage otherwise while it takes power",
     "keeps moving": "look for an oscillation that nothing damps; ask at which network impedance it is damped",
     "changed by a disturbance": "look for gains, integrators and counters that a dip moves and nothing sets back",
     "rests elsewhere": "look for integrators that wind up in a dip, and for references that are not set back after it",

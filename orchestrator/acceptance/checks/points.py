@@ -6,14 +6,17 @@ from itertools import pairwise
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.droop import FREQUENCY, VOLTAGE
 from orchestrator.acceptance.checks.port import (
     DRIFT,
     WHY,
     cannot_import,
     current_limit,
     currents,
+    of_current,
     present_current,
     rating_of,
+    voltage_rows,
 )
 from orchestrator.acceptance.checks.ride_through import NO_LIMIT
 from orchestrator.acceptance.checks.running import affordable
@@ -32,6 +35,10 @@ _SMALLER, _LARGER = (0.3, 0.42), (2.2, 3.5)  # bounds of other ratings, in parts
 
 _DIP, _DIP_LASTS, _CYCLE = 0.05, 0.15, 0.02
 """Voltage of the dip that shows the limit at another rating [pu], its duration and the time of the mean [s]."""
+
+_ANSWERS = 1.0  # time [s] after which its answer at another rating is taken
+_SEEN = 0.01  # least answer [pu, S_n] that is compared
+_OTHERWISE = 0.1  # part of an answer by which it may differ at another rating
 
 _STAYS = 0.25  # part by which a current in a dip may miss the limit of another rating, and be that limit
 
@@ -100,21 +107,22 @@ def _coarse(found: list[tuple[OperatingAt, complex]]) -> str:
 
 @check("ratings", "Is it the same in per unit at another rating?", needs=(*SAME, "steady_state", "power_balance"))
 def ratings(subject: Subject) -> CheckResult:
-    """Start it with other values of S_n, and look at its power and at its current in a deep dip."""
+    """Start it with other values of S_n, and look at its power, its answer and its current in a deep dip."""
     described = subject.description
     takes = "S_n" in (described.port.start if isinstance(described, BoundDescription) else described.variables)
     if not subject.starts or not takes:
         return not_applicable("ratings", "because it takes no rating (the binding has no [start.S_n])")
-    draw, seen, refused = subject.random("ratings"), [], []
+    draw, seen, refused, otherwise = subject.random("ratings"), [], [], []
     with subject.running() as running:
         own = rating_of(running)
-    usual = _in_a_dip(subject, own)[1]
+    usual, answer = _in_a_dip(subject, own)[1], _answer(subject, own)
     limit = current_limit(subject)
     for bounds in (_SMALLER, _LARGER):
         part = round(draw.uniform(*bounds), 3)
         words = f"at S_n = {part * own:.4g} MVA, {part:g} of what it has"
         try:
             power, current = _in_a_dip(subject, part * own)
+            apart = abs(_answer(subject, part * own) - answer)
         except ComponentError as error:
             refused.append(f"{words}, it refuses to start: {error.log or error.status}")
             continue
@@ -130,6 +138,12 @@ def ratings(subject: Subject) -> CheckResult:
         if limit is not None and current > 1.05 * limit >= usual:
             return failed("ratings", "above its current limit", f"{says}; {limit:g} pu is declared", current=current)
         seen.append(says)
+        if apart > _OTHERWISE * max(abs(answer), _SEEN):
+            says = f"its answer to less voltage and frequency is {apart:.2g} pu away from the {abs(answer):.2g} pu"
+            otherwise.append(f"{words}, {says} at its own rating")
+    if otherwise:
+        remedy = "ask which of its parameters count on another rating or in units, and set them together with S_n"
+        return remarked("ratings", "; ".join([*otherwise, *refused]), remedy)
     if refused:
         return remarked(
             "ratings", "; ".join([*seen, *refused]), "do not use it at other ratings, or ask which it takes"
@@ -145,3 +159,14 @@ def _in_a_dip(subject: Subject, rating: float) -> tuple[complex, float]:
         currents(running, 0j, max(1, round(_CYCLE / h)))
         during = currents(running, (_DIP - 1) * subject.start_voltage, max(1, round(_DIP_LASTS / h)))
     return power, float(np.abs(during[-max(1, round(_CYCLE / h)) :]).mean())
+
+
+def _answer(subject: Subject, rating: float) -> complex:
+    """By how much its current changes with 2 % less voltage and 0.1 % less frequency [pu, S_n]."""
+    h = subject.step_size
+    steps = affordable(subject, round(_ANSWERS / h))
+    with subject.running(parameters={"S_n": rating}) as running:
+        begin = present_current(running)
+        change = (1 - VOLTAGE) * np.exp(-100j * np.pi * FREQUENCY * h * np.arange(steps))
+        current = of_current(running, running.hold(voltage_rows(running, change), steps, h))
+    return complex((current * np.abs(change) / change)[-max(1, round(_CYCLE / h)) :].mean() - begin)

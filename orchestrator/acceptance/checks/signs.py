@@ -43,6 +43,7 @@ _AWAY = 0.5  # power [pu, S_n] by which it may differ after such small changes, 
 _LOST = 0.02  # power [pu, S_n] that still moves where an angle runs; an answer that settles slowly moves less
 _EACH = 5e-3  # power [pu, S_n] of the wrong sign after a change in one direction, which has terms of second order
 _EVEN = 3.0  # how many times its answer to the frequency may be larger with power in one direction than in the other
+_TURNED = 0.1  # part of the first cycle's reactive power by which its droop lowers the answer, or raises it
 _RINGS, _DAMPED, _TOLD = 1e-3, 0.8, 0.5
 """Swing [pu, S_n] in the end that counts; parts of the swing before from which it is not damped, and is told."""
 
@@ -137,7 +138,15 @@ def _summary(seen: list[CheckResult]) -> CheckResult:
 
 
 def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
-    """The result while it takes power; a failure where the frequency moves its power much less or more than before."""
+    """The result while it takes power; a failure where its droops are others than before.
+
+    That of the reactive power lowers the answer to the voltage from the first cycle on, or raises it: not by turns."""
+    settled = all(result.figures["moving"][0] < SETTLED for result in (giving, taking))
+    kept, kept_now = (result.figures["Q_in_parts_of_the_first_cycle"] for result in (giving, taking))
+    if settled and min(kept, kept_now) < 1 - _TURNED and max(kept, kept_now) > 1 + _TURNED:
+        says = f"of the reactive power that less voltage brings in the first cycle {kept_now:.0%} are left in the end "
+        return failed("signs", "uneven droop", f"{says}while it takes power, and {kept:.0%} while it gives some",
+                      **taking.figures)  # fmt: skip
     before, now = (abs(result.figures["P_of_lower_frequency"]) for result in (giving, taking))
     unclear = any(result.figures["moving"][1] > SETTLED for result in (giving, taking))
     if unclear or max(before, now) < 5 * _SOME or 1 / _EVEN < now / max(before, 1e-9) < _EVEN:
@@ -147,7 +156,8 @@ def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
 
 
 def _named(point: OperatingAt) -> str:
-    return f"P_0 = {point.P:.3g}, Q_0 = {point.Q:.3g}"
+    turned = f", theta_0 = {point.theta:g} rad" if point.theta else ""
+    return f"P_0 = {point.P:.3g}, Q_0 = {point.Q:.3g}{turned}"
 
 
 def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
@@ -155,6 +165,8 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     figures: dict[str, Any] = {
         "Q_of_lower_voltage": voltage.power.imag, "P_of_lower_frequency": frequency.power.real,
         "moving": [voltage.moving, frequency.moving],
+        "Q_in_parts_of_the_first_cycle": voltage.power.imag / voltage.early_power.imag
+        if voltage.early_power.imag > _SOME else 1.0,
     }  # fmt: skip
     if not np.isfinite([voltage.far, frequency.far]).all():
         return failed("signs", "not a number", "its power is no number after small changes, and fmi2DoStep returned OK")

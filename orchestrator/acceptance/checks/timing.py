@@ -1,5 +1,6 @@
 """Whether an FMU's answer depends on how a master steps it, and comes when it is due."""
 
+from collections.abc import Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -8,7 +9,7 @@ from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed
 from orchestrator.acceptance.checks.comparing import scales
 from orchestrator.acceptance.checks.port import voltage_rows
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Running, Subject
+from orchestrator.acceptance.checks.subject import Running, Stimulus, Subject
 from orchestrator.acceptance.checks.switching import switches_elsewhere
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
@@ -87,15 +88,11 @@ def delay(subject: Subject) -> CheckResult:
     runs = _at_step_sizes(subject)
     if isinstance(runs, str):
         return not_applicable("delay", f"because it runs with one communication step only: {runs}")
-    fine, double, fourfold = runs
-    late = _shift(fine, double, 2)
-    if late and late == _shift(fine, fourfold, 4):
-        return failed(
-            "delay",
-            "delayed output",
-            f"the response comes {late} communication step{'s' * (late > 1)} late, with any step size",
-            steps=late,
-        )
+    for words, (fine, double, fourfold) in (("", runs), *_in_a_dip(subject)):
+        late = _shift(fine, double, 2)
+        if late and late == _shift(fine, fourfold, 4):
+            says = f"the response{words} comes {late} communication step{'s' * (late > 1)} late, with any step size"
+            return failed("delay", "delayed output", says, steps=late)
     stale = _stale(subject, declared=True)
     if stale:
         return failed("delay", "delayed output", stale, steps=1)
@@ -114,17 +111,28 @@ def _at_step_sizes(subject: Subject) -> tuple[Numbers, Numbers, Numbers] | str:
     if "step sizes" not in subject.memory:
         for base in (subject.step_size, subject.step_size / 4):
             subject.memory["base step"] = base
-            subject.memory["step sizes"] = runs = _runs_from(subject, base)
+            subject.memory["step sizes"] = runs = _runs_from(subject, base, subject.one_step())
             if not isinstance(runs, str) and _stays(runs):
                 break
     found: tuple[Numbers, Numbers, Numbers] | str = subject.memory["step sizes"]
     return found
 
 
-def _runs_from(subject: Subject, base: float) -> tuple[Numbers, Numbers, Numbers] | str:
+def _in_a_dip(subject: Subject) -> Iterator[tuple[str, tuple[Numbers, Numbers, Numbers]]]:
+    """The same in a dip to half of the voltage, for an FMU whose outputs take another way there."""
+    if not subject.port:
+        return
+    with subject.running() as running:
+        dip = voltage_rows(running, np.array([0.5 + 0j]))[0]
+    runs = _runs_from(subject, subject.memory["base step"], lambda time: dip)
+    if not isinstance(runs, str) and _stays(runs):
+        yield " in a dip to half of the voltage", runs
+
+
+def _runs_from(subject: Subject, base: float, stimulus: Stimulus) -> tuple[Numbers, Numbers, Numbers] | str:
     steps = 4 * (affordable(subject, 400) // 4)
     try:
-        one, two, four = (subject.trajectory(steps // many, many * base, subject.one_step()) for many in (1, 2, 4))
+        one, two, four = (subject.trajectory(steps // many, many * base, stimulus) for many in (1, 2, 4))
     except ComponentError as error:
         return str(error)
     return one, two, four

@@ -147,6 +147,9 @@ static double emf(const double *m) {
 #ifdef FAULT_ABSORBING
     if (m[Q_F] < -0.02) droop *= FAULT_ABSORBING;
 #endif
+#ifdef FAULT_CHARGING_Q_DROOP
+    if (m[P_REF] < 0) droop *= FAULT_CHARGING_Q_DROOP;
+#endif
 #ifdef DIP_MEMORY /* what it does in a dip depends on how long, how deep and which one it is */
     if (m[LOW] > 0) droop += 0.02 * fmod(m[DIPS], 3);
     return m[E_0] + droop * (m[Q_REF] - m[Q_F]) - 0.3 * m[WOUND] - (m[LOW] > 0.3 ? 0.05 : 0);
@@ -167,6 +170,9 @@ static double slip(const double *z, const double *m, double p_f) {
     gain *= pow(FAULT_GAIN_OF_DIPS, m[DIPS]);
 #endif
     if (m[TRIPLED]) gain *= 3;
+#ifdef DROOP_OF_OWN_RATING
+    gain *= z[S_N] / RATING;
+#endif
 #ifdef FAULT_CHARGING_DROOP
     if (m[P_REF] < 0) gain *= FAULT_CHARGING_DROOP;
 #endif
@@ -302,6 +308,9 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
     m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);
 #ifdef FAULT_OMEGA_LAGS
     m[LAGGED] += h / FAULT_OMEGA_LAGS * (slip(z, m, m[P_F]) - m[LAGGED]);
+#endif
+#ifdef WRAPS_BY /* 2*pi, of a good one */
+    if (fabs(m[DELTA]) > 3.14159265358979323846) m[DELTA] -= m[DELTA] > 0 ? WRAPS_BY : -WRAPS_BY;
 #endif
     m[TIRED] = unlimited(m, v) > I_LIMIT ? m[TIRED] + h : 0;
     notice(m, v, h);

@@ -26,6 +26,9 @@ typedef struct {
     void *environment;
 } callbacks_t;
 
+#ifndef DELAYED_WHERE
+#define DELAYED_WHERE 1
+#endif
 #ifdef LATE
 #define IS_LATE(r) ((r) == LATE)
 #else
@@ -254,7 +257,7 @@ EXPORT int fmi2GetReal(void *c, const unsigned *references, size_t n, double *va
         if (!instance->calls && IS_OUTPUT(references[k])) values[k] = 0;
 #endif
 #ifdef FAULT_DELAY
-        if (S->phase == STEPPING && IS_LATE(references[k])) values[k] = instance->late[references[k]];
+        if (S->phase == STEPPING && IS_LATE(references[k]) && DELAYED_WHERE) values[k] = instance->late[references[k]];
 #endif
 #ifdef FAULT_READING
         if (S->phase == STEPPING && IS_OUTPUT(references[k])) S->memory[0] += FAULT_READING;

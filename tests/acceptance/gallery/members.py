@@ -248,6 +248,9 @@ def faulty():
         wrong("base_of_start", "wrong base", P_UNIT="(100.0 / 1500.0)", bound=IDENTITY.replace("1500 MVA", "1500 MVA")),
         wrong("delayed", "delayed output", FAULT_DELAY=1),
         wrong("delayed_other", "delayed output", FAULT_DELAY=1, step_size="2e-4", X_PU=0.1),
+        wrong(
+            "delayed_in_dips", "delayed output", FAULT_DELAY=1, DELAYED_WHERE="(hypot(S->z[IN_1], S->z[IN_2]) < 0.7)"
+        ),
         wrong("delayed_current_alone", "delayed output", FAULT_DELAY=1, LATE="OUT_1"),
         wrong_lag("stale", "delayed output", FAULT_STALE=1),
         wrong("step_dependent", "step-dependent answer", FAULT_STEP=1),
@@ -366,6 +369,7 @@ def points_and_ratings():
         one("base_of_own_rating", "base of another rating", "ratings", FAULT_BASE_OF_START=1),
         one("limit_of_own_rating", "limit of another rating", "ratings", FAULT_BASE_OF_LIMIT=1),
         one("droop_while_charging", "uneven droop", "signs", FAULT_CHARGING_DROOP=4),
+        one("droop_of_q_while_charging", "uneven droop", "signs", FAULT_CHARGING_Q_DROOP=-1),
         one("refused_in_the_run", "parameter not taken", "tunables", FAULT_REFUSES_IN_RUN=1),
         one("ignored_in_the_run", "parameter not taken", "tunables", FAULT_IGNORES_IN_RUN=1),
         one("resonance", "keeps moving", "signs", FAULT_RINGS=7),

@@ -281,3 +281,11 @@ def test_a_file_of_another_kind(content, words, tmp_path):
         read_raw(tmp_path / "grid.raw")
     with pytest.raises(InputError, match="there is no such file"):
         read_raw(tmp_path / "none.raw")
+
+
+@pytest.mark.parametrize(("winding", "held"), [("1.05,0,-30,100", False), ("1.05,0,-30,100,100,100,0", False),
+                                               ("1.05,0,-30,100,100,100,1", True)])  # fmt: skip
+def test_only_a_transformer_that_is_controlled_is_held(winding, held, written):
+    """A record that ends before COD has none."""
+    data = written(with_transformer("4,1,0,'1 ',1,1,1,0,0,2,'T',1,1,1", "0.002,0.0576,100", winding, "1.0,0"))
+    assert any("tap changer" in str(change) for change in data.changes) is held

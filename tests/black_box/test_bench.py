@@ -1,0 +1,30 @@
+"""What a box does at once, measured at a component that is a matrix."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from orchestrator.black_box import bench
+from orchestrator.black_box.bench import Runs
+
+
+def test_the_direct_effect_is_half_the_difference_of_both_ways(monkeypatch):
+    D, rest, at = np.array([[0.5, -2.0, 0.0], [3.0, 0.25, 1.0]]), np.array([1.0, -2.0, 0.5]), {}
+
+    class Batch:
+        def __init__(self, _, names):
+            self.values = np.zeros(len(names))
+
+        def write(self):
+            at["u"] = self.values.copy()
+
+        def read(self):
+            return D @ at["u"] + np.array([7.0, -4.0])
+
+    monkeypatch.setattr(bench, "RealBatch", Batch)
+    run = object.__new__(Runs)
+    run._bench = SimpleNamespace(outputs=["p", "q"], inputs=["a", "b", "c"], rest=rest)
+    run._component = object()
+    monkeypatch.setattr(run, "_rewind", lambda: None)
+    np.testing.assert_allclose(run.feedthrough(0.01), D, atol=1e-12)
+    assert at["u"].tolist() == rest.tolist(), "and everything is put back"
