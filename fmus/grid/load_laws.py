@@ -11,6 +11,10 @@ In steady state, and for everything slow against τ, the load follows its law ex
 real ones are. With the inductances L that feed the bus, a constant current G obeys G·L·s² + s + 1/τ = 0, damped at any
 τ > 0. Static generation (P < 0) has Y = 0: within τ it is a source of constant current, not a negative conductance.
 
+Of the longer τ of phasor networks a swing would see too much: 6 % of the change lies in quadrature at 1 Hz, 0.8 points
+of damping in a network of twelve buses. There the load draws Y·v + 3·c − 2·d, with (τ/2)·dd/dt = c − d, whose error is
+of second order in ω·τ.
+
 Only Y'(|v|, f)·v is no linear function of the states. An implicit step takes it at the stages of the step, and all else
 implicitly."""
 
@@ -47,14 +51,17 @@ FREQUENCY_TIME = 0.02
 class FollowingLoad:
     """A declared load with its correction c at scale 1.
 
-    ``data``: the load's laws; ``load``: its admittance at scale 1; ``correction``: the state c; ``tau``: its lag [s];
-    ``v_min``: voltage below which it is an impedance [pu]; None for never; ``delayed``: the bus voltage behind a lag,
-    and that lag [s], for the frequency; None for a load that does not depend on it."""
+    ``data``: the load's laws; ``load``: its admittance at scale 1; ``correction``, ``held``: the states c and d, the
+    second of phasor networks; ``followed``: what is drawn beside the admittance; ``tau``: the lag [s]; ``v_min``:
+    voltage below which it is an impedance [pu]; None for never; ``delayed``: the bus voltage behind a lag, and that
+    lag [s], for the frequency; None for a load that does not depend on it."""
 
     data: Load
     bus: Bus
     load: DeclaredLoad
     correction: Phasor
+    held: Phasor | None
+    followed: Phasor
     tau: Expr
     v_min: Expr | None
     delayed: tuple[Phasor, Expr] | None
@@ -103,9 +110,11 @@ def declare_following_load(
         start = _missing(load, declared, bus.v_0)
         text = "Correction of the load's current at scale 1"
         correction = phasor_state(m, "c", start, text, SYSTEM_BASE)
+        held = phasor_state(m, "d", start, f"{text}, behind its lag", SYSTEM_BASE) if phasors else None
         delayed = _delayed_voltage(m, bus) if load.k_pf or load.k_qf else None
-    bus.injected -= correction * declared.scale
-    return FollowingLoad(load, bus, declared, correction, tau, v_min, delayed, omega_b)
+    followed = correction if held is None else correction * 3.0 - held * 2.0
+    bus.injected -= followed * declared.scale
+    return FollowingLoad(load, bus, declared, correction, held, followed, tau, v_min, delayed, omega_b)
 
 
 def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
@@ -114,6 +123,8 @@ def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
     rate = (_wanted(m, load) - load.correction) * (1 / load.tau)
     implicit = load.correction * (-1 / load.tau)
     phasor_derivative(m, load.correction, rate, implicit)
+    if load.held is not None:
+        phasor_derivative(m, load.held, (load.correction - load.held) * (2 / load.tau), load.held * (-2 / load.tau))
     if load.delayed is not None:
         delayed, lag = load.delayed
         moved = (v - delayed) * (1 / lag)
@@ -123,7 +134,7 @@ def following_load_equations(m: ModelBuilder, load: FollowingLoad) -> None:
         own = v * Phasor(declared.G, declared.B_0 if load.data.susceptance_mvar and not declared.branches else 0.0)
         for branch in declared.branches:
             own += branch.current
-    drawn = power(v, (own + load.correction) * declared.scale)
+    drawn = power(v, (own + load.followed) * declared.scale)
     with m.scope(load.data.name):
         if load.data.active_follows:
             m.output("p", drawn.re, "pu", "Active power drawn", base=SYSTEM_BASE)

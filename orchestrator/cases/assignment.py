@@ -54,7 +54,8 @@ def _assign_frequency(draft: Draft) -> None:
 
 
 def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
-    """Assign to one component, or to all that have the variable and whose name fits a pattern such as ``gfor*``."""
+    """Assign to one component, or to all that have the variable and whose name fits a pattern such as ``gfor*``; the
+    variable may be a pattern, too."""
     if sets_imperfection(key):
         return  # done when the connections are made
     pattern, _, variable = key.partition(".")
@@ -68,13 +69,20 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
             draft.note(where, f"no component that fits {pattern!r} has a variable {variable!r}; {hint}")
         fitting = having
     for name in fitting:
-        _assign(draft, name, variable, value, where)
+        for each in _meant(draft, name, variable) or [variable]:
+            _assign(draft, name, each, value, where)
     _check_component(draft, pattern, where)
 
 
 def _has(draft: Draft, name: str, variable: str) -> bool:
     plan = draft.system.components.get(name)
-    return plan is not None and variable in plan.description.variables
+    return plan is not None and (variable in plan.description.variables or bool(_meant(draft, name, variable)))
+
+
+def _meant(draft: Draft, name: str, variable: str) -> list[str]:
+    """What a pattern of variables fits."""
+    known = name in draft.system.components and "*" in variable
+    return fnmatch.filter(_settable(draft, name), variable) if known else []
 
 
 def _settable(draft: Draft, name: str) -> tuple[str, ...]:

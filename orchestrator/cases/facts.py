@@ -21,6 +21,7 @@ class Facts:
     buses: int
     machines: int
     converters: int
+    governed: bool  # whether a machine has a governor
     load_mw: float  # active power of all loads, without what feeds in [MW]
     load_model: str
     slack: tuple[tuple[str, float, float], ...]  # units at the slack bus, with their power [MW] and their rating [MVA]
@@ -33,6 +34,7 @@ class Facts:
             *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []),
             _counted(self.buses, "bus"),
             *units,
+            *(["no governor"] if self.machines and not self.governed else []),
             f"{self.load_mw:.5g} MW of load ({self.load_model})",
             *([f"slack {slack}"] if slack else []),
             "voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu),
@@ -64,6 +66,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
         len(network.buses),
         len(machines),
         len(feeding) - len(machines),
+        any(v.startswith("governor.T_") for n in machines for v in plans[n].description.variables),
         sum(p for _, p in loads if p > 0),
         _model([load for load, p in loads if p > 0]),
         tuple((n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n")) for n in at_slack),

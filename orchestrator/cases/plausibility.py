@@ -15,11 +15,13 @@ from orchestrator.cases.plausible_networks import network_doubts
 from orchestrator.cases.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of, unit_of, value_of
+from orchestrator.coupling.schedule import SECOND_ORDER
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import Problem
 from orchestrator.fmi.port import BoundDescription
 
 _FULL = 1.05  # apparent power [pu of the rating] above which a converter's operating point is questioned
+_LONG = 0.01  # step of phasor models [s] above which it is questioned
 _OF_PARTS = ("machine", "exciter", "governor", "pss")
 """Begins of a generator's variables; another scenario may choose a part that has one which this one's has not."""
 
@@ -35,6 +37,7 @@ def check_plausibility(draft: Draft) -> None:
     _check_meant(draft)
     doubts = list(_doubts(draft))
     ranges = {doubt.name for doubt in doubts}  # one question about a value is enough, and a range says more
+    draft.found.questions += _long_step(draft)
     thousands = [(name, text) for name, text in draft.found.thousandfold.items() if name not in ranges]
     question(draft, [*doubts, *(UnusualValue(name, draft.places[name], text) for name, text in thousands)])
 
@@ -67,6 +70,10 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
             wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
             if wanted is not None and value is not None:
                 yield from outside(draft, name, variable, value, wanted, scale=_to_rating(plan, variable))
+        lead, lag = value_of(plan, "exciter.T_A"), value_of(plan, "exciter.T_B")
+        if plan.kind == "machine" and lead and lag and lead > 2 * lag and value_of(plan, "exciter.K") is not None:
+            text = f"exciter.T_A = {lead:g} s, the lead, exceeds exciter.T_B = {lag:g} s, the lag; are the two swapped?"
+            yield UnusualValue(f"{name}.exciter.T_A", place_of(draft, name, "exciter.T_A", "exciter.T_B"), text)
         for resistance, reactance in RESISTANCES:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
             if R is not None and X is not None and R > X > 0:
@@ -76,6 +83,14 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
     yield from network_doubts(draft)
     yield from source_doubts(draft)
     yield from _ratings(draft)
+
+
+def _long_step(draft: Draft) -> Iterator[Problem]:
+    """Ask about a step of the file after which phasor models exchange too late for their modes."""
+    solver, grid = draft.given.case.solver, draft.tables.get(draft.grid or "")
+    if grid and "phasor" in (grid.model or "") and solver.step_size > _LONG and solver.schedule not in SECOND_ORDER:
+        text = f"{1e3 * solver.step_size:g} ms are long for phasor models and move modes: 1 to 5 ms are usual; is it"
+        yield Problem(draft.given.place("solver", "step_size"), f"{text} meant? `gfor steps` says what a step costs")
 
 
 def _ratings(draft: Draft) -> Iterator[UnusualValue]:
@@ -90,8 +105,8 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
 
 
 def question_loading(draft: Draft) -> None:
-    """Ask about converters whose operating point exceeds their rating. The operating point is the power flow's if there
-    is one."""
+    """Ask about units whose operating point exceeds their rating, of machines in active power. It is the power flow's
+    if there is one."""
     asked = {question.place for question in draft.found.questions}  # one question about a rating is enough
     question(draft, (d for d in _overloaded(draft) if d.place not in asked))
 
@@ -99,19 +114,13 @@ def question_loading(draft: Draft) -> None:
 def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
     for name, plan in draft.system.components.items():
         P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
-        if (
-            plan.kind == "machine"
-            or P is None
-            or Q is None
-            or S_n is None
-            or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0"))
-        ):
+        if P is None or Q is None or S_n is None or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0")):
             continue
-        apparent = math.hypot(P, Q)
+        apparent = abs(P) if plan.kind == "machine" else math.hypot(P, Q)
         if apparent > _FULL:
             text = (
                 f"the operating point, P_0 = {P:.4g} pu and Q_0 = {Q:.4g} pu, asks for {apparent:.3g} pu of "
-                f"S_n = {S_n:g} MVA, more than the rating of the converter"
+                f"S_n = {S_n:g} MVA, more than the rating of the {plan.kind}"
             )
             yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
 

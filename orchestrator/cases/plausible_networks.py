@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
+from statistics import median
 
 from fmus.grid.network import Line, Network, ThreeWinding
 from orchestrator.cases.draft import Draft
@@ -11,7 +12,8 @@ from orchestrator.cases.plausible_ranges import COMPENSATION, LINE_B, LINE_RATIO
 from orchestrator.cases.plausible_values import UnusualValue, outside, value_of
 from orchestrator.coupling.system import ComponentPlan
 
-_SHOWN = 3  # equivalents that are named
+_SHOWN = 3  # equivalents that are named; lines beyond which one is compared with the others
+_UNLIKE = 8.0  # times from which on a line is unlike the others
 
 
 def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
@@ -19,6 +21,7 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
     if grid is None or draft.network is None or draft.grid is None:
         return
     yield from _equivalents(draft, draft.grid, draft.network)
+    yield from _unlike_others(draft, draft.grid, grid, draft.network)
     for line in draft.network.lines:
         yield from _line(draft, draft.grid, grid, line)
     for transformer in draft.network.transformers:
@@ -39,6 +42,26 @@ def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualV
                 "of a reduced network they are taken as admittances, which hold at rated frequency alone"
             )
             yield UnusualValue(f"{name}.{found[0].variable(quantity)}", draft.given.place("network"), text)
+
+
+def _unlike_others(draft: Draft, name: str, grid: ComponentPlan, network: Network) -> Iterator[UnusualValue]:
+    """Lines whose X/R and X/B both are far from those of the middle line, by about the same: of a higher voltage the
+    first is larger and the second smaller, of a cable the second is smaller by far."""
+    found = {}
+    for line in network.lines:
+        R, X, B = (value_of(grid, line.variable(q)) for q in "RXB")
+        if R and X and B and min(R, X, B) > 0:
+            found[line] = X, X / R, X / B
+    middle = [median(x) for x in zip(*found.values(), strict=True)]
+    for line, (X, *ratios) in found.items() if len(found) > _SHOWN else ():
+        times = [ratio / usual for ratio, usual in zip(ratios, middle[1:], strict=True)]
+        if max(times) < 2 * min(times) and (min(times) > _UNLIKE or max(times) < 1 / _UNLIKE):
+            variable = line.variable("X")
+            text = (
+                f"{variable} = {X:g} pu: its X/R is {times[0]:.3g} times and its X/B {times[1]:.3g} times that of the "
+                f"middle line; has X a digit too {'many' if times[0] > 1 else 'few'}?"
+            )
+            yield UnusualValue(f"{name}.{variable}", _place(draft, "lines", line.name, "X", variable), text)
 
 
 def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[UnusualValue]:

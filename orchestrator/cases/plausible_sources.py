@@ -9,7 +9,8 @@ from orchestrator.coupling.system import ComponentPlan
 SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
 _STEP_UP = (0.03, 0.35)  # usual reactances of step-up transformers on the machine's rating [pu], widened
 _FAR = 20.0
-"""A capacitor that is smaller than the next one by this factor is questioned where 100 times as much is usual."""
+"""A capacitor or a load that is smaller than the next one by this factor is questioned where 100 times as much is
+usual; a step-up transformer from this factor of the least usual on."""
 
 
 def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
@@ -31,7 +32,9 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
         )
         yield UnusualValue(f"{draft.grid}.{SOLVED}", where, text)
     yield from _negative_loads(draft, draft.grid, where)
-    yield from _capacitors(draft.grid, draft.data.capacitors, where)
+    yield from _hundredths(draft.grid, "shunt", "Mvar", draft.data.capacitors, where)
+    loads = [load for load in draft.network.loads if load.p_mw > 0 and load.name.startswith("load_")]
+    yield from _hundredths(draft.grid, "load", "MW", {x.name[5:]: x.p_mw for x in loads}, where)
     yield from _step_up(draft, draft.grid, grid, where)
     yield from _saturation(draft)
 
@@ -51,15 +54,16 @@ def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValu
         yield UnusualValue(f"{grid}.load_{bus.removeprefix('bus_')}.P", where, text)
 
 
-def _capacitors(grid: str, found: Mapping[str, float], where: str) -> Iterator[UnusualValue]:
+def _hundredths(grid: str, what: str, unit: str, found: Mapping[str, float], where: str) -> Iterator[UnusualValue]:
     for bus, b in found.items():
         others = [other for name, other in found.items() if name != bus]
         if others and b < min(others) / _FAR and 0.2 * min(others) < 100 * b < 5 * max(others):
+            number = bus.removeprefix("bus_")
             text = (
-                f"the shunt at {bus} has {b:g} Mvar, where the others have {min(others):g} to {max(others):g} Mvar: is "
-                f"{100 * b:g} Mvar meant?"
+                f"the {what} at bus_{number} has {b:g} {unit}, where the others have {min(others):g} to "
+                f"{max(others):g} {unit}: is {100 * b:g} {unit} meant?"
             )
-            yield UnusualValue(f"{grid}.shunt_{bus.removeprefix('bus_')}.B", where, text)
+            yield UnusualValue(f"{grid}.{what}_{number}.{'B' if what == 'shunt' else 'P'}", where, text)
 
 
 def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterator[UnusualValue]:
@@ -85,9 +89,11 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
         variable = branches[0].variable("X")
         X = value_of(grid, variable)
         own = 0.0 if X is None else X * rating / 100  # on the machines' rating [pu]
-        if X is not None and own > high and (low <= X <= high or low <= own / 100 <= high):
+        if X is not None and own > high and (low <= X <= high or own > _FAR * low):
             meant = f"if {X:g} pu is on the machine's base, it is {100 * X / rating:.4g} pu on 100 MVA"
-            if own >= 100 * low:
+            if not low <= X <= high and own < 100 * low:
+                meant = f"is the machine's rating {rating / 10:g} MVA?"
+            elif own >= 100 * low:
                 meant = f"is it in percent? {own / 100:.3g} pu would be usual, {X / 100:.4g} pu on 100 MVA"
             text = (
                 f"{variable} = {X:g} pu on 100 MVA is {own:.3g} pu on the {rating:g} MVA behind it, and "

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
+from orchestrator.analysis.mode_names import CLEAR
 from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarities
 from orchestrator.analysis.modes import ZERO, damping_ratio
 from orchestrator.analysis.threads import one_thread
@@ -31,6 +32,7 @@ class ModeVerdict:
     accepted: bool
     reason: str
     components: str = ""
+    doubt: str = ""  # which other mode without the converter it may be as well
 
     @property
     def frequency_hz(self) -> float:
@@ -88,17 +90,27 @@ def neighbouring_modes(matched: Iterable[ModeVerdict]) -> list[ModeVerdict]:
 
 
 def matched_modes(having: ModeSet, lacking: ModeSet, components: list[str] | None = None) -> Iterator[ModeVerdict]:
+    """Each mode with the converter, and which it was without. Where another one is about as like, it is told; of
+    both the better damped one counts where a mode has not enough damping: it excuses nothing."""
     alike = np.zeros((len(having.eigenvalues), len(lacking.eigenvalues)))
     if alike.size:
         alike = np.where(_comparable(having, lacking), similarities(having, lacking), 0.0)
     partners = _partners(alike)
     left = [column for column in range(alike.shape[1]) if column not in partners.values()]
     for k, value in enumerate(having.eigenvalues.tolist()):
-        partner = partners.get(k)
+        partner, doubt = partners.get(k), ""
+        rivals = [j for j in left if partner is not None and alike[k, j] >= CLEAR * alike[k, partner]]
+        if partner is not None and rivals:
+            both = [partner, max(rivals, key=lambda j: alike[k, j])]
+            if damping_ratio(value) < LEAST_DAMPING:
+                both.sort(key=lambda j: -damping_ratio(complex(lacking.eigenvalues[j])))
+            partner, other = both[0], complex(lacking.eigenvalues[both[1]])
+            doubt = f"or {other.imag / (2 * np.pi):.3f} Hz, {100 * damping_ratio(other):.2f} %, as like"
+            left = [j for j in (*left, both[1]) if j != partner]
         before = None if partner is None else complex(lacking.eigenvalues[partner])
         likeness = float(alike[k, left].max(initial=0.0) if partner is None else alike[k, partner])
         accepted, reason = judge_mode(value, before)
-        yield ModeVerdict(value, before, likeness, accepted, reason, components[k] if components else "")
+        yield ModeVerdict(value, before, likeness, accepted, reason, components[k] if components else "", doubt)
 
 
 def _comparable(having: ModeSet, lacking: ModeSet) -> NDArray[np.bool_]:

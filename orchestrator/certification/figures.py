@@ -110,6 +110,7 @@ def mode_json(m: ModeVerdict) -> dict[str, Any]:
         "components": m.components,
         "accepted": m.accepted,
         "reason": m.reason,
+        **({"doubt": m.doubt} if m.doubt else {}),
     }
 
 

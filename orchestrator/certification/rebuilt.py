@@ -140,7 +140,8 @@ def _verdict(point: dict[str, Any], having: PointResult, lacking: PointResult, p
 def _matched(mode: dict[str, Any]) -> ModeVerdict:
     before = None if mode["without"] is None else _value(mode["without"])
     accepted, reason = judge_mode(_value(mode), before)
-    return ModeVerdict(_value(mode), before, mode["likeness"], accepted, reason, mode["components"])
+    told = mode["components"], mode.get("doubt", "")
+    return ModeVerdict(_value(mode), before, mode["likeness"], accepted, reason, *told)
 
 
 def _value(mode: dict[str, Any]) -> complex:

@@ -49,7 +49,8 @@ def eigenvalues(c: Certification, figures: Figures) -> str:
     for v in c.verdicts:
         rows = [
             [eigenvalue(m.eigenvalue.real, m.eigenvalue.imag), f"{m.frequency_hz:.4f}", damping(m.damping_percent),
-             before(m.before), f"{m.similarity:.2f}", escape(m.components), verdict(m.accepted)] for m in v.modes
+             f"{before(m.before)} {escape(m.doubt)}", f"{m.similarity:.2f}", escape(m.components), verdict(m.accepted)]
+            for m in v.modes
         ]  # fmt: skip
         columns = ["λ [rad/s]", "f [Hz]", "Damping [%]", "Same mode without the converter", "Likeness"]
         columns += ["Who takes part", "Verdict"]

@@ -24,8 +24,9 @@ compares these rules with the norm's text.</p><ol>
 <li>Eigenvalue criterion: every mode from 0.1 to 1.5 Hz of the system with the converter has at least 5 % of damping. A
 mode with less is accepted only where the same mode had less than 5 % without the converter already. Modes are matched
 by their left and right eigenvectors over the states that both systems have, each with one at most, so that the sum of
-the likenesses is largest; a mode without a partner of at least 0.5 counts as introduced. A mode from 0.1 to 1.5 Hz has
-no partner below 0.08 or above 1.875 Hz.</li>
+the likenesses is largest; a mode without a partner of at least 0.5 counts as introduced. Where another one is about as
+like, it is named, and the better damped of both counts for a mode below 5 %. A mode from 0.1 to 1.5 Hz has no partner
+below 0.08 or above 1.875 Hz.</li>
 <li>An eigenvalue that grows, at whatever frequency, is not accepted where none grew without the converter; nor one
 that grows without a communication step and is hidden by it.</li>
 <li>{watched}</li>

@@ -77,3 +77,12 @@ def test_a_value_of_the_same_digits_in_another_unit_is_asked_about(gfor):
     found = [gfor("modes", "wscc9", "--set", f"grid.load_5.P={value}")[2] for value in ("125 kW", "125 MW", "130")]
     assert [asked in error for error in found] == [True, False, False]
     assert 'meant = ["grid.load_5.P"]' in " ".join(found[0].split())
+
+
+def test_a_pattern_names_variables_as_it_names_components():
+    case = load_case("wscc9")
+    (found,) = case.prepare(["base"], {"grid.load_*.scale": 0.9})
+    own = {v: x for v, x in found.system.components["grid"].parameters.items() if v.endswith(".scale")}
+    assert own == {"load_5.scale": 0.9, "load_6.scale": 0.9, "load_8.scale": 0.9}
+    with pytest.raises(CaseError, match=r"no variable 'laod_\*.scale'"):
+        case.prepare(["base"], {"grid.laod_*.scale": 0.9})

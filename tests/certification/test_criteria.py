@@ -76,6 +76,22 @@ def test_one_mode_that_was_below_already_excuses_one_only():
     assert "introduces" in found[0.7].reason
 
 
+@pytest.mark.parametrize("turned", [0.02, -0.02])
+def test_of_two_modes_that_it_was_about_as_like_the_one_that_excuses_nothing_counts(turned):
+    """A mode halfway between two: a bad one before would excuse it, a good one does not."""
+    angle = np.pi / 4 + turned
+    shape = np.array([[np.cos(angle), np.sin(angle)]], complex)
+    having = ModeSet(np.array([mode(0.5, 0.03)]), shape, shape, ("a", "b"))
+    both = np.eye(2, dtype=complex)
+    lacking = ModeSet(np.array([mode(0.45, 0.02), mode(0.6, 0.3)]), both, both, ("a", "b"))
+    (found,) = eigenvalue_test(having, lacking)
+    assert (found.before_percent, found.accepted) == (pytest.approx(30.0), False)
+    assert found.doubt == "or 0.450 Hz, 2.00 %, as like"
+    clear = ModeSet(having.eigenvalues, *(np.array([[0.96, 0.28]], complex),) * 2, ("a", "b"))
+    (found,) = eigenvalue_test(clear, lacking)
+    assert (found.before_percent, found.accepted, found.doubt) == (pytest.approx(2.0), True, "")
+
+
 def test_partners_are_chosen_together():
     alike = np.array([[0.9, 0.8], [0.85, 0.1], [0.45, 0.4]])
     assert _partners(alike) == {0: 1, 1: 0}

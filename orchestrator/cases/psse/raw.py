@@ -24,6 +24,7 @@ _SBASE = 100.0  # usual base [MVA]
 _FAR = 20.0
 """Times the middle one of all reactances of lines from which one is questioned, where its ohms would be usual."""
 
+_SMALL_LOSS = 10.0  # MW that a fixed shunt may draw unasked
 _SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may differ
 
 
@@ -178,7 +179,10 @@ class _Reading:
         for record in self._raw.of("fixed shunt"):
             bus = self._bus(record)
             if record.whole(2, "STATUS", 1):
-                self._add(bus, 4, complex(record.number(3, "GL", 0.0), record.number(4, "BL", 0.0)))
+                drawn = complex(record.number(3, "GL", 0.0), record.number(4, "BL", 0.0))
+                if drawn.real > max(_SMALL_LOSS, abs(drawn.imag)):
+                    self._changes.note(record.line, f"shunt that draws GL = {drawn.real:g} MW: is it BL, in Mvar?")
+                self._add(bus, 4, drawn)
         status, mode, initial = (3, 1, 9) if self._raw.revision < 35 else (4, 2, 11)
         for record in self._raw.of("switched shunt"):
             bus = self._bus(record)

@@ -75,6 +75,9 @@ DYRS = {
     "temporary droop in percent": (changed(DYR, (TGOV1, HYGOV.replace(" 0.3 ", " 30 "))), "governor.r = 30 pu"),
     "gain of an exciter": (changed(DYR, (EXST1, SEXS.replace(" 100.0 ", " 0.01 "))), "exciter.K = 0.01 pu"),
     "gain of a stabiliser": (changed(DYR, (STAB1, STAB1.replace("  1.0 ", "  1000 "))), "pss.K_S = 1000 pu"),
+    "least droop of a governor": (changed(DYR, (TGOV1, TGOV1.replace("0.05", "0.005"))), "governor.R = 0.005 pu is"),
+    "field's time constant": (changed(DYR, ("8.0 0.03", "0.8 0.03")), "machine.T_d10 = 0.8 s is outside"),
+    "lead for lag": (changed(DYR, (EXST1, SEXS.replace("0.1 10.0", "10.0 0.1"))), "are the two swapped?"),
     "no saturation": (changed(DYR, ("0.0392 0.2227", "0.0 0.0")), "sg1: the saturation is 0, where 3 of 4 machines"),
     "saturation in percent": (changed(DYR, ("0.0392 0.2227", "3.92 22.27")), "machine.s_10 = 3.92 is outside"),
 }
@@ -119,6 +122,24 @@ RAWS = {
         "line 24: VS is 0.83 pu, where the solved file has VM = 1.03 pu",
     ),
     "load of the wrong sign": (changed(RAW, ("967.000, 100.000", "-96.7, 10.000")), "load at bus_7 is -96.7 MW"),
+    "rating": (
+        changed(RAW, ("1.03, 0, 900.0, 0.0025", "1.03, 0, 9000.0, 0.0025")),
+        "1.5 pu on the 9000 MVA behind it, and step-up transformers have 0.03 to 0.35 pu there; is the machine",
+    ),
+    "line of ten times": (
+        changed(RAW, ("6,  7, '1 ', 0.001, 0.01,", "6,  7, '1 ', 0.001, 0.1,")),
+        "line_6_7 = 0.1 pu: its X/R is 10 times and its X/B 10 times that of the middle line; has X a digit too many?",
+    ),
+    "line of a tenth": (
+        changed(RAW, ("5,  6, '1 ', 0.0025, 0.025,", "5,  6, '1 ', 0.0025, 0.0025,")),
+        "has X a digit too few?",
+    ),
+    "load in pu": (changed(RAW, ("967.000, 100.000", "9.67, 1.0")), "load at bus_7 has 9.67 MW, where the others have"),
+    "power in pu": (changed(RAW, (" 2, '1 ', 700.000", " 2, '1 ', 7.00")), "more than the rating of the machine"),
+    "conductance for a capacitor": (
+        changed(RAW, ("0.0, 200.0", "200.0, 0.0")),
+        "line 20: shunt that draws GL = 200 MW",
+    ),
     "small shunt": (changed(RAW, ("7, '1 ', 1, 0.0, 200.0", "7, '1 ', 1, 0.0, 3.5")), "shunt at bus_7 has 3.5 Mvar"),
 }
 
@@ -214,6 +235,17 @@ EVENT = '[[events]]\ntype = "bus_fault"\ntime = "1 s"\nbus = "bus_8"\ncleared_by
 def test_the_duration_of_a_fault_is_asked_about(questions, duration, words):
     asked = questions(case=CASE + EVENT + duration)
     assert (words in asked[0] and len(asked) == 1) if words else asked == []
+
+
+def test_a_long_step_is_asked_about(questions):
+    (asked,) = questions(case=CASE.replace('step_size = "5 ms"', 'step_size = "20 ms"'))
+    assert "solver.step_size: 20 ms are long for phasor models" in asked
+
+
+def test_that_no_machine_is_governed_stands_in_the_facts(questions, tmp_path, gfor):
+    questions(dyr=without("TGOV1", 1, 2, 3, 4))
+    facts = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])["facts"]
+    assert ", 4 machines, no governor, " in facts
 
 
 OPEN = CASE.replace('load_model = { active = "power", reactive = "power" }\n', "")
