@@ -22,11 +22,8 @@ from fmus.toolchain.nodes import LARGEST_REST
 from fmus.toolchain.symbols import Function
 from fmus.toolchain.symbols.c_code import c_function
 
-LONGEST = 20_000
-"""Operations of a function that is not written in parts."""
-
-LONGEST_OF_DATA = 1_000
-"""The same where a network is solved as data."""
+LONGEST = 2_000
+"""Instructions of a function that is not written in parts."""
 
 _C = Path(__file__).with_name("c")
 
@@ -65,8 +62,7 @@ def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str
     sizes["NW"] = max(1, *(f.room for f in functions.values()))
     if further:
         sizes["NWD"] = max(1, *(f.room for f in further.values()))
-    longest = LONGEST if model.nodal is None else LONGEST_OF_DATA
-    code = [c_function(function, f"{name}_code", longest) for name, function in (functions | further).items()]
+    code = [c_function(function, f"{name}_code", LONGEST) for name, function in (functions | further).items()]
     enumeration = "enum { " + ", ".join(f"{name} = {value}" for name, value in sizes.items()) + " };\n"
     parts = ["#include <math.h>", *code, enumeration, tables]
     files = ["nodal.c"] if model.nodal is not None else []
