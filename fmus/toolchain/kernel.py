@@ -21,8 +21,8 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.symbols import Function
 from fmus.toolchain.symbols.c_code import c_function
 
-LONGEST = 20_000
-"""Operations of a function that is not written in parts."""
+LONGEST = 2_000
+"""Instructions of a function that is not written in parts."""
 
 _C = Path(__file__).with_name("c")
 
