@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.api.progress import shown_progress
-from orchestrator.api.values import binding_path, plain
 from orchestrator.asked import path as path_of
+from orchestrator.cases.given import binding_path, plain
 from orchestrator.errors import InputError
 from orchestrator.points.study import choose_executor
 from orchestrator.results.lock import held

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.values import plain
+from orchestrator.cases.given import plain
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.immittance.scan_files import ENDINGS
 from orchestrator.immittance.study import CutRequest, study_cut

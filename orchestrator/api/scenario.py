@@ -13,11 +13,11 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
-from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.asked import Names, frequency_range, percent, plain_value, whole_number
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
+from orchestrator.cases.given import Paths, Time, case_values, in_seconds, parameter_files
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.load_models import as_powers, is_open
 from orchestrator.cases.parameter_files import ParameterFile

@@ -44,9 +44,11 @@ def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> 
     for name, one in asked_of(request).items():
         if one.option is None or one.option in parser._option_string_actions:
             continue
-        how: dict[str, Any] = {"action": "append"} if one.kind.several else {"type": one.kind.read}
-        how = {"action": "store_true"} if one.kind.read is None else {"metavar": one.metavar, **how}
-        parser.add_argument(one.option, dest=name, help=one.help, **how)
+        how: dict[str, Any] = {"action": "append"} if one.kind.several else {}
+        options = [(one.option, one.metavar, one.help, one.kind.read), *one.kind.besides]
+        for spelt, metavar, text, read in options:
+            of = {"action": "store_true"} if read is None else {"metavar": metavar, "type": read, **how}
+            parser.add_argument(spelt, dest=name, help=text, **of)
 
 
 def asked_by(options: argparse.Namespace, request: type) -> dict[str, Any]:
@@ -56,14 +58,6 @@ def asked_by(options: argparse.Namespace, request: type) -> dict[str, Any]:
         for name, (kind, value) in found.items()
         if value is not None and value is not False and value != []
     }
-
-
-class Joined(argparse.Action):
-    """A list with commas, to which the option adds each time that it is given."""
-
-    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: str | None = None) -> None:
-        before = getattr(namespace, self.dest)
-        setattr(namespace, self.dest, f"{before},{values}" if before else values)
 
 
 def assignment(text: str) -> tuple[str, bool | float | str]:

@@ -13,7 +13,7 @@ from orchestrator.cases.parameter_files import ParameterFile, read_parameter_fil
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.cli.arguments import assignment, option, repeatable, seconds, switch
+from orchestrator.cli.arguments import asked_by, assignment, option, repeatable, seconds, switch
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.errors import InputError
@@ -85,12 +85,17 @@ def values_set(options: argparse.Namespace) -> dict[str, Value]:
     return values
 
 
-def of_one_scenario(options: argparse.Namespace, rule: str) -> dict[str, Any]:
-    """Scenario, values, step and parameter files for a study of one scenario; ``rule`` says that it is of one."""
-    if len(options.scenario) > 1:
-        raise InputError(f"--scenario: {rule}, not for {' and '.join(options.scenario)}; start it once for each")
-    return {"scenario": next(iter(options.scenario), None), "overrides": values_set(options),
-            "step_size": options.step, "parameters": parameters(options)}  # fmt: skip
+def asked_of_case(options: argparse.Namespace, request: type, study: str) -> dict[str, Any]:
+    """The fields of a request from all options: its own, and those of the case."""
+    of_case = {"values": values_set(options), "step": options.step, "parameters": parameters(options)}
+    if hasattr(request, "scenarios"):
+        of_case["scenarios"] = tuple(options.scenario)
+    elif len(options.scenario) > 1:
+        given = " and ".join(options.scenario)
+        raise InputError(f"--scenario: gfor {study} is for one scenario, not for {given}; start it once for each")
+    else:
+        of_case["scenario"] = next(iter(options.scenario), None)
+    return asked_by(options, request) | of_case
 
 
 def prepare(options: argparse.Namespace) -> list[PreparedScenario]:

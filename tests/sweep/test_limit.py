@@ -13,6 +13,7 @@ from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import parse_vary
 from orchestrator.sweep.limit import HALVINGS, Ending, Until, search
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep, run_sweep
 from tests.coupling.small_fmus import small_fmu
 
@@ -182,7 +183,7 @@ def test_on_the_terminal_the_answer_comes_first(gfor, loop):
 
 
 def planned(loop, *vary, **more):
-    return plan_sweep(load_case(loop), [parse_vary(text) for text in vary], **more)
+    return plan_sweep(load_case(loop), SweepRequest([parse_vary(text) for text in vary], **more))
 
 
 def test_several_parameters_take_one_value(loop):
