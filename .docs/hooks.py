@@ -137,18 +137,20 @@ def _command(name: str, words: str) -> str:
 
 
 def studies() -> str:
-    """The methods of a case that are made from the requests of its studies; mkdocstrings reads files, and sees none."""
+    """The methods that are made from the requests of their studies; mkdocstrings reads files, and sees none."""
     from orchestrator.added import rooms  # noqa: PLC0415 - only the page of Python needs the package
     from orchestrator.api.case import Case  # noqa: PLC0415 - as above
+    from orchestrator.api.scenario import Scenario  # noqa: PLC0415 - as above
 
-    names = sorted({*rooms(), "design_over_points"})
-    return "\n\n".join(_method(name, getattr(Case, name)) for name in names)
+    of_case = [(f"Case.{name}", getattr(Case, name)) for name in sorted({*rooms(), "design_over_points"})]
+    of_scenario = [(f"Scenario.{name}", getattr(Scenario, name)) for name in ("modes", "sensitivities", "steps")]
+    return "\n\n".join(_method(name, function) for name, function in (*of_case, *of_scenario))
 
 
 def _method(name: str, function: Callable[..., object]) -> str:
     """A heading, and the documentation: a table of parameters, and what stands under other heads as text and code."""
     parts = re.split(r"\n(\w+)\n-+\n", inspect.cleandoc(function.__doc__ or ""))
-    shown = [f"### `Case.{name}`", parts[0]]
+    shown = [f"### `{name}`", parts[0]]
     for head, text in zip(parts[1::2], parts[2::2], strict=True):
         if head == "Examples":
             shown.append(f"```python\n{text.strip()}\n```")

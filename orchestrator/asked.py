@@ -19,7 +19,7 @@ Request = TypeVar("Request")
 Names = str | Sequence[str]  # one name, or several
 
 _ASKED = "asked"
-_FOR_COMMANDS = re.compile(r" \((default: ([\d.:]+[^()]*|\S+)|repeatable|[\d.:]+)\)")
+_FOR_COMMANDS = re.compile(r" \((default: [^ ;()]+(; with [^()]*)?|repeatable|[\d.:]+)\)|repeatable; (?=default)")
 _SHOWN = 60  # characters of an overlong path that an error shows
 _LARGEST = 10**308  # of a whole number that a floating-point number can hold
 

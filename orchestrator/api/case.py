@@ -1,16 +1,17 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from types import MethodType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Concatenate, cast
 
 import pandas as pd
 
 from orchestrator.added import rooms, study_in
-from orchestrator.api.progress import shown_stages
+from orchestrator.api.methods import Asks, Shown, method
+from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
-from orchestrator.api.study_methods import method, of_study
 from orchestrator.asked import Names, flag, text_or_none
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
@@ -26,7 +27,11 @@ from orchestrator.errors import InputError
 from orchestrator.interactions.command import STUDY as INTERACTIONS
 from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.view import ControllerDesign
+from orchestrator.points.points import nobody
+from orchestrator.points.store import POINTS
+from orchestrator.points.study import PointStudy, Study, StudyAtOnce, choose_executor
 from orchestrator.report.notebook import page
+from orchestrator.results.lock import held
 from orchestrator.screening.command import STUDY as SCREENING
 from orchestrator.siting.command import STUDY as SITING
 from orchestrator.sweep.command import STUDY as SWEEP
@@ -75,8 +80,13 @@ def load(case: str | Path, *, trust_fmus: bool = False) -> "Case":
 def _designed(file: CaseFile, request: DesignRequest) -> ControllerDesign:
     with shown_stages(shown=request.progress) as report:
         design = design_controller(file, request, report=report)
-    question([design.result.prepared], above=1)
+    question([design.result.prepared], above=2)
     return design
+
+
+def of_study(name: str, study: Study[Asks, Shown]) -> Callable[Concatenate[Any, Asks], Shown]:
+    """The method of a study."""
+    return method(f"Case.{name}", study.request, lambda case, request: _computed(study, case.file, request))
 
 
 class Case:
@@ -219,7 +229,7 @@ class Case:
     screen = of_study("screen", SCREENING)
     site = of_study("site", SITING)
     interactions = of_study("interactions", INTERACTIONS)
-    design = method("design", DesignRequest, _designed)
+    design = method("Case.design", DesignRequest, lambda case, request: _designed(case.file, request))
     design_over_points = of_study("design_over_points", COORDINATED_DESIGN)
 
     if not TYPE_CHECKING:  # a study that was added; a line as those above shows it to type checkers
@@ -237,3 +247,30 @@ class Case:
         titles = [table.title or name for name, table in self.file.scenarios.items()]
         table = pd.DataFrame({"scenario": self.scenarios, "title": titles})
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
+
+
+def _computed(study: Study[..., Shown], file: CaseFile, request: Any) -> Shown:
+    """Plan a study and compute it; a folder that keeps its points is kept from other commands meanwhile."""
+    if isinstance(study, StudyAtOnce):
+        return cast("Shown", study.compute(file, request, nobody))
+    assert isinstance(study, PointStudy)
+    cluster = (getattr(request, "scheduler", None), getattr(request, "tls", None))
+    executor = choose_executor(request.workers, cluster[0], study.imports, cluster[1])
+    planned = study.plan(file, request)
+    question(study.prepared(planned), above=2)
+    kept = None if request.folder is None else _folder(request.folder)
+    title = study.counted.capitalize()
+    with shown_progress(title, shown=request.progress) as report, nullcontext() if kept is None else held(kept):
+        return cast("Shown", study.compute(planned, executor, kept, report))
+
+
+def _folder(given: str | Path) -> Path:
+    """The folder that keeps a study's points, made where missing."""
+    place = path_of(given, "folder", "folder")
+    try:
+        (place / POINTS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"folder = {str(place)!r}: points cannot be kept there: {error.strerror}; choose another"
+        ) from error
+    return place

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
+from orchestrator.api.methods import method
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
-from orchestrator.asked import Names, frequency_range, percent, plain_value, whole_number
+from orchestrator.asked import Names, whole_number
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
@@ -37,8 +37,11 @@ from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
+from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.sensitivities.view import Sensitivities
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
+from orchestrator.study.modes import ModesResult, compute_modes, running
+from orchestrator.study.request import ModesRequest, StepsRequest
 from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
 
 
@@ -52,6 +55,36 @@ class CheckpointWarning(UserWarning):
 
 class UnusualDataWarning(UserWarning):
     """Data that may well be a slip of a unit."""
+
+
+def _modes(scenario: Scenario, request: ModesRequest) -> Modes:
+    return Modes(modes_of(scenario, request))
+
+
+def modes_of(scenario: Scenario, request: ModesRequest) -> ModesResult:
+    """Steady state and modes."""
+    request.check()
+    prepared, seen, critical = scenario.prepared, request.frequencies, request.critical
+    if not request.black_box:
+        return compute_modes(prepared, seen, critical, directional=request.directional)
+    from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - a second to import
+
+    with running(prepared) as master:
+        return modes_with_boxes(prepared, master, seen, critical, report=request.report)
+
+
+def sensitivities_of(scenario: Scenario, request: SensitivitiesRequest) -> Sensitivities:
+    """The mode's derivatives by the parameters that are asked for."""
+    from orchestrator.sensitivities.sensitivities import find_sensitivities  # noqa: PLC0415 - as above
+
+    return Sensitivities(find_sensitivities(scenario.prepared, scenario.again, request))
+
+
+def steps_of(scenario: Scenario, request: StepsRequest) -> StepChoice:
+    """What steps and schedules do to the critical modes."""
+    allowed, steps = Allowed(*request.allowed), cast("Sequence[float]", request.steps)
+    schedules = cast("Sequence[ScheduleName]", request.schedules)
+    return choose_step(scenario.prepared, allowed, steps, schedules, request.frequencies)
 
 
 class Scenario:
@@ -140,60 +173,7 @@ class Scenario:
         """Data that are most unusual, each with its place."""
         return [str(question) for question in self.prepared.questions]
 
-    def modes(
-        self,
-        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-        critical: float | None = None,
-        *,
-        directional: bool = False,
-        black_box: bool = False,
-        report: Callable[[str], None] | None = None,
-    ) -> Modes:
-        """Steady state and modes.
-
-        Parameters
-        ----------
-        frequencies
-            Modes from the first to the second are shown [Hz].
-        critical
-            Damping [%] below which modes are looked for, by sparse search; by default the whole
-            spectrum is computed.
-        directional
-            Linearise with the FMUs' own directional derivatives instead of by perturbation.
-        black_box
-            Identify the components that hide their states from their inputs and outputs.
-        report
-            Called with a sentence before each run of an identification, which may take minutes; such as ``print``.
-
-        Raises
-        ------
-        AnalysisError
-            If no steady state is found, or the system cannot be linearised.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> modes = gfor.load("two_area").scenario("pod_p").modes()
-        >>> modes.table()[["frequency_hz", "damping_percent", "name"]].round(2).head(2)
-              frequency_hz  damping_percent               name
-        mode
-        1             0.76            22.55  electromechanical
-        2             0.34            32.70
-        """
-        from orchestrator.study.modes import compute_modes, running  # noqa: PLC0415 - only modes need it
-
-        frequencies = frequency_range(frequencies)
-        critical = None if critical is None else percent(critical, "critical")
-        if critical is not None and not frequencies[0] > 0:
-            raise InputError("a search for critical modes needs frequencies that begin above 0 Hz, such as (0.1, 2.0)")
-        if not black_box:
-            return Modes(compute_modes(self.prepared, frequencies, critical, directional=directional))
-        if directional:
-            raise InputError("black_box identifies, directional asks the FMUs for derivatives; choose one of them")
-        from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - a second to import
-
-        with running(self.prepared) as master:
-            return Modes(modes_with_boxes(self.prepared, master, frequencies, critical, report=report))
+    modes = method("Scenario.modes", ModesRequest, _modes)
 
     def run(
         self,
@@ -318,6 +298,12 @@ class Scenario:
 
         return response_at_steady_state(self._until(in_seconds(stop, "stop")))
 
+    def again(self, changed: Mapping[str, float]) -> PreparedScenario:
+        """The scenario with other values by ``component.variable``, prepared anew from the case."""
+        layers = (*self._parameters, *([OptionValues.of(self._values)] if self._values else []))
+        (prepared,) = self._file.prepare([self.name], dict(changed), self._step_size, None, layers)
+        return prepared
+
     def _until(self, stop_time: float | None) -> PreparedScenario:
         """The scenario with another stop time [s]: events after it are left out, and it must fit the step."""
         if stop_time is None or stop_time == self.prepared.stop_time:
@@ -331,119 +317,9 @@ class Scenario:
             )
         return prepared
 
-    def sensitivities(
-        self,
-        mode: str | None = None,
-        parameters: Names = (),
-        *,
-        fixed: bool = False,
-        held: bool = False,
-        directional: bool = False,
-        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-        report: Callable[[int, int], None] = lambda done, total: None,
-    ) -> Sensitivities:
-        """How each parameter of each FMU moves a mode: ∂λ/∂p.
+    sensitivities = method("Scenario.sensitivities", SensitivitiesRequest, sensitivities_of)
 
-        The derivative is total: the operating point moves with the parameter, as it does with ``--set``.
-
-        Parameters
-        ----------
-        mode
-            Name of one of the case's modes, or ``"critical"`` for the least damped one in the range; by default the
-            first named one.
-        parameters
-            Names ``component.variable``, also with ``*``; by default all tunable ones.
-        fixed
-            Fixed parameters as well, for each of which the case is started several times.
-        held
-            The partial derivative, at the held operating point, by tunable parameters alone.
-        directional
-            Linearise with the FMUs' own directional derivatives instead of by perturbation.
-        frequencies
-            The mode lies between the first and the second [Hz].
-        report
-            Called with how many parameters are done, of how many.
-
-        Raises
-        ------
-        InputError
-            If there is no such mode or parameter.
-        AnalysisError
-            If no steady state is found, or the system cannot be linearised.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> scenario = gfor.load("two_area").scenario("pod_p")
-        >>> found = scenario.sensitivities(parameters="gfor.pod_p.K")
-        >>> round(found.result.rows[0].damping_per_percent, 3)
-        -0.046
-        """
-        from orchestrator.sensitivities.sensitivities import find_sensitivities  # noqa: PLC0415 - as above
-
-        layers = (*self._parameters, *([OptionValues.of(self._values)] if self._values else []))
-
-        def again(changed: Mapping[str, float]) -> PreparedScenario:
-            (prepared,) = self._file.prepare([self.name], dict(changed), self._step_size, None, layers)
-            return prepared
-
-        return Sensitivities(
-            find_sensitivities(
-                self.prepared, again, mode, names_given(parameters, "parameters"), fixed=fixed, held=held,
-                directional=directional, frequency_range=frequency_range(frequencies), report=report,
-            )
-        )  # fmt: skip
-
-    def steps(
-        self,
-        allowed: tuple[float, float] = (1e-3, 0.1),
-        steps: Sequence[Time] = (),
-        schedules: Sequence[ScheduleName] = (),
-        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    ) -> StepChoice:
-        """What communication steps and schedules do to the critical modes, as ``gfor steps`` says it.
-
-        Parameters
-        ----------
-        allowed
-            Accepted error of a critical mode's frequency [Hz] and damping [points].
-        steps
-            Communication steps [s] to try; by default 0.5 to 50 times the case's own.
-        schedules
-            To try; by default ``gauss-seidel``, ``midpoint`` and ``newton``.
-        frequencies
-            The critical modes lie between the first and the second [Hz].
-
-        Returns
-        -------
-        StepChoice
-            All trials; its ``largest(schedule)`` is the largest step within the error.
-
-        Raises
-        ------
-        InputError
-            If an error is not above 0, a schedule does not exist, or no step fits the case's events.
-        AnalysisError
-            If there is no continuous system to compare with, or no mode in range.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> choice = gfor.load("two_area").scenario("pod_pq").steps(steps=["100 us", "500 us"], schedules=["midpoint"])
-        >>> choice.largest("midpoint").step_size
-        0.0005
-        """
-        errors = [plain_value(error) for error in allowed] if isinstance(allowed, Sequence) else []
-        if len(errors) != 2 or not all(isinstance(x, int | float) and 0 < x < float("inf") for x in errors):
-            raise InputError(f"allowed = {allowed!r}; give two errors above 0 [Hz, points], such as (0.001, 0.1)")
-        chosen = cast("tuple[ScheduleName, ...]", names_given(schedules, "schedules"))
-        if wrong := [name for name in chosen if name not in SCHEDULES]:
-            raise InputError(f"schedules: {wrong[0]!r} is none; give some of {', '.join(SCHEDULES)}")
-        listed = [steps] if isinstance(steps, int | float | str) else steps
-        lengths = [length for step in listed if (length := in_seconds(step, "steps")) is not None]
-        if wrong_lengths := [length for length in lengths if not length > 0]:
-            raise InputError(f"steps: {wrong_lengths[0]:g} s; give communication steps above 0")
-        return choose_step(self.prepared, Allowed(*allowed), lengths, chosen, frequency_range(frequencies))
+    steps = method("Scenario.steps", StepsRequest, steps_of)
 
     def strengths(self, converter_current: float = 0.0, rating: float | None = None) -> list[BusStrength]:
         """Short-circuit power of every bus, with the short-circuit ratio of the converters there.

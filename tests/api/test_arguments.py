@@ -121,7 +121,7 @@ def test_a_damping_of_a_design_is_in_percent(case, name, given, tmp_path):
         ({"least_damping": None}, "least_damping = None; it is in percent"),
         ({"damping_increment": None}, "damping_increment = None; it is in percent"),
         ({"component": ["gfor"]}, r"component = \['gfor'\]; give one name"),
-        ({"scenario": ["gfor"]}, r"scenario = \['gfor'\]; a design is made for one scenario"),
+        ({"scenario": ["gfor"]}, r"scenario = \['gfor'\]; it is for one scenario"),
         ({"refine": "no"}, "refine = 'no'; give True or False"),
     ],
 )

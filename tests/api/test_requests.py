@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import pytest
 
 from orchestrator.api.case import Case
+from orchestrator.api.scenario import Scenario
 from orchestrator.asked import DAMPING, FLAG, NAMES, STAGES, asked, asked_of, checked
 from orchestrator.cli.arguments import add_request_arguments, asked_by
 from orchestrator.coordinated_design.study import PointsDesignRequest
@@ -14,7 +15,9 @@ from orchestrator.errors import InputError
 from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.pod_design.design import DesignRequest
 from orchestrator.screening.request import ScreeningRequest
+from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.siting.study import SiteRequest
+from orchestrator.study.request import ModesRequest, StepsRequest
 from orchestrator.sweep.request import SweepRequest
 from tests.test_docstrings import explained
 
@@ -70,6 +73,9 @@ def test_a_field_without_an_option_is_set_in_python_alone():
         (Case.site, SiteRequest),
         (Case.design, DesignRequest),
         (Case.design_over_points, PointsDesignRequest),
+        (Scenario.modes, ModesRequest),
+        (Scenario.sensitivities, SensitivitiesRequest),
+        (Scenario.steps, StepsRequest),
     ],
 )
 def test_a_method_has_the_keywords_and_the_words_of_its_request(method, request_class):
