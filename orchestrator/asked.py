@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -248,19 +247,19 @@ def positive(given: Any, argument: str, rule: str = "give a number above 0, such
     return float(own)
 
 
-def one_of(values: type[StrEnum]) -> "FieldKind":
-    """One of these words, or None."""
-    known = ", ".join(values)
+def one_of(values: Iterable[str]) -> "FieldKind":
+    """One of these words, or None; a member where these are an enumeration's."""
+    known, words = ", ".join(values), {str(value): value for value in values}
 
-    def read(text: str) -> StrEnum:
-        if text not in list(values):
+    def read(text: str) -> str:
+        if text not in words:
             raise ValueError(f"{text!r} is none of {known}")
-        return values(text)
+        return words[text]
 
-    def check(given: Any, argument: str) -> StrEnum | None:
-        if given is not None and given not in list(values):
+    def check(given: Any, argument: str) -> str | None:
+        if given is not None and (not isinstance(given, str) or given not in words):
             raise InputError(f"{argument} = {given!r}; give one of {known}")
-        return None if given is None else values(given)
+        return None if given is None else words[given]
 
     return FieldKind("RULE", read, check)
 

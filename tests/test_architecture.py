@@ -278,7 +278,6 @@ ON_THE_FACE = {
     "compare": {"api.comparison.compare"},
     "design": {"coordinated_design.one_point.design_controller"},
     "export_ssp": {"api.export.write_ssp"},
-    "verify": {"api.certification.verify_anew"},
     "export_comtrade": {"api.comtrade.export_comtrade"},
     "identify": {"api.identification.identify"},
     "info": {"api.fmu.info"},

@@ -1,6 +1,6 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from types import MethodType
@@ -12,17 +12,15 @@ from orchestrator.added import rooms, study_in
 from orchestrator.api.methods import Asks, Shown, method
 from orchestrator.api.progress import shown_progress, shown_stages
 from orchestrator.api.scenario import Scenario, choose, question
-from orchestrator.asked import Names, flag, text_or_none
+from orchestrator.asked import flag, text_or_none
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import forced
-from orchestrator.cases.given import Paths, Time
 from orchestrator.coordinated_design.command import STUDY as COORDINATED_DESIGN
 from orchestrator.coordinated_design.one_point import design_controller
-from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.interactions.command import STUDY as INTERACTIONS
 from orchestrator.pod_design.design import DesignRequest
@@ -34,6 +32,7 @@ from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.screening.command import STUDY as SCREENING
 from orchestrator.siting.command import STUDY as SITING
+from orchestrator.study.request import ScenarioRequest, ScenariosRequest
 from orchestrator.sweep.command import STUDY as SWEEP
 
 
@@ -75,6 +74,23 @@ def load(case: str | Path, *, trust_fmus: bool = False) -> "Case":
         raise InputError(f"case = {case!r}; give a built-in case's name ({', '.join(names_of_cases())}) or a path")
     path_of(case, "case")
     return Case(load_case(case, trust_fmus=flag(trust_fmus, "trust_fmus")))
+
+
+def _scenario(case: "Case", request: ScenarioRequest) -> Scenario:
+    known, name = ", ".join(case.scenarios), request.name
+    text_or_none(name, "name", f"give the name of one scenario: {known}")
+    if name is None and len(case.scenarios) != 1:
+        raise InputError(f"{case.name}: the case has {len(case.scenarios)} scenarios; choose one of: {known}")
+    file = forced(case.file, names_given(request.force, "force"))
+    (chosen,) = choose(file, [name] if name else [], request)
+    question([chosen.prepared], above=1)
+    return chosen
+
+
+def _chosen(case: "Case", request: ScenariosRequest) -> list[Scenario]:
+    chosen = choose(case.file, request.names, request, cast("float | None", request.stop))
+    question((scenario.prepared for scenario in chosen), above=1)
+    return chosen
 
 
 def _designed(file: CaseFile, request: DesignRequest) -> ControllerDesign:
@@ -120,111 +136,8 @@ class Case:
         """Names of the scenarios."""
         return tuple(self.file.scenarios)
 
-    def scenario(
-        self,
-        name: str | None = None,
-        values: Mapping[str, Any] | None = None,
-        *,
-        step: Time | None = None,
-        parameters: Paths = (),
-        schedule: ScheduleName | None = None,
-        tolerance: float | None = None,
-        sharing: str | None = None,
-        force: Names = (),
-    ) -> Scenario:
-        """One scenario, checked and ready to run; FMUs that are missing are built.
-
-        Data that are most unusual give an `UnusualDataWarning`.
-
-        Parameters
-        ----------
-        name
-            Of the scenario; may be left out where the case has one only.
-        values
-            Values by ``component.variable``, as with ``--set``: numbers, truth values, or text such as ``"1350 MW"``.
-            ``{"grid": {"X_L": 0.3}}`` means the same as ``{"grid.X_L": 0.3}``.
-        step
-            Communication step [s]; the case's by default.
-        parameters
-            Parameter files, as ``gfor design`` writes them; ``values`` go before them.
-        schedule
-            ``gauss-seidel``, ``jacobi``, ``midpoint`` or ``newton``; the case's by default.
-        tolerance
-            Steps of a run are as long as this error of a coupled output allows, of 1 or of its value, from 1e-8 to
-            0.1; under ``newton`` unless the schedule is ``midpoint``. By default steps are fixed, or the case's.
-        sharing
-            How the other units feed what units fed that ``values`` take out of service, such as ``sg5.connected``:
-            ``"droop"``, ``"rating"``, or ``"slack"``; as the case says by default, which is by droop. Where ``values``
-            give powers (``P_0``) as well, nothing is shared.
-        force
-            References that swing, in the place of the case's events: ``"sg1 0.8 Hz 2 %"``, as ``gfor run --force``.
-
-        Raises
-        ------
-        CaseError
-            With every problem of the case and of the values.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> case = gfor.load("two_area")
-        >>> case.scenario("pod_p", {"grid.X_L": 0.3}).values["grid.X_L"]
-        0.3
-        """
-        text_or_none(name, "name", f"give the name of one scenario: {', '.join(self.scenarios)}")
-        if name is None and len(self.scenarios) != 1:
-            raise InputError(
-                f"{self.name}: the case has {len(self.scenarios)} scenarios; choose one of: {', '.join(self.scenarios)}"
-            )
-        names = [name] if name else []
-        (chosen,) = choose(
-            forced(self.file, names_given(force, "force")), names, values, step=step, parameters=parameters,
-            schedule=schedule, tolerance=tolerance, sharing=sharing,
-        )  # fmt: skip
-        question([chosen.prepared])
-        return chosen
-
-    def choose(
-        self,
-        names: Names = (),
-        values: Mapping[str, Any] | None = None,
-        *,
-        step: Time | None = None,
-        stop: Time | None = None,
-        parameters: Paths = (),
-        schedule: ScheduleName | None = None,
-        tolerance: float | None = None,
-        sharing: str | None = None,
-    ) -> list[Scenario]:
-        """Several scenarios, or all; the mistakes of all are reported together.
-
-        Parameters
-        ----------
-        names
-            Of the scenarios; all of them where empty.
-        values, step, parameters, schedule, tolerance, sharing
-            As for `scenario`.
-        stop
-            Time at which runs end [s]; the case's by default.
-
-        Raises
-        ------
-        CaseError
-            With every problem of the case and of the values.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> [scenario.title for scenario in gfor.load("two_area").choose(["gfor", "pod_p"])]
-        ['SG + GFOR', 'SG + GFOR POD-P']
-        """
-        chosen = choose(
-            self.file, names, values, step=step, stop=stop, parameters=parameters, schedule=schedule,
-            tolerance=tolerance, sharing=sharing,
-        )  # fmt: skip
-        question(scenario.prepared for scenario in chosen)
-        return chosen
-
+    scenario = method("Case.scenario", ScenarioRequest, _scenario)
+    choose = method("Case.choose", ScenariosRequest, _chosen)
     sweep = of_study("sweep", SWEEP)
     screen = of_study("screen", SCREENING)
     site = of_study("site", SITING)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from orchestrator.api.linear import LinearSystem
 from orchestrator.api.methods import method
@@ -17,18 +17,15 @@ from orchestrator.asked import Names, whole_number
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
-from orchestrator.cases.given import Paths, Time, case_values, in_seconds, parameter_files
-from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.given import Time, in_seconds
 from orchestrator.cases.load_models import as_powers, is_open
-from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
 from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
-from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
+from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
 from orchestrator.late import pd, xr
@@ -41,7 +38,7 @@ from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.sensitivities.view import Sensitivities
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 from orchestrator.study.modes import ModesResult, compute_modes, running
-from orchestrator.study.request import ModesRequest, StepsRequest
+from orchestrator.study.request import ModesRequest, Preparing, StepsRequest
 from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
 
 
@@ -105,19 +102,9 @@ class Scenario:
     0.5
     """
 
-    def __init__(
-        self,
-        prepared: PreparedScenario,
-        file: CaseFile,
-        values: Mapping[str, Value],
-        step_size: float | None,
-        parameters: Sequence[ParameterFile],
-        schedule: ScheduleName | None = None,
-        tolerance: float | None = None,
-    ) -> None:
+    def __init__(self, prepared: PreparedScenario, file: CaseFile, asked: Preparing) -> None:
         self.prepared = prepared
-        self._file, self._values, self._step_size, self._parameters = file, values, step_size, parameters
-        self._schedule, self._tolerance = schedule, tolerance
+        self._file, self._asked = file, asked
 
     def with_loads_as_powers(self) -> Scenario | None:
         """The same scenario with loads of constant power; None where the case says how its loads follow the voltage."""
@@ -126,9 +113,12 @@ class Scenario:
             return None
         table = self._file.table.model_copy(update={"network": as_powers(network)})
         file = replace(self._file, table=table)
-        (one,) = file.prepare([self.name], self._values, self._step_size, None, self._parameters)
-        asked = _as_asked(one, self._schedule, self._tolerance)
-        return Scenario(asked, file, self._values, self._step_size, self._parameters, self._schedule, self._tolerance)
+        return Scenario(self._anew(file), file, self._asked)
+
+    def _anew(self, file: CaseFile, stop: float | None = None) -> PreparedScenario:
+        asked = self._asked
+        (one,) = file.prepare([self.name], asked.overrides, asked.step_size, stop, asked.files)
+        return asked.scheduled(one)
 
     @property
     def name(self) -> str:
@@ -300,16 +290,14 @@ class Scenario:
 
     def again(self, changed: Mapping[str, float]) -> PreparedScenario:
         """The scenario with other values by ``component.variable``, prepared anew from the case."""
-        layers = (*self._parameters, *([OptionValues.of(self._values)] if self._values else []))
-        (prepared,) = self._file.prepare([self.name], dict(changed), self._step_size, None, layers)
+        (prepared,) = self._file.prepare([self.name], dict(changed), self._asked.step_size, None, self._asked.layers)
         return prepared
 
     def _until(self, stop_time: float | None) -> PreparedScenario:
         """The scenario with another stop time [s]: events after it are left out, and it must fit the step."""
         if stop_time is None or stop_time == self.prepared.stop_time:
             return self.prepared
-        (prepared,) = self._file.prepare([self.name], self._values, self._step_size, stop_time, self._parameters)
-        prepared = _as_asked(prepared, self._schedule, self._tolerance)
+        prepared = self._anew(self._file, stop_time)
         if changed := _differences(self.prepared, prepared):
             raise InputError(
                 f"{self._file.path}: files of the case were changed since the scenario was made, which changes "
@@ -415,39 +403,21 @@ def _checkpoints(prepared: PreparedScenario, folder: Path, every: float) -> Chec
     return Checkpoints(prepared, folder, every, resume=True, say=say)
 
 
-def choose(
-    file: CaseFile,
-    names: Names = (),
-    values: Mapping[str, Any] | None = None,
-    *,
-    step: Time | None = None,
-    stop: Time | None = None,
-    parameters: Paths = (),
-    schedule: ScheduleName | None = None,
-    tolerance: float | None = None,
-    sharing: str | None = None,
-) -> list[Scenario]:
-    """As `Case.choose` offers them."""
-    if schedule is not None and schedule not in SCHEDULES:
-        raise InputError(f"schedule = {schedule!r}; give one of {', '.join(SCHEDULES)}")
-    if sharing is not None and sharing not in list(SharingRule):
-        raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
-    file, files = replace(file, sharing=SharingRule(sharing) if sharing else None), parameter_files(parameters)
-    chosen, step_size, stop_time = case_values(values), in_seconds(step, "step"), in_seconds(stop, "stop")
-    prepared = file.prepare(names_given(names, "names"), chosen, step_size, stop_time, files)
-    prepared = [_as_asked(one, schedule, tolerance) for one in prepared]
-    return [Scenario(one, file, chosen, step_size, files, schedule, tolerance) for one in prepared]
+def choose(file: CaseFile, names: Names, asked: Preparing, stop: float | None = None) -> list[Scenario]:
+    """The scenarios of a case, all where none is named.
 
-
-def _as_asked(prepared: PreparedScenario, schedule: ScheduleName | None, tolerance: float | None) -> PreparedScenario:
-    """A scenario with another schedule and steps within a tolerance, where they are given."""
-    if tolerance is not None and schedule is not None and schedule not in SECOND_ORDER:
-        raise InputError(
-            f"schedule {schedule!r} with tolerance = {tolerance!r}: a tolerance goes with midpoint or newton; choose "
-            "one of them, or leave the schedule out, which takes newton"
-        )
-    prepared = prepared.rescheduled(schedule) if schedule else prepared
-    return prepared if tolerance is None else prepared.with_tolerance(tolerance)
+    Parameters
+    ----------
+    file, names
+        The case, and names of its scenarios.
+    asked
+        How they are prepared.
+    stop
+        Time at which runs end [s]; the case's by default.
+    """
+    file = replace(file, sharing=cast("SharingRule | None", asked.sharing))
+    prepared = file.prepare(names_given(names, "names"), asked.overrides, asked.step_size, stop, asked.files)
+    return [Scenario(asked.scheduled(one), file, asked) for one in prepared]
 
 
 def question(scenarios: Iterable[PreparedScenario], above: int = 0) -> None:

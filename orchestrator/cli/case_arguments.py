@@ -4,9 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.scenario import Scenario, choose
-from orchestrator.asked import read_range
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.forcing import forced
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
@@ -17,6 +15,7 @@ from orchestrator.cli.arguments import asked_by, assignment, option, repeatable,
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.errors import InputError
+from orchestrator.study.request import ScenariosRequest
 
 
 def add_case_arguments(
@@ -43,10 +42,6 @@ def add_case_arguments(
                         "'*.native=true'")  # fmt: skip
 
 
-def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies [Hz] (0.1:2)") -> None:
-    option(parser, "--range", "LO:HI", text, read=read_range, default=ELECTROMECHANICAL_HZ)
-
-
 def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--schedule", choices=SCHEDULES, help="in which order components step, and what their inputs "
                         "do meanwhile: midpoint and newton are of second order in the step (default: the "
@@ -65,11 +60,10 @@ def case_of(options: argparse.Namespace) -> Case:
 
 def chosen(options: argparse.Namespace) -> list[Scenario]:
     file, stop = forced(case_of(options), getattr(options, "force", ())), getattr(options, "stop", None)
-    scenarios = choose(
-        file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters,
-        schedule=getattr(options, "schedule", None), tolerance=getattr(options, "tolerance", None),
-        sharing=getattr(options, "sharing", None),
-    )  # fmt: skip
+    asked = {name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")}
+    asked["sharing"] = SharingRule(asked["sharing"]) if asked["sharing"] else None
+    request = ScenariosRequest(values=values_set(options), step=options.step, parameters=parameters(options), **asked)
+    scenarios = choose(file, options.scenario, request, stop)
     print_questions([scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True))
     return scenarios
 

@@ -1,17 +1,102 @@
-"""What is asked of a scenario's modes, and of its communication step."""
+"""What is asked of scenarios: how they are prepared, their modes, their communication step."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from math import inf
 from typing import Any
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.asked import DAMPING, FLAG, FREQUENCIES, FieldKind, Names, asked, names, plain_value
+from orchestrator.asked import DAMPING, FLAG, FREQUENCIES, NAMES, FieldKind, Names, asked, names, one_of, plain_value
 from orchestrator.cases.given import Time, in_seconds
-from orchestrator.coupling.schedule import SCHEDULES
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.sharing import SharingRule
+from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
 from orchestrator.errors import InputError
-from orchestrator.points.request import ANYTHING
+from orchestrator.points.request import ANYTHING, OfCase, of_scenarios, of_values
 from orchestrator.study.step_choice import TRIED
+
+_SHARING, _SCHEDULE, _STOP = one_of(SharingRule), one_of(SCHEDULES), FieldKind("T", str, in_seconds)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preparing(OfCase):
+    """How scenarios are prepared."""
+
+    schedule: ScheduleName | None = asked(
+        _SCHEDULE, None, "``gauss-seidel``, ``jacobi``, ``midpoint`` or ``newton``; the case's by default", option=None
+    )
+    tolerance: float | None = asked(
+        ANYTHING, None, "steps of a run are as long as this error of a coupled output allows, of 1 or of its value, "
+        "from 1e-8 to 0.1; under ``newton`` unless the schedule is ``midpoint``; by default steps are fixed, or the "
+        "case's", option=None,
+    )  # fmt: skip
+    sharing: str | None = asked(
+        _SHARING, None, "how the other units feed what units fed that ``values`` take out of service, such as "
+        '``sg5.connected``: ``"droop"``, ``"rating"``, or ``"slack"``; as the case says by default, which is by droop; '
+        "where ``values`` give powers (``P_0``) as well, nothing is shared", option=None,
+    )  # fmt: skip
+
+    def scheduled(self, prepared: PreparedScenario) -> PreparedScenario:
+        """A scenario with another schedule and steps within a tolerance, where they are given."""
+        if self.tolerance is not None and self.schedule is not None and self.schedule not in SECOND_ORDER:
+            raise InputError(
+                f"schedule {self.schedule!r} with tolerance = {self.tolerance!r}: a tolerance goes with midpoint or "
+                "newton; choose one of them, or leave the schedule out, which takes newton"
+            )
+        prepared = prepared.rescheduled(self.schedule) if self.schedule else prepared
+        return prepared if self.tolerance is None else prepared.with_tolerance(self.tolerance)
+
+
+@dataclass(frozen=True)
+class ScenarioRequest(Preparing):
+    """One scenario, checked and ready to run; FMUs that are missing are built.
+
+    Data that are most unusual give an `UnusualDataWarning`.
+
+    Raises
+    ------
+    CaseError
+        With every problem of the case and of the values.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> case = gfor.load("two_area")
+    >>> case.scenario("pod_p", {"grid.X_L": 0.3}).values["grid.X_L"]
+    0.3
+    """
+
+    name: str | None = asked(
+        ANYTHING, None, "of the scenario; may be left out where the case has one only", option=None
+    )
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
+    force: Names = asked(
+        NAMES, (), "references that swing, in the place of the case's events: ``\"sg1 0.8 Hz 2 %\"``, as ``gfor run "
+        "--force``", option=None,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ScenariosRequest(Preparing):
+    """Several scenarios, or all; the mistakes of all are reported together.
+
+    Raises
+    ------
+    CaseError
+        With every problem of the case and of the values.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> [scenario.title for scenario in gfor.load("two_area").choose(["gfor", "pod_p"])]
+    ['SG + GFOR', 'SG + GFOR POD-P']
+    """
+
+    names: Names = of_scenarios()
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
+    stop: Time | None = asked(_STOP, None, "time at which runs end [s]; the case's by default", option=None)
 
 
 @dataclass(frozen=True)

@@ -49,9 +49,9 @@ def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
         lists = {key: tuple(map(plain_value, values)) for key, values in vary.items()}
         if empty := [key for key, values in lists.items() if not values]:
             raise InputError(f"{', '.join(empty)}: a sweep needs values, such as {{'grid.X_L': [0.1, 0.3]}}")
-        return tuple(Vary(key, None, len(values), False, values) for key, values in lists.items())
+        vary = [Vary(key, None, len(values), False, values) for key, values in lists.items()]
     given = [vary] if isinstance(vary, str) else list(vary) if isinstance(vary, Iterable) else [None]
-    if not all(isinstance(one, str | Vary) for one in given):
+    if not given or not all(isinstance(one, str | Vary) for one in given):
         raise InputError(f"{argument} = {vary!r}; give what is varied, {_HOW}")
     try:
         return tuple(one if isinstance(one, Vary) else parse_vary(one) for one in given)

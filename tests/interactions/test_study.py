@@ -230,8 +230,8 @@ def test_what_was_kept_is_not_computed_again():
     ("wanted", "text"),
     [
         ({"stand_in": "gfro"}, "stand-in: gfro at east, gfro at north, gfro at west: .*there is no model 'gfro'"),
-        ({"swap": True, "swapped": ("eest",)}, "--place eest: no converter stands there; the places of converters are"),
-        ({"swap": True, "swapped": ("east",)}, "nothing to swap: the only device at east is of B; give others"),
+        ({"swap": True, "places": ("eest",)}, "--place eest: no converter stands there; the places of converters are"),
+        ({"swap": True, "places": ("east",)}, "nothing to swap: the only device at east is of B; give others"),
     ],
 )
 def test_what_cannot_be_studied_is_refused(wanted, text):
