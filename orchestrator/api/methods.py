@@ -22,7 +22,7 @@ def method(
     assert isinstance(request, type)
     signature, (owner, _, last) = _signature(request), name.partition(".")
 
-    def studied(self: Any, *given: Any, **wanted: Any) -> Shown:
+    def studied(self: Any, /, *given: Asks.args, **wanted: Asks.kwargs) -> Shown:
         require_known(wanted, asked_of(request), last)
         bound = signature.bind(self, *given, **wanted).arguments
         return call(self, request(**checked(request, bound)))

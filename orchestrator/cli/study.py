@@ -28,7 +28,7 @@ Simple = StudyAtOnce[..., Any]
 
 def add_study_arguments(name: str, study: AnyStudy | Simple, parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, several=study.of_several)
-    add_request_arguments(parser, study.request)
+    add_request_arguments(parser, study.asks)
     if isinstance(study, PointStudy):
         add_executor_arguments(parser)
         kept = f"{study.counted} that are there are not computed again"
@@ -50,7 +50,7 @@ def run_study(name: str, study: AnyStudy | Simple, options: argparse.Namespace) 
 
 
 def _run_at_once(name: str, study: Simple, options: argparse.Namespace) -> int:
-    request = study.request(**asked_of_case(options, study.request, name))
+    request = study.request(**asked_of_case(options, study.asks, name))
     folder = made_folder(options.out, "--out") if getattr(options, "out", None) else None
     with shown_progress(study.counted.capitalize(), shown=not options.json) as report:
         found = study.compute(case_of(options), request, report)
@@ -70,7 +70,7 @@ def working_in(
 
     Gives the plan, what computes it, and the folder; ``more`` is asked beside the options."""
     case = case_of(options)
-    request = study.request(**asked_of_case(options, study.request, name) | more)
+    request = study.request(**asked_of_case(options, study.asks, name) | more)
     folder = place or options.out or Path("results") / f"{case.name}_{name}"
     executor, progress = choose_executor(options, study.imports), Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on):

@@ -82,7 +82,7 @@ class InteractionsRequest(OverPoints):
             bindings = cast("Mapping[str, Path]", self.bindings or {})
             found = [Device(name, Path(file), bindings.get(name)) for name, file in self.devices.items()]
         elif self.devices and isinstance(self.devices[0], Device):
-            return self.devices  # type: ignore[return-value]
+            return self.devices
         else:
             texts = cast("tuple[str, ...]", self.devices)
             found = devices_of(texts, cast("tuple[str, ...]", self.bindings)) if texts else []

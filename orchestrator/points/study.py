@@ -5,7 +5,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, cast
 
 from rich.console import RenderableType
 
@@ -66,6 +66,11 @@ class Study(Generic[Asks, Shown]):
     counted: str = "points"  # what is counted, in words
     warnings: Callable[[Shown], Iterable[str]] = _nothing
     remarks: Callable[[Shown], Iterable[str]] = _nothing
+
+    @property
+    def asks(self) -> type:
+        """The class of the request."""
+        return cast("type", self.request)
 
     @property
     def of_several(self) -> bool:

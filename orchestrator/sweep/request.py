@@ -50,7 +50,7 @@ def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
         if empty := [key for key, values in lists.items() if not values]:
             raise InputError(f"{', '.join(empty)}: a sweep needs values, such as {{'grid.X_L': [0.1, 0.3]}}")
         vary = [Vary(key, None, len(values), False, values) for key, values in lists.items()]
-    given = [vary] if isinstance(vary, str) else list(vary) if isinstance(vary, Iterable) else [None]
+    given: list[Any] = [vary] if isinstance(vary, str) else list(vary) if isinstance(vary, Iterable) else [None]
     if not given or not all(isinstance(one, str | Vary) for one in given):
         raise InputError(f"{argument} = {vary!r}; give what is varied, {_HOW}")
     try:
