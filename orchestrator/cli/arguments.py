@@ -9,6 +9,8 @@ from orchestrator.asked import as_number, asked_of
 from orchestrator.coupling.schedule import check_tolerance
 from orchestrator.units import read_value, to_unit
 
+_ASKED = "asked_"  # before the name of a field whose own name is that of another option
+
 
 def switch(parser: argparse._ActionsContainer, name: str, text: str) -> None:
     """An option without a value, such as ``--native``."""
@@ -44,15 +46,20 @@ def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> 
     for name, one in asked_of(request).items():
         if one.option is None or one.option in parser._option_string_actions:
             continue
+        taken = any(action.dest == name for action in parser._actions)  # as ``--parameters`` beside ``--parameter``
         how: dict[str, Any] = {"action": "append"} if one.kind.several else {}
+        how["dest"] = f"{_ASKED}{name}" if taken else name
         options = [(one.option, one.metavar, one.help, one.kind.read), *one.kind.besides]
         for spelt, metavar, text, read in options:
-            of = {"action": "store_true"} if read is None else {"metavar": metavar, "type": read, **how}
-            parser.add_argument(spelt, dest=name, help=text, **of)
+            of = how | ({"action": "store_true"} if read is None else {"metavar": metavar, "type": read})
+            parser.add_argument(spelt, help=text, **of)
 
 
 def asked_by(options: argparse.Namespace, request: type) -> dict[str, Any]:
-    found = {name: (one.kind, getattr(options, name, None)) for name, one in asked_of(request).items()}
+    def given(name: str) -> Any:
+        return getattr(options, f"{_ASKED}{name}", getattr(options, name, None))
+
+    found = {name: (one.kind, given(name)) for name, one in asked_of(request).items()}
     return {
         name: ",".join(value) if kind.joined else tuple(value) if isinstance(value, list) else value
         for name, (kind, value) in found.items()

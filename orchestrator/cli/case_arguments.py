@@ -60,9 +60,10 @@ def case_of(options: argparse.Namespace) -> Case:
 
 def chosen(options: argparse.Namespace) -> list[Scenario]:
     file, stop = forced(case_of(options), getattr(options, "force", ())), getattr(options, "stop", None)
-    asked = {name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")}
+    asked: dict[str, Any] = {name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")}
     asked["sharing"] = SharingRule(asked["sharing"]) if asked["sharing"] else None
-    request = ScenariosRequest(values=values_set(options), step=options.step, parameters=parameters(options), **asked)
+    asked |= {"values": values_set(options), "step": options.step, "parameters": parameters(options)}
+    request = ScenariosRequest(**asked)
     scenarios = choose(file, options.scenario, request, stop)
     print_questions([scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True))
     return scenarios
