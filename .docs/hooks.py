@@ -6,9 +6,11 @@ module) becomes the file's path.
 """
 
 import argparse
+import inspect
 import logging
 import posixpath
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -63,6 +65,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     """Turn links of the repository into links of the site, and fill in what is generated."""
     name = ORIGIN[page.file.src_uri]
     text = markdown.replace("```sh first-run", "```sh").replace("<!-- commands -->", commands())
+    text = text.replace("<!-- studies -->", studies())
     text = FILE_MARK.sub(lambda found: f'```{found[3]} title="{found[2]}"\n', text)
     inside, listed, lines = False, False, []
     for line in _with_links(text, name, page.file.src_uri).splitlines():
@@ -131,6 +134,31 @@ def _command(name: str, words: str) -> str:
         rows.append(f"| `{shown.replace('|', '/')}` | {text} |")
     usage = "\n".join(line[len("usage: ") :] for line in parser.format_usage().rstrip().splitlines())
     return f"## `gfor {name}`\n\n{words[0].upper()}{words[1:]}.\n\n```text\n{usage}\n```\n\n" + "\n".join(rows)
+
+
+def studies() -> str:
+    """The methods that are made from the requests of their studies; mkdocstrings reads files, and sees none."""
+    from orchestrator.added import rooms  # noqa: PLC0415 - only the page of Python needs the package
+    from orchestrator.api.case import Case  # noqa: PLC0415 - as above
+    from orchestrator.api.scenario import Scenario  # noqa: PLC0415 - as above
+
+    of_case = [(f"Case.{name}", getattr(Case, name)) for name in sorted({*rooms(), "design_over_points"})]
+    of_scenario = [(f"Scenario.{name}", getattr(Scenario, name)) for name in ("modes", "sensitivities", "steps")]
+    return "\n\n".join(_method(name, function) for name, function in (*of_case, *of_scenario))
+
+
+def _method(name: str, function: Callable[..., object]) -> str:
+    """A heading, and the documentation: a table of parameters, and what stands under other heads as text and code."""
+    parts = re.split(r"\n(\w+)\n-+\n", inspect.cleandoc(function.__doc__ or ""))
+    shown = [f"### `{name}`", parts[0]]
+    for head, text in zip(parts[1::2], parts[2::2], strict=True):
+        if head == "Examples":
+            shown.append(f"```python\n{text.strip()}\n```")
+            continue
+        pairs = re.findall(r"^(\S+)\n((?:    .*\n?)+)", text, re.MULTILINE)
+        rows = [f"| `{one}` | {' '.join(words.split()).replace('|', chr(92) + '|')} |" for one, words in pairs]
+        shown.append("\n".join([f"| {head} | |", "|---|---|", *rows]))
+    return "\n\n".join(shown)
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:

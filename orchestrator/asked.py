@@ -3,9 +3,9 @@
 A `FieldKind` says twice what a field may be: ``read`` takes the text of an option, ``check`` what Python gives."""
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,6 +18,7 @@ Request = TypeVar("Request")
 Names = str | Sequence[str]  # one name, or several
 
 _ASKED = "asked"
+_FOR_COMMANDS = re.compile(r" \((default: [^ ;()]+(; with [^()]*)?|repeatable|[\d.:]+)\)|repeatable; (?=default)")
 _SHOWN = 60  # characters of an overlong path that an error shows
 _LARGEST = 10**308  # of a whole number that a floating-point number can hold
 
@@ -32,6 +33,10 @@ class FieldKind:
     check: Callable[[Any, str], Any]  # from what a caller gives, and the keyword for the `InputError`
     several: bool = False  # whether the option is repeatable, and gives a tuple
     joined: bool = False  # whether these are one text with commas
+    unit: str = ""  # that Python gives it in
+    times: float = 1.0  # the default, as Python has it
+    # further options of the same values: name, metavar, help, and how their text is read
+    besides: tuple[tuple[str, str, str, Callable[[str], Any]], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -42,18 +47,31 @@ class Asked:
     help: str
     metavar: str
     option: str | None
-    keyword: str
     default: Any
+    python: str
+
+    @property
+    def meaning(self) -> str:
+        """What the field means to Python, whose signature shows the default."""
+        text = self.python or _FOR_COMMANDS.sub("", self.help).replace("%%", "%")
+        return text[:1].upper() + text[1:] + (f" [{self.kind.unit}]" if self.kind.unit else "") + "."
+
+    @property
+    def shown_default(self) -> Any:
+        """The default in the unit in which Python gives the field."""
+        return (
+            self.default if self.kind.times == 1 or self.default is None else round(self.kind.times * self.default, 9)
+        )
 
 
 def asked(
-    kind: FieldKind, default: Any, text: str, metavar: str = "", *, option: str | None = "", keyword: str = ""
+    kind: FieldKind, default: Any, text: str, metavar: str = "", *, option: str | None = "", python: str = ""
 ) -> Any:
-    """A field of a request.
+    """A field of a request, whose name is its keyword.
 
-    ``text``: help of the option, and what the field means.
-    ``option`` and ``keyword``: where they are not spelt as the field is; None for a field that only Python has."""
-    return field(default=default, metadata={_ASKED: (kind, text, metavar or kind.metavar, option, keyword)})
+    ``text``: help of the option, and what the field means; ``python``: where Python needs other words.
+    ``option``: where it is not spelt as the field is; None for a field that only Python has."""
+    return field(default=default, metadata={_ASKED: (kind, text, metavar or kind.metavar, option, python)})
 
 
 def asked_of(request: type) -> dict[str, Asked]:
@@ -61,9 +79,9 @@ def asked_of(request: type) -> dict[str, Asked]:
     found = {}
     for one in fields(request):
         if _ASKED in one.metadata:
-            kind, text, metavar, option, keyword = one.metadata[_ASKED]
+            kind, text, metavar, option, python = one.metadata[_ASKED]
             option = f"--{one.name.replace('_', '-')}" if option == "" else option
-            found[one.name] = Asked(kind, text, metavar, option, keyword or one.name, one.default)
+            found[one.name] = Asked(kind, text, metavar, option, one.default, python)
     return found
 
 
@@ -73,10 +91,10 @@ def checked(request: type, wanted: Mapping[str, Any]) -> dict[str, Any]:
     Raises an `InputError` if one of them is not of its kind or outside of its range; it is named."""
     found = {}
     for name, one in asked_of(request).items():
-        if one.keyword in wanted:
-            given = wanted[one.keyword]
+        if name in wanted:
+            given = wanted[name]
             unsaid = given is None and one.default is None
-            found[name] = None if unsaid else one.kind.check(given, one.keyword)
+            found[name] = None if unsaid else one.kind.check(given, name)
     return found
 
 
@@ -229,19 +247,19 @@ def positive(given: Any, argument: str, rule: str = "give a number above 0, such
     return float(own)
 
 
-def one_of(values: type[StrEnum]) -> "FieldKind":
-    """One of these words, or None."""
-    known = ", ".join(values)
+def one_of(values: Iterable[str]) -> "FieldKind":
+    """One of these words, or None; a member where these are an enumeration's."""
+    known, words = ", ".join(values), {str(value): value for value in values}
 
-    def read(text: str) -> StrEnum:
-        if text not in list(values):
+    def read(text: str) -> str:
+        if text not in words:
             raise ValueError(f"{text!r} is none of {known}")
-        return values(text)
+        return words[text]
 
-    def check(given: Any, argument: str) -> StrEnum | None:
-        if given is not None and given not in list(values):
+    def check(given: Any, argument: str) -> str | None:
+        if given is not None and (not isinstance(given, str) or given not in words):
             raise InputError(f"{argument} = {given!r}; give one of {known}")
-        return None if given is None else values(given)
+        return None if given is None else words[given]
 
     return FieldKind("RULE", read, check)
 
@@ -289,7 +307,7 @@ FLAG = FieldKind("", None, flag)
 NAME = FieldKind("NAME", str, text_or_none)
 NAMES = FieldKind("NAME", str, names, several=True)
 FREQUENCIES = FieldKind("LO:HI", read_range, frequency_range)
-DAMPING = FieldKind("PERCENT", read_percent, percent)
+DAMPING = FieldKind("PERCENT", read_percent, percent, unit="%", times=100)
 SHARE = FieldKind("PERCENT", read_part("a share in percent up to 50, such as 5", 1e-9, 50), share)
 POSITIVE = FieldKind("X", read_positive, positive)
 GAIN = FieldKind(

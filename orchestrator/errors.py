@@ -8,6 +8,7 @@ from typing import Any
 
 from orchestrator.spelling import spelled
 
+NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
 

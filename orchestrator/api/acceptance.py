@@ -7,9 +7,9 @@ from typing import Any
 from orchestrator.acceptance.checks.subject import Use
 from orchestrator.acceptance.junit import write_junit
 from orchestrator.acceptance.runner import AcceptanceReport, check_fmu, question_of
-from orchestrator.api.values import Time, binding_path, in_megabytes, in_seconds
 from orchestrator.asked import Names, names, text_or_none
 from orchestrator.asked import path as path_of
+from orchestrator.cases.given import Time, binding_path, in_megabytes, in_seconds
 from orchestrator.cases.use import use_in_case
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import read_description

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.api.values import Time, binding_path, in_seconds, plain
 from orchestrator.asked import frequency_range
 from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
@@ -18,6 +17,7 @@ from orchestrator.black_box.fitting import fit, require_fitting
 from orchestrator.black_box.frequency_response import METHODS, Excitation, measure
 from orchestrator.black_box.passivity import passivity
 from orchestrator.black_box.port import check_port, start_of, values_for
+from orchestrator.cases.given import Time, binding_path, in_seconds, plain
 from orchestrator.errors import InputError
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder

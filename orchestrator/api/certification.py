@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.api.progress import shown_progress
-from orchestrator.api.values import binding_path, plain
 from orchestrator.asked import path as path_of
+from orchestrator.cases.given import binding_path, plain
 from orchestrator.errors import InputError
 from orchestrator.points.study import choose_executor
 from orchestrator.results.lock import held
@@ -15,8 +15,6 @@ from orchestrator.safe_files import made_folder
 
 if TYPE_CHECKING:
     from orchestrator.certification.verification import Verification
-    from orchestrator.points.executor import Executor
-    from orchestrator.points.points import CountReport
 
 
 class IssuedCertificate:
@@ -194,77 +192,15 @@ def verify(
 def _verify_one(
     certificate: Path, anew: Iterable[float | str] | None, *, every: bool, workers: int | None
 ) -> "Verification":
+    from orchestrator.certification.anew import parts_of  # noqa: PLC0415 - as above
     from orchestrator.certification.verification import read_certificate, verify_files  # noqa: PLC0415 - as above
 
     folder, content = read_certificate(certificate)
-    wanted = None if anew is None else tuple(anew)
-    chosen = [] if wanted == () and not every else chosen_anew(folder, content, wanted or (), every=every)
+    wanted, parts = None if anew is None else tuple(anew), parts_of(content)
+    chosen = [] if wanted == () and not every else parts.chosen(folder, content, wanted or (), every=every)
     found = verify_files(folder, content)
     if chosen and found.holds:
-        with closing(choose_executor(workers, None, [worker_of(content)])) as executor:
-            again = verify_anew(folder, content, chosen, executor)
+        with closing(choose_executor(workers, None, [parts.task.__module__])) as executor:
+            again = parts.verify(folder, content, chosen, executor)
         found.faults, found.agreed = found.faults + again.faults, found.agreed + again.agreed
     return found
-
-
-def worker_of(content: Mapping[str, Any]) -> str:
-    """The module that a process imports to compute a part of a certificate anew."""
-    return f"orchestrator.certification.{'point' if is_of_norm(content) else 'codes.bench_point'}"
-
-
-def is_of_norm(content: Mapping[str, Any]) -> bool:
-    """Whether it is the damping test's, which has points at line reactances; others have rows."""
-    from orchestrator.certification.form import NORM  # noqa: PLC0415 - as above
-
-    return bool(content["format"] == NORM)
-
-
-def chosen_anew(folder: Path, content: dict[str, Any], wanted: Sequence[Any], *, every: bool) -> list[Any]:
-    """Line reactances, or names of rows, that are computed anew.
-
-    Parameters
-    ----------
-    folder, content
-        The certificate.
-    wanted
-        Those that were asked for.
-    every
-        Whether all are meant.
-    """
-    from orchestrator.certification.codes.rows_anew import chosen_rows  # noqa: PLC0415 - as above
-    from orchestrator.certification.points_anew import chosen_points  # noqa: PLC0415 - as above
-
-    norm, named = is_of_norm(content), any(isinstance(one, str) for one in wanted)
-    if norm and named:
-        raise InputError(f"--rows: {folder} is the certificate of a damping test, which has points; give --points, "
-                         "with line reactances")  # fmt: skip
-    if wanted and not norm and not named:
-        raise InputError(f"--points: {folder} is the certificate of a grid code, which has rows; give --rows, with "
-                         "their names")  # fmt: skip
-    return chosen_points(content, wanted, every=every) if norm else chosen_rows(content, wanted, every=every)
-
-
-def verify_anew(
-    folder: Path,
-    content: dict[str, Any],
-    chosen: list[Any],
-    executor: "Executor",
-    report: "CountReport" = lambda done, total: None,
-) -> "Verification":
-    """Compute points or rows anew, and compare them with what was certified.
-
-    Parameters
-    ----------
-    folder, content
-        The certificate.
-    chosen
-        What `chosen_anew` gave.
-    executor
-        Where they are computed.
-    report
-        Called with how many are done, of how many.
-    """
-    from orchestrator.certification.codes.rows_anew import verify_rows  # noqa: PLC0415 - as above
-    from orchestrator.certification.points_anew import verify_points  # noqa: PLC0415 - as above
-
-    return (verify_points if is_of_norm(content) else verify_rows)(folder, content, chosen, executor, report)

@@ -8,8 +8,8 @@ import xarray as xr
 from orchestrator.analysis.threads import side_by_side
 from orchestrator.api.identification import opened
 from orchestrator.api.results import Run
-from orchestrator.api.values import Time, moment
 from orchestrator.asked import Names, names
+from orchestrator.cases.given import Time, moment
 from orchestrator.errors import InputError
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.results.recorded import in_memory

@@ -7,11 +7,11 @@ from typing import Any, Self
 
 import pandas as pd
 
-from orchestrator.api.values import Time, binding_path, in_seconds, plain
 from orchestrator.asked import Names
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
+from orchestrator.cases.given import Time, binding_path, in_seconds, plain
 from orchestrator.cases.values import convert
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component

@@ -7,8 +7,8 @@ import xarray as xr
 from orchestrator.analysis.identification import sampling
 from orchestrator.analysis.mode_doubts import straight_line
 from orchestrator.api.results import Run
-from orchestrator.api.values import Time, moment
 from orchestrator.asked import text_or_none
+from orchestrator.cases.given import Time, moment
 from orchestrator.errors import InputError
 from orchestrator.results.recorded import warn_of_early_end
 from orchestrator.study.comparison import open_trajectory, recorded, require_numbers, strongest_modes

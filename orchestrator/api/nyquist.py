@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.values import plain
+from orchestrator.cases.given import case_values, plain
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.immittance.scan_files import ENDINGS
 from orchestrator.immittance.study import CutRequest, study_cut
@@ -95,5 +95,7 @@ def network_of(
     """
     from orchestrator.api.scenario import choose  # noqa: PLC0415 - scans need no cases
     from orchestrator.cases.case import load_case  # noqa: PLC0415
+    from orchestrator.study.request import ScenariosRequest  # noqa: PLC0415
 
-    return choose(load_case(case, trust_fmus=trust_fmus), [scenario] if scenario else [], values)[0].prepared
+    asked = ScenariosRequest(values=case_values(values))
+    return choose(load_case(case, trust_fmus=trust_fmus), [scenario] if scenario else [], asked)[0].prepared

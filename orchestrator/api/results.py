@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode
-from orchestrator.api.values import Time, moment
+from orchestrator.cases.given import Time, moment
 from orchestrator.errors import CosimError, InputError
 from orchestrator.late import pd, xr
 from orchestrator.oscillations.reading import measurements_of

@@ -3,32 +3,29 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.linear import LinearSystem
+from orchestrator.api.methods import method
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
-from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
-from orchestrator.asked import Names, frequency_range, percent, plain_value, whole_number
+from orchestrator.asked import Names, whole_number
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
-from orchestrator.cases.layers import OptionValues
+from orchestrator.cases.given import Time, in_seconds
 from orchestrator.cases.load_models import as_powers, is_open
-from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
 from orchestrator.cores import MOST_THREADS
 from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.progress import Progress
-from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
+from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates
 from orchestrator.late import pd, xr
@@ -37,8 +34,11 @@ from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
 from orchestrator.results.recording import RecordingFolder, temporary_recording
 from orchestrator.results.room import recorded_size
+from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.sensitivities.view import Sensitivities
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
+from orchestrator.study.modes import ModesResult, compute_modes, running
+from orchestrator.study.request import ModesRequest, Preparing, StepsRequest
 from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
 
 
@@ -52,6 +52,36 @@ class CheckpointWarning(UserWarning):
 
 class UnusualDataWarning(UserWarning):
     """Data that may well be a slip of a unit."""
+
+
+def _modes(scenario: Scenario, request: ModesRequest) -> Modes:
+    return Modes(modes_of(scenario, request))
+
+
+def modes_of(scenario: Scenario, request: ModesRequest) -> ModesResult:
+    """Steady state and modes."""
+    request.check()
+    prepared, seen, critical = scenario.prepared, request.frequencies, request.critical
+    if not request.black_box:
+        return compute_modes(prepared, seen, critical, directional=request.directional)
+    from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - a second to import
+
+    with running(prepared) as master:
+        return modes_with_boxes(prepared, master, seen, critical, report=request.report)
+
+
+def sensitivities_of(scenario: Scenario, request: SensitivitiesRequest) -> Sensitivities:
+    """The mode's derivatives by the parameters that are asked for."""
+    from orchestrator.sensitivities.sensitivities import find_sensitivities  # noqa: PLC0415 - as above
+
+    return Sensitivities(find_sensitivities(scenario.prepared, scenario.again, request))
+
+
+def steps_of(scenario: Scenario, request: StepsRequest) -> StepChoice:
+    """What steps and schedules do to the critical modes."""
+    allowed, steps = Allowed(*request.allowed), cast("Sequence[float]", request.steps)
+    schedules = cast("Sequence[ScheduleName]", request.schedules)
+    return choose_step(scenario.prepared, allowed, steps, schedules, request.frequencies)
 
 
 class Scenario:
@@ -72,19 +102,9 @@ class Scenario:
     0.5
     """
 
-    def __init__(
-        self,
-        prepared: PreparedScenario,
-        file: CaseFile,
-        values: Mapping[str, Value],
-        step_size: float | None,
-        parameters: Sequence[ParameterFile],
-        schedule: ScheduleName | None = None,
-        tolerance: float | None = None,
-    ) -> None:
+    def __init__(self, prepared: PreparedScenario, file: CaseFile, asked: Preparing) -> None:
         self.prepared = prepared
-        self._file, self._values, self._step_size, self._parameters = file, values, step_size, parameters
-        self._schedule, self._tolerance = schedule, tolerance
+        self._file, self._asked = file, asked
 
     def with_loads_as_powers(self) -> Scenario | None:
         """The same scenario with loads of constant power; None where the case says how its loads follow the voltage."""
@@ -93,9 +113,12 @@ class Scenario:
             return None
         table = self._file.table.model_copy(update={"network": as_powers(network)})
         file = replace(self._file, table=table)
-        (one,) = file.prepare([self.name], self._values, self._step_size, None, self._parameters)
-        asked = _as_asked(one, self._schedule, self._tolerance)
-        return Scenario(asked, file, self._values, self._step_size, self._parameters, self._schedule, self._tolerance)
+        return Scenario(self._anew(file), file, self._asked)
+
+    def _anew(self, file: CaseFile, stop: float | None = None) -> PreparedScenario:
+        asked = self._asked
+        (one,) = file.prepare([self.name], asked.overrides, asked.step_size, stop, asked.files)
+        return asked.scheduled(one)
 
     @property
     def name(self) -> str:
@@ -140,60 +163,7 @@ class Scenario:
         """Data that are most unusual, each with its place."""
         return [str(question) for question in self.prepared.questions]
 
-    def modes(
-        self,
-        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-        critical: float | None = None,
-        *,
-        directional: bool = False,
-        black_box: bool = False,
-        report: Callable[[str], None] | None = None,
-    ) -> Modes:
-        """Steady state and modes.
-
-        Parameters
-        ----------
-        frequencies
-            Modes from the first to the second are shown [Hz].
-        critical
-            Damping [%] below which modes are looked for, by sparse search; by default the whole
-            spectrum is computed.
-        directional
-            Linearise with the FMUs' own directional derivatives instead of by perturbation.
-        black_box
-            Identify the components that hide their states from their inputs and outputs.
-        report
-            Called with a sentence before each run of an identification, which may take minutes; such as ``print``.
-
-        Raises
-        ------
-        AnalysisError
-            If no steady state is found, or the system cannot be linearised.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> modes = gfor.load("two_area").scenario("pod_p").modes()
-        >>> modes.table()[["frequency_hz", "damping_percent", "name"]].round(2).head(2)
-              frequency_hz  damping_percent               name
-        mode
-        1             0.76            22.55  electromechanical
-        2             0.34            32.70
-        """
-        from orchestrator.study.modes import compute_modes, running  # noqa: PLC0415 - only modes need it
-
-        frequencies = frequency_range(frequencies)
-        critical = None if critical is None else percent(critical, "critical")
-        if critical is not None and not frequencies[0] > 0:
-            raise InputError("a search for critical modes needs frequencies that begin above 0 Hz, such as (0.1, 2.0)")
-        if not black_box:
-            return Modes(compute_modes(self.prepared, frequencies, critical, directional=directional))
-        if directional:
-            raise InputError("black_box identifies, directional asks the FMUs for derivatives; choose one of them")
-        from orchestrator.black_box.coupled_modes import modes_with_boxes  # noqa: PLC0415 - a second to import
-
-        with running(self.prepared) as master:
-            return Modes(modes_with_boxes(self.prepared, master, frequencies, critical, report=report))
+    modes = method("Scenario.modes", ModesRequest, _modes)
 
     def run(
         self,
@@ -318,12 +288,16 @@ class Scenario:
 
         return response_at_steady_state(self._until(in_seconds(stop, "stop")))
 
+    def again(self, changed: Mapping[str, float]) -> PreparedScenario:
+        """The scenario with other values by ``component.variable``, prepared anew from the case."""
+        (prepared,) = self._file.prepare([self.name], dict(changed), self._asked.step_size, None, self._asked.layers)
+        return prepared
+
     def _until(self, stop_time: float | None) -> PreparedScenario:
         """The scenario with another stop time [s]: events after it are left out, and it must fit the step."""
         if stop_time is None or stop_time == self.prepared.stop_time:
             return self.prepared
-        (prepared,) = self._file.prepare([self.name], self._values, self._step_size, stop_time, self._parameters)
-        prepared = _as_asked(prepared, self._schedule, self._tolerance)
+        prepared = self._anew(self._file, stop_time)
         if changed := _differences(self.prepared, prepared):
             raise InputError(
                 f"{self._file.path}: files of the case were changed since the scenario was made, which changes "
@@ -331,119 +305,9 @@ class Scenario:
             )
         return prepared
 
-    def sensitivities(
-        self,
-        mode: str | None = None,
-        parameters: Names = (),
-        *,
-        fixed: bool = False,
-        held: bool = False,
-        directional: bool = False,
-        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-        report: Callable[[int, int], None] = lambda done, total: None,
-    ) -> Sensitivities:
-        """How each parameter of each FMU moves a mode: ∂λ/∂p.
+    sensitivities = method("Scenario.sensitivities", SensitivitiesRequest, sensitivities_of)
 
-        The derivative is total: the operating point moves with the parameter, as it does with ``--set``.
-
-        Parameters
-        ----------
-        mode
-            Name of one of the case's modes, or ``"critical"`` for the least damped one in the range; by default the
-            first named one.
-        parameters
-            Names ``component.variable``, also with ``*``; by default all tunable ones.
-        fixed
-            Fixed parameters as well, for each of which the case is started several times.
-        held
-            The partial derivative, at the held operating point, by tunable parameters alone.
-        directional
-            Linearise with the FMUs' own directional derivatives instead of by perturbation.
-        frequencies
-            The mode lies between the first and the second [Hz].
-        report
-            Called with how many parameters are done, of how many.
-
-        Raises
-        ------
-        InputError
-            If there is no such mode or parameter.
-        AnalysisError
-            If no steady state is found, or the system cannot be linearised.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> scenario = gfor.load("two_area").scenario("pod_p")
-        >>> found = scenario.sensitivities(parameters="gfor.pod_p.K")
-        >>> round(found.result.rows[0].damping_per_percent, 3)
-        -0.046
-        """
-        from orchestrator.sensitivities.sensitivities import find_sensitivities  # noqa: PLC0415 - as above
-
-        layers = (*self._parameters, *([OptionValues.of(self._values)] if self._values else []))
-
-        def again(changed: Mapping[str, float]) -> PreparedScenario:
-            (prepared,) = self._file.prepare([self.name], dict(changed), self._step_size, None, layers)
-            return prepared
-
-        return Sensitivities(
-            find_sensitivities(
-                self.prepared, again, mode, names_given(parameters, "parameters"), fixed=fixed, held=held,
-                directional=directional, frequency_range=frequency_range(frequencies), report=report,
-            )
-        )  # fmt: skip
-
-    def steps(
-        self,
-        allowed: tuple[float, float] = (1e-3, 0.1),
-        steps: Sequence[Time] = (),
-        schedules: Sequence[ScheduleName] = (),
-        frequencies: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    ) -> StepChoice:
-        """What communication steps and schedules do to the critical modes, as ``gfor steps`` says it.
-
-        Parameters
-        ----------
-        allowed
-            Accepted error of a critical mode's frequency [Hz] and damping [points].
-        steps
-            Communication steps [s] to try; by default 0.5 to 50 times the case's own.
-        schedules
-            To try; by default ``gauss-seidel``, ``midpoint`` and ``newton``.
-        frequencies
-            The critical modes lie between the first and the second [Hz].
-
-        Returns
-        -------
-        StepChoice
-            All trials; its ``largest(schedule)`` is the largest step within the error.
-
-        Raises
-        ------
-        InputError
-            If an error is not above 0, a schedule does not exist, or no step fits the case's events.
-        AnalysisError
-            If there is no continuous system to compare with, or no mode in range.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> choice = gfor.load("two_area").scenario("pod_pq").steps(steps=["100 us", "500 us"], schedules=["midpoint"])
-        >>> choice.largest("midpoint").step_size
-        0.0005
-        """
-        errors = [plain_value(error) for error in allowed] if isinstance(allowed, Sequence) else []
-        if len(errors) != 2 or not all(isinstance(x, int | float) and 0 < x < float("inf") for x in errors):
-            raise InputError(f"allowed = {allowed!r}; give two errors above 0 [Hz, points], such as (0.001, 0.1)")
-        chosen = cast("tuple[ScheduleName, ...]", names_given(schedules, "schedules"))
-        if wrong := [name for name in chosen if name not in SCHEDULES]:
-            raise InputError(f"schedules: {wrong[0]!r} is none; give some of {', '.join(SCHEDULES)}")
-        listed = [steps] if isinstance(steps, int | float | str) else steps
-        lengths = [length for step in listed if (length := in_seconds(step, "steps")) is not None]
-        if wrong_lengths := [length for length in lengths if not length > 0]:
-            raise InputError(f"steps: {wrong_lengths[0]:g} s; give communication steps above 0")
-        return choose_step(self.prepared, Allowed(*allowed), lengths, chosen, frequency_range(frequencies))
+    steps = method("Scenario.steps", StepsRequest, steps_of)
 
     def strengths(self, converter_current: float = 0.0, rating: float | None = None) -> list[BusStrength]:
         """Short-circuit power of every bus, with the short-circuit ratio of the converters there.
@@ -539,39 +403,21 @@ def _checkpoints(prepared: PreparedScenario, folder: Path, every: float) -> Chec
     return Checkpoints(prepared, folder, every, resume=True, say=say)
 
 
-def choose(
-    file: CaseFile,
-    names: Names = (),
-    values: Mapping[str, Any] | None = None,
-    *,
-    step: Time | None = None,
-    stop: Time | None = None,
-    parameters: Paths = (),
-    schedule: ScheduleName | None = None,
-    tolerance: float | None = None,
-    sharing: str | None = None,
-) -> list[Scenario]:
-    """As `Case.choose` offers them."""
-    if schedule is not None and schedule not in SCHEDULES:
-        raise InputError(f"schedule = {schedule!r}; give one of {', '.join(SCHEDULES)}")
-    if sharing is not None and sharing not in list(SharingRule):
-        raise InputError(f"sharing = {sharing!r}; give one of {', '.join(SharingRule)}")
-    file, files = replace(file, sharing=SharingRule(sharing) if sharing else None), parameter_files(parameters)
-    chosen, step_size, stop_time = case_values(values), in_seconds(step, "step"), in_seconds(stop, "stop")
-    prepared = file.prepare(names_given(names, "names"), chosen, step_size, stop_time, files)
-    prepared = [_as_asked(one, schedule, tolerance) for one in prepared]
-    return [Scenario(one, file, chosen, step_size, files, schedule, tolerance) for one in prepared]
+def choose(file: CaseFile, names: Names, asked: Preparing, stop: float | None = None) -> list[Scenario]:
+    """The scenarios of a case, all where none is named.
 
-
-def _as_asked(prepared: PreparedScenario, schedule: ScheduleName | None, tolerance: float | None) -> PreparedScenario:
-    """A scenario with another schedule and steps within a tolerance, where they are given."""
-    if tolerance is not None and schedule is not None and schedule not in SECOND_ORDER:
-        raise InputError(
-            f"schedule {schedule!r} with tolerance = {tolerance!r}: a tolerance goes with midpoint or newton; choose "
-            "one of them, or leave the schedule out, which takes newton"
-        )
-    prepared = prepared.rescheduled(schedule) if schedule else prepared
-    return prepared if tolerance is None else prepared.with_tolerance(tolerance)
+    Parameters
+    ----------
+    file, names
+        The case, and names of its scenarios.
+    asked
+        How they are prepared.
+    stop
+        Time at which runs end [s]; the case's by default.
+    """
+    file = replace(file, sharing=cast("SharingRule | None", asked.sharing))
+    prepared = file.prepare(names_given(names, "names"), asked.overrides, asked.step_size, stop, asked.files)
+    return [Scenario(asked.scheduled(one), file, asked) for one in prepared]
 
 
 def question(scenarios: Iterable[PreparedScenario], above: int = 0) -> None:

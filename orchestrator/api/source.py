@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from orchestrator.api.identification import opened
 from orchestrator.api.results import Run, sources_of
-from orchestrator.api.values import Time
+from orchestrator.cases.given import Time
 from orchestrator.oscillations.reading import contest_cases, read_contest
 from orchestrator.oscillations.verdict import locate
 from orchestrator.oscillations.view import Sources

@@ -7,7 +7,9 @@ from pathlib import Path
 from orchestrator.cases.schema import Value
 from orchestrator.certification.certificate import Certificate, Judged
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, code_for
+from orchestrator.certification.codes.bench_point import BenchTask
 from orchestrator.certification.codes.certificate import certify_code
+from orchestrator.certification.point import CertificatePointTask
 from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
 from orchestrator.certification.study import certify
 from orchestrator.errors import InputError
@@ -42,7 +44,7 @@ def issue_of(
     if key != NTS631:
         code, bench = code_for(key, declared), bench_request(fmu, binding, values)
         return Issue(
-            bench, "orchestrator.certification.codes.bench_point", "rows",
+            bench, BenchTask.__module__, "rows",
             lambda executor, folder, report: certify_code(bench, code, executor, folder, report=report),
         )  # fmt: skip
     if declared:
@@ -52,7 +54,7 @@ def issue_of(
     own = {name: value for name, value in values.items() if name not in study}
     norm = CertificationRequest(as_device(fmu, binding), binding, own, pod, reactances, study, black_box)
     norm.check()
-    return Issue(norm, "orchestrator.certification.point", "points",
+    return Issue(norm, CertificatePointTask.__module__, "points",
                  lambda executor, folder, report: certify(norm, executor, folder, report))  # fmt: skip
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from orchestrator.cases.devices import Device
 from orchestrator.certification.codes.frequency_domain import FIGURES_JSON, FIGURES_PNG
 from orchestrator.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
-from orchestrator.certification.devices import Device
 from orchestrator.certification.environment import environment
 from orchestrator.certification.files import HTML, JSON
 from orchestrator.certification.margins import CriterionMargin, margin_text

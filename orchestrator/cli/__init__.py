@@ -7,9 +7,11 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from io import TextIOWrapper
+from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.extras import SetupError
+from orchestrator.added import rooms, study_in, words_of
 from orchestrator.cli.interrupted import ending, is_interrupt
 from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
@@ -52,6 +54,9 @@ COMMANDS = {
     "master federate": "one component of a case as a federate at HELICS, for a run elsewhere",
 }
 """Commands; those of a group follow its name."""
+
+_ROOMS = rooms()
+COMMANDS |= {n.replace("_", "-"): words_of(room) for n, room in _ROOMS.items() if n not in COMMANDS}
 
 GROUPS = {
     "fmu": "An FMU, DLL or device by itself",
@@ -268,8 +273,13 @@ class _Command(argparse.ArgumentParser):
 
 
 def module_of(command: str) -> Any:
-    """The module with a command's ``add_arguments`` and ``run``."""
-    return import_module(f"orchestrator.cli.{_MODULES.get(command, command).replace('-', '_')}")
+    """What has a command's ``add_arguments`` and ``run``: its module, or its study where that is all."""
+    name = _MODULES.get(command, command).replace("-", "_")
+    if name not in _ROOMS or (Path(__file__).parent / f"{name}.py").exists():
+        return import_module(f"orchestrator.cli.{name}")
+    from orchestrator.cli.study import StudyCommand  # noqa: PLC0415 - imports what all studies need
+
+    return StudyCommand(command, study_in(_ROOMS[name]))
 
 
 def _parser(chosen: str | None) -> argparse.ArgumentParser:

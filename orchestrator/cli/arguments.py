@@ -9,6 +9,8 @@ from orchestrator.asked import as_number, asked_of
 from orchestrator.coupling.schedule import check_tolerance
 from orchestrator.units import read_value, to_unit
 
+_ASKED = "asked_"  # before the name of a field whose own name is that of another option
+
 
 def switch(parser: argparse._ActionsContainer, name: str, text: str) -> None:
     """An option without a value, such as ``--native``."""
@@ -44,26 +46,25 @@ def add_request_arguments(parser: argparse._ActionsContainer, request: type) -> 
     for name, one in asked_of(request).items():
         if one.option is None or one.option in parser._option_string_actions:
             continue
-        how: dict[str, Any] = {"action": "append"} if one.kind.several else {"type": one.kind.read}
-        how = {"action": "store_true"} if one.kind.read is None else {"metavar": one.metavar, **how}
-        parser.add_argument(one.option, dest=name, help=one.help, **how)
+        taken = any(action.dest == name for action in parser._actions)  # as ``--parameters`` beside ``--parameter``
+        how: dict[str, Any] = {"action": "append"} if one.kind.several else {}
+        how["dest"] = f"{_ASKED}{name}" if taken else name
+        options = [(one.option, one.metavar, one.help, one.kind.read), *one.kind.besides]
+        for spelt, metavar, text, read in options:
+            of = how | ({"action": "store_true"} if read is None else {"metavar": metavar, "type": read})
+            parser.add_argument(spelt, help=text, **of)
 
 
 def asked_by(options: argparse.Namespace, request: type) -> dict[str, Any]:
-    found = {name: (one.kind, getattr(options, name, None)) for name, one in asked_of(request).items()}
+    def given(name: str) -> Any:
+        return getattr(options, f"{_ASKED}{name}", getattr(options, name, None))
+
+    found = {name: (one.kind, given(name)) for name, one in asked_of(request).items()}
     return {
         name: ",".join(value) if kind.joined else tuple(value) if isinstance(value, list) else value
         for name, (kind, value) in found.items()
         if value is not None and value is not False and value != []
     }
-
-
-class Joined(argparse.Action):
-    """A list with commas, to which the option adds each time that it is given."""
-
-    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: str | None = None) -> None:
-        before = getattr(namespace, self.dest)
-        setattr(namespace, self.dest, f"{before},{values}" if before else values)
 
 
 def assignment(text: str) -> tuple[str, bool | float | str]:

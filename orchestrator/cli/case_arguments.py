@@ -4,19 +4,18 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.scenario import Scenario, choose
-from orchestrator.asked import read_range
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.forcing import forced
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.cli.arguments import assignment, option, repeatable, seconds, switch
+from orchestrator.cli.arguments import asked_by, assignment, option, repeatable, seconds, switch
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.errors import InputError
+from orchestrator.study.request import ScenariosRequest
 
 
 def add_case_arguments(
@@ -43,10 +42,6 @@ def add_case_arguments(
                         "'*.native=true'")  # fmt: skip
 
 
-def add_range_argument(parser: argparse.ArgumentParser, text: str = "frequencies [Hz] (0.1:2)") -> None:
-    option(parser, "--range", "LO:HI", text, read=read_range, default=ELECTROMECHANICAL_HZ)
-
-
 def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--schedule", choices=SCHEDULES, help="in which order components step, and what their inputs "
                         "do meanwhile: midpoint and newton are of second order in the step (default: the "
@@ -65,11 +60,11 @@ def case_of(options: argparse.Namespace) -> Case:
 
 def chosen(options: argparse.Namespace) -> list[Scenario]:
     file, stop = forced(case_of(options), getattr(options, "force", ())), getattr(options, "stop", None)
-    scenarios = choose(
-        file, options.scenario, values_set(options), step=options.step, stop=stop, parameters=options.parameters,
-        schedule=getattr(options, "schedule", None), tolerance=getattr(options, "tolerance", None),
-        sharing=getattr(options, "sharing", None),
-    )  # fmt: skip
+    asked: dict[str, Any] = {name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")}
+    asked["sharing"] = SharingRule(asked["sharing"]) if asked["sharing"] else None
+    asked |= {"values": values_set(options), "step": options.step, "parameters": parameters(options)}
+    request = ScenariosRequest(**asked)
+    scenarios = choose(file, options.scenario, request, stop)
     print_questions([scenario.prepared for scenario in scenarios], as_json=getattr(options, "json", True))
     return scenarios
 
@@ -85,12 +80,17 @@ def values_set(options: argparse.Namespace) -> dict[str, Value]:
     return values
 
 
-def of_one_scenario(options: argparse.Namespace, rule: str) -> dict[str, Any]:
-    """Scenario, values, step and parameter files for a study of one scenario; ``rule`` says that it is of one."""
-    if len(options.scenario) > 1:
-        raise InputError(f"--scenario: {rule}, not for {' and '.join(options.scenario)}; start it once for each")
-    return {"scenario": next(iter(options.scenario), None), "overrides": values_set(options),
-            "step_size": options.step, "parameters": parameters(options)}  # fmt: skip
+def asked_of_case(options: argparse.Namespace, request: type, study: str) -> dict[str, Any]:
+    """The fields of a request from all options: its own, and those of the case."""
+    of_case = {"values": values_set(options), "step": options.step, "parameters": parameters(options)}
+    if hasattr(request, "scenarios"):
+        of_case["scenarios"] = tuple(options.scenario)
+    elif len(options.scenario) > 1:
+        given = " and ".join(options.scenario)
+        raise InputError(f"--scenario: gfor {study} is for one scenario, not for {given}; start it once for each")
+    else:
+        of_case["scenario"] = next(iter(options.scenario), None)
+    return asked_by(options, request) | of_case
 
 
 def prepare(options: argparse.Namespace) -> list[PreparedScenario]:

@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
+from orchestrator.cases.devices import Device
 from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.certificate import Certificate, Judged
 from orchestrator.certification.codes.bench_case import rated_frequency
@@ -21,7 +22,6 @@ from orchestrator.certification.codes.frequency_domain import (
     stiffness_in_words,
 )
 from orchestrator.certification.details import Details, read_details
-from orchestrator.certification.devices import Device
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.inside import check_target, put_inside
 from orchestrator.certification.issue import NTS631, WITH_VERDICT, bench_request, issue_of

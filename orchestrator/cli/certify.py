@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
+from orchestrator.cases.devices import devices_of
 from orchestrator.certification.details import TEMPLATE
-from orchestrator.certification.devices import devices_of
 from orchestrator.certification.issue import NTS631
 from orchestrator.certification.request import PODS, REACTANCES
 from orchestrator.cli.arguments import option, reactances, repeatable, setting, switch

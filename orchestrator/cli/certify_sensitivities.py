@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from orchestrator.asked import read_part
 from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.codes.change_point import ChangeTask
 from orchestrator.certification.codes.needs_record import (
     confirmed_text,
     left_out_text,
@@ -26,8 +27,6 @@ from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
-
-_WORKER = ["orchestrator.certification.codes.change_point"]
 
 
 def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +76,7 @@ def find_needs(
     progress = Progressing(folder)
 
     def computed(study: Any) -> Any:
-        executor = choose_executor(options, _WORKER)
+        executor = choose_executor(options, [ChangeTask.__module__])
         return progress.compute(lambda report: study(executor, report), executor, console)
 
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):

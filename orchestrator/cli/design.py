@@ -8,15 +8,15 @@ from shutil import rmtree
 
 from rich.markup import escape
 
-from orchestrator.api.studies import design_controller
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
-from orchestrator.cli.arguments import add_request_arguments, asked_by, option, repeatable, switch
-from orchestrator.cli.case_arguments import add_case_arguments, case_of, of_one_scenario
-from orchestrator.cli.design_points import A_DESIGN, add_points_arguments, run_over_points
+from orchestrator.cli.arguments import add_request_arguments, option, repeatable, switch
+from orchestrator.cli.case_arguments import add_case_arguments, asked_of_case, case_of
+from orchestrator.cli.design_points import add_points_arguments, run_over_points
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.terminal import make_console, print_json, print_parts, print_questions, warn
-from orchestrator.cli.verdict import NOT_MET, add_verdict_argument, exit_code, print_stability
-from orchestrator.errors import CosimError, InputError
+from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
+from orchestrator.coordinated_design.one_point import design_controller
+from orchestrator.errors import NOT_MET, CosimError, InputError
 from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.sheet import first_screen, sheet
 from orchestrator.pod_design.view import parameter_file_path
@@ -47,7 +47,10 @@ def run(options: argparse.Namespace) -> int:
     """Design, print, and write the parameter file."""
     if options.points is not None:
         _check_over_points(options)
-        return run_over_points(options, None if options.out is None else _writable(_given(options.out)))
+        out = options.out and _writable(_given(options.out))
+        return run_over_points(
+            options, out or Path(f"{case_of(options).name}_{'_'.join(options.controller)}_points.toml")
+        )
     _check_for_one_point(options)
     case, console = case_of(options), make_console(stderr=options.json)
     request = _request(options)
@@ -115,11 +118,9 @@ def _how_it_goes_on(folder: Path) -> str:
 
 
 def _request(options: argparse.Namespace) -> DesignRequest:
-    if options.damping is not None and options.damping_increment is not None:
-        raise InputError("--damping and --damping-increment both say what is required; give one of them")
     first = {name: next(iter(getattr(options, name)), None) for name in ("controller", "component", "mode")}
     how = {"compensated_gain": options.gain_from == "compensated", "margins": not options.no_margins}
-    return DesignRequest(**asked_by(options, DesignRequest) | first | how | of_one_scenario(options, A_DESIGN))
+    return DesignRequest(**asked_of_case(options, DesignRequest, "design") | first | how)
 
 
 def _command_line(options: argparse.Namespace, request: DesignRequest) -> str:

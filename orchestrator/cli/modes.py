@@ -3,15 +3,15 @@
 import argparse
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.scenario import Scenario
+from orchestrator.api.scenario import Scenario, modes_of
 from orchestrator.asked import read_percent
-from orchestrator.cli.arguments import option, switch
-from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, chosen
+from orchestrator.cli.arguments import add_request_arguments, asked_by, option, switch
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_given
 from orchestrator.cli.terminal import (
     make_console,
@@ -31,17 +31,15 @@ from orchestrator.study.all_modes import compute_all_modes
 from orchestrator.study.answers import of_modes
 from orchestrator.study.load_model_weight import load_model_weights
 from orchestrator.study.modes import modes_json
+from orchestrator.study.request import ModesRequest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
-    add_range_argument(parser, "frequencies shown [Hz] (default: 0.1:2)")
+    add_request_arguments(parser, ModesRequest)
     parser.add_argument("--critical", type=read_percent, nargs="?", const=0.2, metavar="PERCENT",
                         help="only modes with less damping than this (20 by default), by sparse search instead of the "
                         "full spectrum")  # fmt: skip
-    switch(parser, "--directional", "linearise with the FMUs' own directional derivatives instead of by perturbation "
-           "(with --native)")  # fmt: skip
-    switch(parser, "--black-box", "identify the components that hide their states from their inputs and outputs")
     option(parser, "--component", "NAME", "with --black-box: take this one for a black box, beside the modes from its "
            "states; its admittance and model go to --out (default: results/<case>_black_box)")  # fmt: skip
     add_excitation_arguments(parser)
@@ -58,13 +56,11 @@ def run(options: argparse.Namespace) -> int:
     if excited := excitation_given(options):
         raise InputError(f"{excited[0]} is for a black box of its own: give --black-box --component NAME as well")
     scenarios = chosen(options)
-    if options.critical is not None and not options.range[0] > 0:
-        raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
-    if options.black_box and options.directional:
-        raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
+    request = ModesRequest(**asked_by(options, ModesRequest))
+    request.check()
     folder = made_folder(options.out, "--out") if options.out else None
     with held(folder) if folder else nullcontext():
-        return _compute(scenarios, options, folder)
+        return _compute(scenarios, request, options, folder)
 
 
 def _with_a_black_box(options: argparse.Namespace) -> int:
@@ -73,7 +69,7 @@ def _with_a_black_box(options: argparse.Namespace) -> int:
     if not options.black_box:
         raise InputError("--component names what is taken for a black box: give --black-box as well")
     others = {"--critical": options.critical is not None, "--directional": options.directional,
-              "--range": options.range != ELECTROMECHANICAL_HZ, "--details": options.details}  # fmt: skip
+              "--range": options.frequencies is not None, "--details": options.details}  # fmt: skip
     if given := [name for name, is_given in others.items() if is_given]:
         raise InputError(
             f"{given[0]} does not go with --component, which shows all modes of one black box; leave it out"
@@ -81,20 +77,15 @@ def _with_a_black_box(options: argparse.Namespace) -> int:
     return black_box.run(options)
 
 
-def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
-    if options.black_box:
+def _compute(
+    scenarios: Sequence[Scenario], request: ModesRequest, options: argparse.Namespace, folder: Path | None
+) -> int:
+    if request.black_box:
         with said_stages() as report:
-            results = [
-                scenario.modes(options.range, options.critical, black_box=True, report=report).result
-                for scenario in scenarios
-            ]
+            results = [modes_of(scenario, replace(request, report=report)) for scenario in scenarios]
     else:
-        results = compute_all_modes(
-            [scenario.prepared for scenario in scenarios],
-            options.range,
-            options.critical,
-            directional=options.directional,
-        )
+        prepared = [scenario.prepared for scenario in scenarios]
+        results = compute_all_modes(prepared, request.frequencies, request.critical, directional=request.directional)
     written = []
     if folder:
         from orchestrator.results.staging import new_run_id, staged  # noqa: PLC0415 - only here
@@ -106,7 +97,7 @@ def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder:
             plots = [path.name for path in save_modes(results, staging)]
             save_json(modes_json(results), staging / "modes.json")
             written += ["modes.json", *sorted(path.name for path in staging.glob("power_flow_*.csv")), *plots]
-    weights = [] if options.black_box else load_model_weights(scenarios, results, options.range)
+    weights = [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
     if options.json:
         print_json(modes_json(results, weights))
         return exit_code(options, [r.stability for r in results])

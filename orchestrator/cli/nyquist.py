@@ -11,8 +11,7 @@ from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import add_json_argument, option, quantity, repeatable, seconds, setting, switch
 from orchestrator.cli.terminal import make_console, print_json, print_parts, said_stages, say
-from orchestrator.cli.verdict import NOT_MET
-from orchestrator.errors import InputError
+from orchestrator.errors import NOT_MET, InputError
 from orchestrator.immittance.scan_files import ENDINGS
 from orchestrator.immittance.study import CutRequest, study_cut
 from orchestrator.immittance.view import Nyquist, parts

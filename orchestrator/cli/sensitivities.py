@@ -3,43 +3,33 @@
 import argparse
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 from rich.markup import escape
 
 from orchestrator.api.progress import shown_progress
-from orchestrator.api.scenario import Scenario
-from orchestrator.cli.arguments import option, repeatable, switch
-from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, chosen
+from orchestrator.api.scenario import Scenario, sensitivities_of
+from orchestrator.cli.arguments import add_json_argument, add_request_arguments, asked_by, option
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import make_console, print_json, print_warnings, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_verdicts
-from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
+from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.sensitivities.view import left_out, sensitivity_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    option(parser, "--mode", "NAME", "a mode that the case names, or 'critical' for the least damped one (default: the "
-           "first named one)")  # fmt: skip
-    repeatable(parser, "--parameter", "COMPONENT.PARAMETER", "only this one, tunable or fixed; also a pattern "
-               "(repeatable; default: all tunable ones)")  # fmt: skip
-    switch(parser, "--fixed", "fixed parameters too: the case is started several times for each")
-    switch(parser, "--held", "partial derivatives at the held operating point, instead of the total ones; tunable "
-           "parameters only")  # fmt: skip
-    add_range_argument(parser)
-    switch(parser, "--directional", "linearise with the FMUs' own directional derivatives instead of by perturbation "
-           "(with --native)")  # fmt: skip
+    add_request_arguments(parser, SensitivitiesRequest)
     option(parser, "--out", "DIR", "write sensitivities.csv and sensitivities.json there", read=Path)
-    switch(parser, "--json", "print JSON")
+    add_json_argument(parser)
     add_verdict_argument(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Compute, print, and write what is asked for; returns 1 if no parameter has a derivative."""
-    if options.held and options.fixed:
-        raise InputError("--held holds the operating point, which a fixed parameter moves; give one of them")
     scenarios = chosen(options)
     folder = made_folder(options.out, "--out") if options.out else None
     with held(folder) if folder else nullcontext():
@@ -47,15 +37,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _compute(scenarios: Sequence[Scenario], options: argparse.Namespace, folder: Path | None) -> int:
-    found = []
+    request, found = SensitivitiesRequest(**asked_by(options, SensitivitiesRequest)), []
     for scenario in scenarios:
         with shown_progress("Parameters", shown=not options.json) as report:
-            found.append(
-                scenario.sensitivities(
-                    options.mode, options.parameter, fixed=options.fixed, held=options.held,
-                    directional=options.directional, frequencies=options.range, report=report,
-                )
-            )  # fmt: skip
+            found.append(sensitivities_of(scenario, replace(request, report=report)))
     written = []
     if folder:
         for scenario, one in zip(scenarios, found, strict=True):

@@ -5,49 +5,25 @@ import argparse
 import numpy as np
 
 from orchestrator.analysis.modes import damping_percent
-from orchestrator.cli.arguments import option, seconds, switch
-from orchestrator.cli.case_arguments import add_case_arguments, add_range_argument, prepare
+from orchestrator.api.scenario import steps_of
+from orchestrator.cli.arguments import add_json_argument, add_request_arguments, asked_by
+from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import make_console, print_json
-from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.report.tables import make_table
-from orchestrator.study.step_choice import TRIED, Allowed, StepChoice, TriedStep, choose_step, step_choice_json
+from orchestrator.study.request import StepsRequest
+from orchestrator.study.step_choice import Allowed, StepChoice, TriedStep, step_choice_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    option(parser, "--error", "HZ:POINTS", "accepted error of a critical mode's frequency [Hz] and damping [points] "
-           "(default: 0.001:0.1)", read=_error, default=Allowed())  # fmt: skip
-    parser.add_argument("--try", dest="tried", type=_steps, default=[], metavar="H,H,...", help="communication steps "
-                        "to try, such as '100 us,500 us' (default: 0.5 to 50 times the case's own)")  # fmt: skip
-    parser.add_argument("--schedule", action="append", choices=SCHEDULES, default=None,
-                        help=f"schedule to try (repeatable; default: {', '.join(TRIED)})")  # fmt: skip
-    add_range_argument(parser, "frequencies of the critical modes [Hz] (default: 0.1:2)")
-    switch(parser, "--json", "print JSON")
-
-
-def _error(text: str) -> Allowed:
-    parts = text.split(":")
-    try:
-        hertz, points = map(float, parts)
-    except ValueError:
-        raise ValueError(f"{text!r} is not of the form HZ:POINTS, such as 0.001:0.1") from None
-    if not (0 < hertz < np.inf and 0 < points < np.inf):
-        raise ValueError(f"{text!r}: both errors must be above 0 and finite")
-    return Allowed(hertz, points)
-
-
-def _steps(text: str) -> list[float]:
-    return [seconds(part.strip()) for part in text.split(",")]
+    add_request_arguments(parser, StepsRequest)
+    add_json_argument(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Try, print, and return 1 where no schedule has a step within the error."""
-    wanted = options.schedule
-    options.schedule = None  # here it says what is tried, not how the case is prepared
-    choices = [
-        choose_step(prepared, options.error, options.tried, wanted or (), options.range)
-        for prepared in prepare(options)
-    ]
+    request = StepsRequest(**asked_by(options, StepsRequest))
+    choices = [steps_of(scenario, request) for scenario in chosen(options)]
     if options.json:
         print_json([step_choice_json(choice) for choice in choices])
     else:

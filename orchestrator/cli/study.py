@@ -1,64 +1,104 @@
-"""Parts that the commands on many points share: options, the folder, what is printed, and the last line."""
+"""A study of many points as a command: options, the folder, what is printed, and the last line."""
 
 import argparse
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.cli.arguments import add_json_argument, option
+from orchestrator.api.progress import shown_progress
+from orchestrator.cli.arguments import add_json_argument, add_request_arguments, option
+from orchestrator.cli.case_arguments import add_case_arguments, asked_of_case, case_of
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
-from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, print_questions
+from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, print_questions, say
 from orchestrator.cli.verdict import add_verdict_argument
-from orchestrator.points.study import Plan, PointStudy, Result, Shown
+from orchestrator.points.study import PointStudy, StudyAtOnce
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
-
-class Counted(Protocol):
-    """A result that knows how many of its points were computed now, and how many were read."""
-
-    computed: int
-    stored: int
+AnyStudy = PointStudy[..., Any, Any, Any]
+Simple = StudyAtOnce[..., Any]
 
 
-def add_study_arguments(parser: argparse.ArgumentParser, study: str, what: str = "points") -> None:
-    add_executor_arguments(parser)
-    where = f"folder for results (default: results/<case>_{study}); {what} that are there are not computed again"
-    option(parser, "--out", "DIR", where, read=Path)
+def add_study_arguments(name: str, study: AnyStudy | Simple, parser: argparse.ArgumentParser) -> None:
+    add_case_arguments(parser, several=study.of_several)
+    add_request_arguments(parser, study.asks)
+    if isinstance(study, PointStudy):
+        add_executor_arguments(parser)
+        kept = f"{study.counted} that are there are not computed again"
+        where = f"folder for results (default: results/<case>_{name}); {kept}"
+        option(parser, "--out", "DIR", where, read=Path)
+        add_verdict_argument(parser)
+    elif study.files:
+        option(parser, "--out", "DIR", f"write {study.files}", read=Path)
     add_json_argument(parser)
-    add_verdict_argument(parser)
+
+
+def run_study(name: str, study: AnyStudy | Simple, options: argparse.Namespace) -> int:
+    """Plan, compute, write and print."""
+    if isinstance(study, StudyAtOnce):
+        return _run_at_once(name, study, options)
+    with working_in(options, name, study) as (_, compute, folder):
+        found = compute()
+        return shown(options, study, found, folder, found.save(folder))
+
+
+def _run_at_once(name: str, study: Simple, options: argparse.Namespace) -> int:
+    request = study.request(**asked_of_case(options, study.asks, name))
+    folder = made_folder(options.out, "--out") if getattr(options, "out", None) else None
+    with shown_progress(study.counted.capitalize(), shown=not options.json) as report:
+        found = study.compute(case_of(options), request, report)
+    print_questions(study.prepared(found), as_json=options.json)
+    written = found.save(folder) if folder else []
+    end = f"Written: {', '.join(map(str, written))}" if written else ""
+    say("warning", study.warnings(found))
+    present(options, found.as_json, study.parts(found), study.remarks(found), end)
+    return study.code(found, False)
 
 
 @contextmanager
 def working_in(
-    options: argparse.Namespace, folder: Path, study: PointStudy[Plan, Result, Shown], plan: Callable[[], Plan]
-) -> Iterator[tuple[Plan, Callable[..., Shown]]]:
+    options: argparse.Namespace, name: str, study: AnyStudy, place: Path | None = None, **more: Any
+) -> Iterator[tuple[Any, Callable[..., Any], Path]]:
     """Plan, make the folder and keep other commands from it; after an interrupt say how the study goes on.
 
-    Gives the plan and what computes it."""
+    Gives the plan, what computes it, and the folder; ``more`` is asked beside the options."""
+    case = case_of(options)
+    request = study.request(**asked_of_case(options, study.asks, name) | more)
+    folder = place or options.out or Path("results") / f"{case.name}_{name}"
     executor, progress = choose_executor(options, study.imports), Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on):
-        planned = plan()
+        planned = study.plan(case, request)
         print_questions(study.prepared(planned), as_json=options.json)
 
-        def compute(*more: object) -> Shown:
+        def compute(*more: object) -> Any:
             return progress.compute(
                 lambda report: study.compute(planned, executor, folder, report, *more), executor,
                 make_console(stderr=options.json),
             )  # fmt: skip
 
         with held(made_folder(folder, "--out")):
-            yield planned, compute
+            yield planned, compute, folder
 
 
-def folder_of(options: argparse.Namespace, case: str, study: str) -> Path:
-    return options.out or Path("results") / f"{case}_{study}"
+def shown(
+    options: argparse.Namespace, study: AnyStudy, found: Any, folder: Path, written: Sequence[Path], end: str = ""
+) -> int:
+    """Print what was found, by default with a line on its files at the end; returns the exit code."""
+    result = found.result
+    if not end:
+        stored = f", {result.stored} were there already" if result.stored else ""
+        files = ", ".join(path.name for path in written)
+        end = f"{result.computed} {study.counted} computed{stored}. Results in {folder}: {files}"
+    say("warning", study.warnings(found))
+    present(options, found.as_json, study.parts(found), study.remarks(found), end)
+    return study.code(found, options.fail_unstable)
 
 
 def present(
@@ -80,6 +120,9 @@ def present(
         console.print(escape(end), soft_wrap=True, highlight=False)
 
 
-def last_line(result: Counted, what: str, folder: Path, written: Sequence[Path]) -> str:
-    stored = f", {result.stored} were there already" if result.stored else ""
-    return f"{result.computed} {what}computed{stored}. Results in {folder}: {', '.join(path.name for path in written)}"
+class StudyCommand:
+    """A command that is made from a study alone."""
+
+    def __init__(self, name: str, study: AnyStudy | Simple) -> None:
+        self.add_arguments = partial(add_study_arguments, name, study)
+        self.run = partial(run_study, name, study)

@@ -14,8 +14,6 @@ from orchestrator.study import tables
 from orchestrator.study.answers import ScenarioAnswer, answers_table, outside
 from orchestrator.study.modes import ModesResult
 
-NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
-
 
 def add_verdict_argument(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--fail-unstable", "end with exit code 1 unless everything is known to be stable, at any frequency")

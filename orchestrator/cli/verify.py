@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.api.certification import chosen_anew, is_of_norm, verify_anew, worker_of
+from orchestrator.certification.anew import POINTS, Parts, parts_of
 from orchestrator.certification.inside import laid_out
 from orchestrator.certification.issue import NTS631
 from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED
@@ -62,14 +62,15 @@ def run(options: argparse.Namespace) -> int:
 def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any], int]:
     """What is said of one certificate as JSON, and its exit code."""
     folder, content = read_certificate(place)
-    norm = is_of_norm(content)
+    parts = parts_of(content)
+    norm = parts is POINTS
     console = make_console(stderr=options.json)
     wanted = options.points or options.rows or ()
-    chosen = [] if options.files_only else chosen_anew(folder, content, wanted, every=options.all)
+    chosen = [] if options.files_only else parts.chosen(folder, content, wanted, every=options.all)
     found = verify_files(folder, content)
     computed = bool(chosen) and found.holds
     if computed:
-        again = _anew(options, folder, content, chosen, console, norm=norm)
+        again = _anew(options, folder, content, chosen, console, parts)
         found = Verification(found.faults + again.faults, found.agreed + again.agreed)
     said = {"holds": found.holds, "verdict": content["verdict"], **({"points": content["judged"]} if norm else {}),
             "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
@@ -82,14 +83,14 @@ def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any],
 
 
 def _anew(
-    options: argparse.Namespace, folder: Path, content: dict[str, Any], chosen: list[Any], console: Console, *,
-    norm: bool,
+    options: argparse.Namespace, folder: Path, content: dict[str, Any], chosen: list[Any], console: Console,
+    parts: Parts,
 ) -> Verification:  # fmt: skip
-    executor = choose_executor(options, [worker_of(content)])
+    executor = choose_executor(options, [parts.task.__module__])
     with progress_bar(console) as bar:
-        task = bar.add_task("Points" if norm else "Rows", total=len(chosen) * (2 if norm else 1))
+        task = bar.add_task(f"{parts.one.capitalize()}s", total=len(chosen) * parts.times)
         try:
-            return verify_anew(folder, content, chosen, executor, lambda done, _: bar.update(task, completed=done))
+            return parts.verify(folder, content, chosen, executor, lambda done, _: bar.update(task, completed=done))
         finally:
             executor.close()
 

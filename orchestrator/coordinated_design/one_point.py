@@ -2,6 +2,7 @@
 
 from functools import partial
 
+from orchestrator.cases.case import Case
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.coordinated_design.measured_loops import measure
 from orchestrator.coordinated_design.objective import Aim, RatedPoint
@@ -9,8 +10,10 @@ from orchestrator.coordinated_design.search import SettingSearch
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.coordinated_design.study import naming_of
 from orchestrator.pod_design.closed_loop import PodLoop, PodSetting
-from orchestrator.pod_design.design import DesignRequest
+from orchestrator.pod_design.design import DesignRequest, StageReport, design_pod
 from orchestrator.pod_design.target import Target
+from orchestrator.pod_design.view import ControllerDesign
+from orchestrator.points.store import PointStore
 
 
 def search_settings(
@@ -34,3 +37,10 @@ def search_settings(
         best, _ = search.over_grid(search.best())
         found.append((why, space.group_settings(best.x)[0]))
     return found
+
+
+def design_controller(
+    case: Case, request: DesignRequest, report: StageReport = lambda text: None, store: PointStore | None = None
+) -> ControllerDesign:
+    """A design for one operating point; ``store`` keeps figures on the way."""
+    return ControllerDesign(design_pod(case, request, report, store, search_settings))

@@ -1,18 +1,18 @@
 """A design over operating points and outages: open loops of all points, the search, and all modes computed anew."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, MISSING, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from orchestrator.analysis.modes import Mode
-from orchestrator.asked import DAMPING, GAIN_BOUNDS, NAMES, RANKED, STAGES, asked
+from orchestrator.asked import DAMPING, FILE, GAIN_BOUNDS, NAMES, OUTAGES, RANKED, STAGES, Names, asked
 from orchestrator.cases.case import Case
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.layers import OptionValues
-from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.coordinated_design.following import with_followed_names
@@ -26,8 +26,9 @@ from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict, 
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.operating_points.plan import OperatingPoints, read_operating_points
 from orchestrator.pod_design.closed_loop import PodSetting, check_tunable
-from orchestrator.pod_design.target import check_range, find_target, with_controller
+from orchestrator.pod_design.target import check_range, find_target, require_controllers, with_controller
 from orchestrator.points.points import Work, nobody
+from orchestrator.points.request import OverCluster, of_scenario, of_values
 from orchestrator.points.task import StudyCase
 from orchestrator.study.naming import modes_named
 
@@ -37,17 +38,45 @@ TOGETHER = 4  # operating points with outages that are computed together
 
 
 @dataclass(frozen=True)
-class PointsDesignRequest:
-    controllers: tuple[str, ...]
-    components: tuple[str, ...] = asked(
+class PointsDesignRequest(OverCluster):
+    """Design POD controllers with one setting for many operating points, each with its outages.
+
+    Raises
+    ------
+    InputError
+        If points, outages, scenario, components or modes cannot be used.
+    AnalysisError
+        If no point has modes.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> from pathlib import Path
+    from typing import Any
+    >>> lines = "name,grid.X_L", "short,0.05", "long,0.3"
+    >>> _ = Path("two.csv").write_text(chr(10).join(lines))
+    >>> design = gfor.load("two_area").design_over_points("two.csv", damping=15)
+    >>> design.met
+    True
+    >>> bool(design.points()["damping_percent"].min() >= 15)
+    True
+    """
+
+    points: str | Path = asked(FILE, MISSING, "operating points: a CSV file, as gfor screen has it")
+    controllers: Sequence[str] = asked(
+        NAMES, ("pod_p",), '``"pod_p"``, ``"pod_q"``, or both; each gets a setting of its own', option=None
+    )
+    outages: Names | None = asked(OUTAGES, None, "n-1, lines, units, or names, each at every point (repeatable)")
+    scenario: str | None = of_scenario("its name; by default the one without these controllers")
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
+    components: Sequence[str] = asked(
         NAMES, (), "converters, or patterns, each with a setting of its own", option="--component"
     )
-    scenario: str | None = None
-    # all electromechanical ones where empty
-    modes: tuple[str, ...] = asked(
-        NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode"
+    modes: Sequence[str] = asked(NAMES, (), "the case's modes to damp (default: all from 0.1 to 2 Hz)", option="--mode")
+    damping: float | None = asked(
+        DAMPING, None, "required damping, such as 20", python="wanted everywhere; the best that there is by default"
     )
-    damping: float | None = asked(DAMPING, None, "required damping, such as 20")  # None for the best that there is
     gain_bounds: tuple[float, float] = asked(GAIN_BOUNDS, (0.0, 400.0), "bounds of every gain [pu]")
     stages: int | None = asked(STAGES, None, "lead/lag stages (default: the components' own)")
     # no other mode may fall below this damping ratio, or, where it is below already, below what it has
@@ -57,9 +86,6 @@ class PointsDesignRequest:
     ranked: int = asked(
         RANKED, 3, "converters for which a controller alone is designed to rank them (default: 3)", option="--rank"
     )
-    overrides: Mapping[str, Value] = field(default_factory=dict)
-    parameters: Sequence[ParameterFile] = ()
-    step_size: float | None = None
 
 
 @dataclass(frozen=True)
@@ -76,20 +102,10 @@ class PointsDesignPlan:
     def prepared(self) -> PreparedScenario:
         return self.read.prepared
 
-    @property
-    def layers(self) -> tuple[ParameterFile, ...]:
-        """Values that hold at every point, without those of the controllers."""
-        own = [OptionValues.of(self.request.overrides)] if self.request.overrides else []
-        return (*self.request.parameters, *own)
 
-
-def plan_points_design(
-    case: Case, request: PointsDesignRequest, points: Path, outages: str | None = None
-) -> PointsDesignPlan:
-    """Check a design over operating points, and build the FMUs that it needs.
-
-    ``points``: CSV file with the operating points, as `gfor screen` takes it.
-    ``outages``: as `orchestrator.operating_points.outages.read_outages` takes them."""
+def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesignPlan:
+    """Check a design over operating points, and build the FMUs that it needs."""
+    require_controllers(request.controllers)
     groups = _groups(case, request)
     known = [table.name for table in case.table.analysis.modes]
     for name in request.modes:
@@ -101,8 +117,7 @@ def plan_points_design(
     for place in candidates:
         off |= {f"{place.name}.enabled": False, f"{place.name}.T_S1": 0.0, f"{place.name}.T_S2": 0.0}
     off |= {f"{place.name}.N_S": float(group.stages) for group in groups for place in group.places}
-    overrides = {key: value for key, value in request.overrides.items() if key not in off} | off
-    read = read_operating_points(case, points, outages, scenario, overrides, request.step_size, request.parameters)
+    read = read_operating_points(case, request, request.points, request.outages, scenario, off)
     plans = read.prepared.system.components
     for group in groups:
         for bound in request.gain_bounds:
@@ -111,9 +126,9 @@ def plan_points_design(
         check_tunable(place.component, plans[place.component].description, place.controller)
     clash = {key for item in read.items for key in item.values} & {*off, *(f"{p.name}.K" for p in candidates)}
     if clash:
-        raise InputError(f"{points}: the column for {min(clash)} sets what is to be designed; leave it out")
+        raise InputError(f"{request.points}: the column for {min(clash)} sets what is to be designed; leave it out")
     naming = partial(naming_of, case) if request.modes else None
-    aim = Aim(request.modes, request.least_damping, naming)
+    aim = Aim(tuple(request.modes), request.least_damping, naming)
     return PointsDesignPlan(case=case, request=request, read=read, groups=groups, candidates=candidates, off=off,
                             aim=aim)  # fmt: skip
 
@@ -130,7 +145,7 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
         for pattern in request.components or (None,):
             target = find_target(
                 case, controller, scenario=request.scenario, pattern=pattern, stages=request.stages,
-                overrides=request.overrides, parameters=request.parameters,
+                overrides=request.overrides, parameters=request.files,
             )  # fmt: skip
             group = PodGroup(controller, target.components, target.key, target.stages)
             for other in found:
@@ -146,7 +161,7 @@ def _groups(case: Case, request: PointsDesignRequest) -> tuple[PodGroup, ...]:
 def _scenario(case: Case, request: PointsDesignRequest) -> str:
     target = find_target(
         case, request.controllers[0], scenario=request.scenario, pattern=None, stages=0,
-        overrides=request.overrides, parameters=request.parameters,
+        overrides=request.overrides, parameters=request.files,
     )  # fmt: skip
     return target.scenario
 
@@ -156,7 +171,7 @@ def _candidates(
 ) -> tuple[PodPlace, ...]:
     """Loops of the groups, and for the ranking those of other converters whose controller is off."""
     own = [place for group in groups for place in group.places]
-    plan = case.components_of(scenario, request.overrides, request.parameters)
+    plan = case.components_of(scenario, request.overrides, request.files)
     for controller in request.controllers if request.ranked else ():
         own += [
             PodPlace(name, controller)
@@ -290,7 +305,7 @@ def modes_at(
 
     ``values``: by ``component.variable``; they go before all layers.
     ``places``: loops that are measured as well."""
-    study = StudyCase.of(plan.prepared, (*plan.layers, OptionValues.of(values)), plan.request.step_size)
+    study = StudyCase.of(plan.prepared, (*plan.request.layers, OptionValues.of(values)), plan.request.step_size)
     parts = [plan.read.items[k : k + TOGETHER] for k in range(0, len(plan.read.items), TOGETHER)]
     tasks = [PointsTask(study, part, tuple(places)) for part in parts]
     return [point for record in work.all(compute_points, tasks, list(map(len, parts))) for point in record.points]

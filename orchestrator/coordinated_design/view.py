@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.parameter_files import parameter_file_text
-from orchestrator.coordinated_design.point import PointsTask
 from orchestrator.coordinated_design.ranking import RankedConverter
-from orchestrator.coordinated_design.study import PointsDesign, design_over_points, values_of
+from orchestrator.coordinated_design.study import PointsDesign, values_of
 from orchestrator.coordinated_design.verdict import JudgedPoint, PlacedMode, PointsVerdict
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
 from orchestrator.late import pd
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.view import parameter_file_path
-from orchestrator.points.study import PointStudy
 from orchestrator.report.notebook import page
 from orchestrator.report.table import Column, ColumnTable
 from orchestrator.report.tables import PlainTable, make_table
@@ -272,6 +270,3 @@ def provenance(design: PointsDesign, command: str) -> list[str]:
         verdict_sentence(design.verdict).replace("\n", " "),
         "K in pu of the converter's rating, T_S1 and T_S2 in s",
     ]
-
-
-STUDY = PointStudy(design_over_points, CoordinatedDesign, PointsTask)

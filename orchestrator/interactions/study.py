@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from orchestrator.asked import names
 from orchestrator.cases.case import Case
-from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import ComponentTable, Value
+from orchestrator.cases.schema import ComponentTable
 from orchestrator.errors import CaseError, InputError, Problem
 from orchestrator.interactions.exchange import STAND_IN, exchanged_case, require_same_flow, voltages_of
 from orchestrator.interactions.places import Place, groups_of, places_of, vendors_of
@@ -57,7 +57,7 @@ class InteractionsPlan:
         tables = {name: table.model_dump(exclude_defaults=True) for name, table in exchanged.items()}
         files = {name: self.files[_content_name(table)] for name, table in exchanged.items()}
         voltages = {bus: (v.real, v.imag) for bus, v in voltages_of(self.prepared.power_flow).items()}
-        return SystemTask(self.study, self.request.frequency_range, tables, files, self.request.black_box, voltages)
+        return SystemTask(self.study, self.request.frequencies, tables, files, self.request.black_box, voltages)
 
 
 @dataclass
@@ -70,25 +70,13 @@ class InteractionsResult:
     stored: int = 0
 
 
-def plan_interactions(
-    case: Case,
-    request: InteractionsRequest,
-    scenario: str | None = None,
-    overrides: Mapping[str, Value] | None = None,
-    step_size: float | None = None,
-    parameters: Sequence[ParameterFile] = (),
-) -> InteractionsPlan:
+def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsPlan:
     """Check a study, and build the FMUs that it needs.
 
-    ``scenario``: name of the scenario; None for the only one.
-    ``overrides``: values by ``component.variable``; they go before the parameter files.
-    ``step_size``: communication step [s]; the case's where None.
-    ``parameters``: parameter files; a later one goes before an earlier one.
     Raises an `InputError` if the scenario, a place or a device is unknown, there are too many systems, or another
     device gives another power flow."""
-    name = _scenario(case, scenario)
-    (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
-    layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
+    name, layers, step_size = _scenario(case, request.scenario), request.layers, request.step_size
+    (prepared,) = case.prepare([name], request.overrides, step_size, None, request.files)
     components = case.placed(name, {}, layers)
     grid = None if case.table.power_flow is None else case.table.power_flow.grid
     places = places_of(components, grid)
@@ -99,9 +87,10 @@ def plan_interactions(
         )
     stand_in = request.stand_in or (f"{STAND_IN}_phasor" if _of_phasors(prepared, places) else STAND_IN)
     systems, swapped = systems_of_vendors(places, stand_in), tuple[str, ...]()
-    if request.swap:
-        swapped = _swapped(places, request.swapped)
-        systems |= assignments(places, swapped, request.devices)
+    devices = request.given_devices()
+    if request.swap or devices:
+        swapped = _swapped(places, names(request.places, "places"))
+        systems |= assignments(places, swapped, devices)
     files = _tried(case, prepared, layers, step_size, systems)
     groups = groups_of(components, places, grid)
     return InteractionsPlan(

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import combinations, product
 
+from orchestrator.cases.devices import Device
 from orchestrator.cases.schema import ComponentTable
 from orchestrator.errors import InputError
 from orchestrator.interactions.exchange import file_at, stand_in_at, vendors_device_at
 from orchestrator.interactions.places import Place, first_of, vendors_of
-from orchestrator.interactions.request import GivenDevice
 
 MOST_ASSIGNMENTS = 64
 """So many assignments of devices to places are computed at most: all of three devices at three places, with room."""
@@ -69,9 +69,7 @@ def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemNa
     return found | {SystemName(Kind.PAIR, pair): only(pair) for pair in combinations(vendors, 2)}
 
 
-def assignments(
-    places: Mapping[str, Place], at: Sequence[str], given: Sequence[GivenDevice]
-) -> dict[SystemName, Exchanged]:
+def assignments(places: Mapping[str, Place], at: Sequence[str], given: Sequence[Device]) -> dict[SystemName, Exchanged]:
     """Each device at each of some places, in all ways.
 
     Raises an `InputError` if there is nothing to swap, two devices have one name, or there are more than

@@ -16,12 +16,11 @@ from orchestrator.interactions.judgement import (
     plan_text,
 )
 from orchestrator.interactions.places import by_group
-from orchestrator.interactions.point import SharedMode, SystemTask
-from orchestrator.interactions.study import InteractionsResult, run_interactions
+from orchestrator.interactions.point import SharedMode
+from orchestrator.interactions.study import InteractionsResult
 from orchestrator.interactions.systems import Kind, SystemName
 from orchestrator.interactions.words import damping_text, frequency_text, sentences, stand_in_sentence, verdict_word
 from orchestrator.late import pd
-from orchestrator.points.study import PointStudy
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, paragraphs
 from orchestrator.report.notebook import page
@@ -214,7 +213,7 @@ def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
         "scenario": plan.prepared.name,
         "stand_in": plan.stand_in,
         "threshold_percent": 100 * plan.request.threshold,
-        "range_hz": list(plan.request.frequency_range),
+        "range_hz": list(plan.request.frequencies),
         "vendors": list(plan.vendors),
         "places": {name: place.vendor for name, place in plan.places.items()},
         "groups": groups,
@@ -345,6 +344,3 @@ def _colour(system: JudgedSystem) -> str:
     end = _GOOD if share > 0 else _BAD
     mixed = (round(m + (e - m) * abs(share)) for m, e in zip(_MIDDLE, end, strict=True))
     return "#" + "".join(f"{value:02x}" for value in mixed)
-
-
-STUDY = PointStudy(run_interactions, Interactions, SystemTask)

@@ -31,7 +31,7 @@ def verdict_of(judgement: JudgedInteractions) -> VerdictSentence:
 
 def modes_sentence(judgement: JudgedInteractions) -> str:
     plan, found = judgement.result.plan, judgement.interaction_modes
-    low, high = plan.request.frequency_range
+    low, high = plan.request.frequencies
     percent = f"{100 * plan.request.threshold:g} %"
     head = f"{len(found)} of {len(judgement.modes)} modes from {low:g} to {high:g} Hz are shared"
     tail = f" by two vendors or more, with {percent} each at least"

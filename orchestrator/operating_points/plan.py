@@ -1,9 +1,11 @@
 """The operating points and outages of a study, each point with each outage."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
+from orchestrator.asked import Names
 from orchestrator.cases.case import Case
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
@@ -14,6 +16,7 @@ from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import Outage, read_outages
 from orchestrator.operating_points.points_file import OperatingCase, read_points
+from orchestrator.points.request import OfCase
 
 _MOST = 1_000_000
 
@@ -35,27 +38,26 @@ class OperatingPoints:
 
 def read_operating_points(
     case: Case,
-    points: Path | None,
-    outages: str | None = None,
-    scenario: str | None = None,
-    overrides: Mapping[str, Value] | None = None,
-    step_size: float | None = None,
-    parameters: Sequence[ParameterFile] = (),
+    request: OfCase,
+    points: str | Path | None,
+    outages: Names | None,
+    scenario: str | None,
+    off: Mapping[str, Value] | None = None,
 ) -> OperatingPoints:
     """Prepare the scenario, which builds the FMUs that it needs, and read its points and outages.
 
     ``points``: CSV file with the operating points; None for the case's own.
     ``outages``: as `read_outages` takes them.
     ``scenario``: its name; the first one where None.
-    ``overrides``: values by ``component.variable`` that hold at every point.
-    ``step_size``: communication step [s]; the case's where None."""
+    ``off``: values that hold at every point, before those of the request."""
     name = scenario or next(iter(case.scenarios))
-    (prepared,) = case.prepare([name], overrides, step_size, None, parameters)
-    layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
+    overrides = {key: value for key, value in request.overrides.items() if key not in (off or {})} | dict(off or {})
+    (prepared,) = case.prepare([name], overrides, request.step_size, None, request.files)
+    layers = (*request.files, *([OptionValues.of(overrides)] if overrides else []))
     elements = Elements.of(prepared)
     own = OperatingCase("case", 1.0, {}, (), str(case.path))
-    rows = [own] if points is None else read_points(points, prepared, elements)
-    lost = read_outages(outages, elements)
+    rows = [own] if points is None else read_points(Path(points), prepared, elements)
+    lost = read_outages(cast("str | None", outages), elements)
     if len(rows) * len(lost) > _MOST:
         raise InputError(
             f"{points}: {len(rows)} operating points with {len(lost)} outages are {len(rows) * len(lost)}; at most "

@@ -5,7 +5,8 @@ The sensitivities are finite differences between two real linearisations, and th
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, MISSING, dataclass, replace
+from typing import Any
 
 from orchestrator.analysis.continuation import pair_at
 from orchestrator.analysis.examination import Examination
@@ -16,7 +17,6 @@ from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.asked import DAMPING, FLAG, GAIN, GAIN_BOUNDS, NAME, STAGES, asked
 from orchestrator.cases.case import Case
 from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import AnalysisError, InputError
@@ -35,7 +35,8 @@ from orchestrator.pod_design.lead_lag import (
 )
 from orchestrator.pod_design.margins import Margins, compute_margins
 from orchestrator.pod_design.refinement import Judgement, Refinement, refine
-from orchestrator.pod_design.target import Target, check_range, find_target, mode_name
+from orchestrator.pod_design.target import Target, check_range, find_target, mode_name, require_controllers
+from orchestrator.points.request import ANYTHING, OfCase, of_scenario, of_values
 from orchestrator.points.store import PointStore
 from orchestrator.study.modes import identified, running
 from orchestrator.study.naming import named_modes
@@ -47,17 +48,35 @@ _MET = 5e-4  # a requirement counts as met if the damping ratio falls short of i
 
 
 @dataclass(frozen=True)
-class DesignRequest:
-    """The requirements of a design; a required damping goes before a required increase of it."""
+class DesignRequest(OfCase):
+    """Design a POD controller by eigenvalue sensitivity, and check it on the closed loop.
 
-    controller: str
+    Raises
+    ------
+    InputError
+        If scenario, component, mode or requirement cannot be found or make no sense.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> design = gfor.load("two_area").design("pod_p", margins=False)
+    >>> design.met
+    True
+    >>> design.parameters["gfor.pod_p.K"]
+    200.0
+    """
+
+    controller: str = asked(ANYTHING, MISSING, '``"pod_p"`` or ``"pod_q"``', option=None)
+    scenario: str | None = of_scenario("its name; by default the one without this controller")
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
     component: str | None = asked(NAME, None, "the converter, or a pattern for several with one setting")
-    scenario: str | None = None
     mode: str | None = asked(NAME, None, "the case's mode to damp (default: its first)")
     damping: float | None = asked(DAMPING, None, "required damping, such as 20")
-    damping_increment: float = asked(
-        DAMPING, 0.10, "required increase of the damping in points (default: 10)", "POINTS"
-    )
+    damping_increment: float | None = asked(
+        DAMPING, None, "required increase of the damping in points (default: 10)", "POINTS",
+        python="required increase of the damping, in points and in the place of ``damping``",
+    )  # fmt: skip
     delta_gain: float = asked(GAIN, 50.0, "gain of the finite-difference sensitivity [pu] (default: 50)")
     gain_bounds: tuple[float, float] = asked(
         GAIN_BOUNDS, (200.0, 400.0), "bounds of the gain [pu] (default: 200:400; with --points 0:400)"
@@ -71,9 +90,12 @@ class DesignRequest:
     )
     refine: bool = asked(FLAG, False, "search gain and lead/lag on the closed loop as well")
     margins: bool = asked(FLAG, True, "compute the margins, which take longest", option=None)
-    overrides: Mapping[str, Value] = field(default_factory=dict)
-    parameters: Sequence[ParameterFile] = ()
-    step_size: float | None = None
+    progress: bool = asked(FLAG, False, "show a line with the stage that the design has come to", option=None)
+
+    @property
+    def increment(self) -> float:
+        """Required where no damping is."""
+        return 0.10 if self.damping_increment is None else self.damping_increment
 
 
 SearchOnLinearModels = Callable[
@@ -185,6 +207,9 @@ def design_pod(
 
     ``store``: keeps figures on the way as soon as they are there; those that are there already are not computed again.
     ``search``: gives a refinement settings to try; by default it surveys all itself."""
+    require_controllers([request.controller])
+    if request.damping is not None and request.damping_increment is not None:
+        raise InputError("--damping and --damping-increment both say what is required; give one of them")
     report("preparing the case")
     target = find_target(
         case,
@@ -193,14 +218,14 @@ def design_pod(
         pattern=request.component,
         stages=request.stages,
         overrides=request.overrides,
-        parameters=request.parameters,
+        parameters=request.files,
     )
     own: dict[str, Value] = {}
     for name in target.components:
         own |= {f"{name}.{request.controller}.enabled": False, f"{name}.{request.controller}.N_S": float(target.stages)}
     overrides = {key: value for key, value in request.overrides.items() if key not in own} | own
     name = mode_name(case, request.mode)
-    (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.parameters)
+    (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.files)
 
     def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
         fitting = named_modes(case, model, modes).fits.get(name)  # with a gain of any size, a tie counts as a change
@@ -346,7 +371,7 @@ def _unstable(stability: Stability) -> str | None:
 def _required(request: DesignRequest, initial: complex) -> float:
     """ζ_d, checked against the damping ratio without the controller."""
     present = damping_ratio(initial)
-    required = request.damping if request.damping is not None else present + request.damping_increment
+    required = request.damping if request.damping is not None else present + request.increment
     if required <= present:
         raise InputError(
             f"--damping {100 * required:g}: without the controller the mode has {100 * present:.2f} % already; "

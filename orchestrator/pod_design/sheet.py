@@ -97,7 +97,7 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
 
 
 def _requirement(d: PodDesign) -> str:
-    return "as asked for" if d.request.damping is not None else f"ζ₀ + {percent(d.request.damping_increment)}"
+    return "as asked for" if d.request.damping is not None else f"ζ₀ + {percent(d.request.increment)}"
 
 
 def _refinement(r: Refinement, required: float) -> Table:

@@ -13,6 +13,16 @@ from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 
 
+def require_controllers(controllers: Sequence[str]) -> None:
+    """Refuse a controller that there is not, and none."""
+    known = ", ".join(DAMPING_CONTROLLERS)
+    if not controllers:
+        raise InputError(f"controllers is empty; name one or both of {known}")
+    for controller in controllers:
+        if controller not in DAMPING_CONTROLLERS:
+            raise InputError(f"there is no controller {controller!r}; there are: {known}")
+
+
 @dataclass(frozen=True)
 class Target:
     """A scenario, and those of its components that get one common setting."""

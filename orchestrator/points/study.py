@@ -1,12 +1,15 @@
 """A study of many points, and where they are computed."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Concatenate, Generic, TypeVar
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, cast
 
+from rich.console import RenderableType
+
+from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cores import number_of_cores
 from orchestrator.errors import InputError
@@ -17,6 +20,7 @@ from orchestrator.points.processes import Processes
 from orchestrator.points.serial import Serial
 from orchestrator.points.task import Task
 
+Asks = ParamSpec("Asks")
 Plan = TypeVar("Plan")
 Result = TypeVar("Result")
 Shown = TypeVar("Shown")
@@ -44,10 +48,50 @@ def choose_executor(
     return Processes(workers, (_WORKER, *imports)) if workers > 1 else Serial()
 
 
-@dataclass(frozen=True)
-class PointStudy(Generic[Plan, Result, Shown]):
+def _nothing(shown: Any) -> Iterable[str]:
+    return ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(Generic[Asks, Shown]):
+    """What may be asked of a study of a case, and how a command shows what users get of it.
+
+    The class of its request says what it is; options, keywords and documentation come from there. What users get has
+    ``as_json`` and, where files are written, ``save``."""
+
+    request: Callable[Asks, Any]
+    parts: Callable[[Shown], Iterable[RenderableType]]  # for a terminal
+    # exit code of a command, which is told whether instability fails it
+    code: Callable[[Shown, bool], int] = lambda shown, fail_unstable: 0
+    counted: str = "points"  # what is counted, in words
+    warnings: Callable[[Shown], Iterable[str]] = _nothing
+    remarks: Callable[[Shown], Iterable[str]] = _nothing
+
+    @property
+    def asks(self) -> type:
+        """The class of the request."""
+        return cast("type", self.request)
+
+    @property
+    def of_several(self) -> bool:
+        """Whether it is of several scenarios, or of one."""
+        return hasattr(self.request, "scenarios")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyAtOnce(Study[Asks, Shown]):
+    """A study that computes all in this process, and keeps nothing on its way."""
+
+    compute: Callable[[Case, Any, CountReport], Shown]
+    prepared: Callable[[Shown], Sequence[PreparedScenario]]  # the scenarios that were computed
+    files: str = ""  # what is written into a folder, in words; nothing is where it is empty
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointStudy(Study[Asks, Shown], Generic[Asks, Plan, Result, Shown]):
     """A study of many points, from its plan to what users get."""
 
+    plan: Callable[[Case, Any], Plan]
     run: Callable[Concatenate[Plan, Work, ...], Result]  # computes all points of a plan
     shown: Callable[[Result], Shown]  # what users get of its result
     task: type[Task]  # whose module a worker imports

@@ -1,34 +1,69 @@
 """What is asked of a screening."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.asked import FILE, FLAG, FREQUENCIES, OUTAGES, FieldKind, asked, one_of, percent, read_percent
+from orchestrator.asked import FILE, FLAG, FREQUENCIES, OUTAGES, FieldKind, Names, asked, one_of, percent, read_percent
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import InputError
+from orchestrator.points.request import OverCluster, of_scenario, of_values
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 
 _MOST = 100 * MOST_DAMPING
-_DAMPING = FieldKind("PERCENT", partial(read_percent, most=_MOST), partial(percent, most=_MOST))
+_DAMPING = FieldKind("PERCENT", partial(read_percent, most=_MOST), partial(percent, most=_MOST), unit="%", times=100)
 
 
 @dataclass(frozen=True)
-class ScreeningRequest:
-    points: Path | None = asked(FILE, None, "operating points: a CSV file, a row each (default: the case as it is)")
-    outages: str | None = asked(
+class ScreeningRequest(OverCluster):
+    """Critical modes of many operating points, each with its outages.
+
+    Raises
+    ------
+    InputError
+        If points, outages, scenario or values cannot be used; with file and line of what is wrong in the points.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> from pathlib import Path
+    >>> lines = "time,grid.X_L", "00:00,0.1", "01:00,0.5"
+    >>> _ = Path("day.csv").write_text(chr(10).join(lines))
+    >>> screening = gfor.load("two_area").screen("day.csv", scenario="gfor")
+    >>> screening.stable
+    True
+    >>> screening.modes()[["point", "frequency_hz", "damping_percent"]].round(2)
+       point  frequency_hz  damping_percent
+    0  00:00          0.58            10.57
+    """
+
+    points: str | Path | None = asked(
+        FILE, None, "operating points: a CSV file, a row each (default: the case as it is)",
+        python="CSV file, a row each: a column ``time`` or ``name``, and what differs from the case; the case as it is "
+        "by default",
+    )  # fmt: skip
+    outages: Names | None = asked(
         OUTAGES, None, "n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)"
     )
-    sharing: SharingRule | None = asked(
+    scenario: str | None = of_scenario()
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
+    sharing: str | None = asked(
         one_of(SharingRule), None, "who feeds what an outage takes: droop (units by droop and rating, the default), "
         "rating, or slack (the slack alone)",
     )  # fmt: skip
     frequencies: tuple[float, float] = asked(
-        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range"
-    )
+        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range",
+        python="modes from the first to the second are critical [Hz], where they are damped less than ``damping``",
+    )  # fmt: skip
     damping: float = asked(_DAMPING, 0.2, "damping below which a mode is critical, at most 60 (default: 20)")
-    whole: bool = asked(FLAG, False, "count growing modes of all frequencies at every point; takes longer")
+    whole: bool = asked(
+        FLAG, False, "count growing modes of all frequencies at every point; takes longer",
+        python="whether growing modes of all frequencies are counted at every point, rather than at one in 24",
+    )  # fmt: skip
 
     @property
     def region(self) -> CriticalRegion:

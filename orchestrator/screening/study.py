@@ -1,14 +1,12 @@
 """A screening: operating points times outages, in stretches that are computed, kept, and joined."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
+from typing import cast
 
 from orchestrator.analysis.mode_tracking import match
 from orchestrator.cases.case import Case
-from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import Outage
@@ -19,6 +17,7 @@ from orchestrator.points.task import StudyCase
 from orchestrator.screening.modes import CriticalRegion
 from orchestrator.screening.point import StretchTask, compute_stretch
 from orchestrator.screening.record import ItemRecord, StretchRecord
+from orchestrator.screening.request import ScreeningRequest
 
 STRETCH = 48  # operating points with outages that are computed one from the other before the next full search
 
@@ -54,36 +53,18 @@ class ScreeningPlan(OperatingPoints):
         return len(self.items)
 
 
-def plan_screening(
-    case: Case,
-    points: Path | None,
-    outages: str | None = None,
-    scenario: str | None = None,
-    overrides: Mapping[str, Value] | None = None,
-    step_size: float | None = None,
-    wanted: CriticalRegion | None = None,
-    parameters: Sequence[ParameterFile] = (),
-    *,
-    whole: bool = False,
-    sharing: SharingRule | None = None,
-) -> ScreeningPlan:
-    """Check a screening, and build the FMUs that it needs.
-
-    The points and outages: as `read_operating_points` takes them.
-    ``wanted``: which modes are critical; from 0.1 to 2 Hz with less than 20 % damping where None.
-    ``whole``: whether growing eigenvalues are counted at all points, at all frequencies; otherwise at the ends of
-    stretches.
-    ``sharing``: how units share an outage; as the case says where None."""
-    read = read_operating_points(case, points, outages, scenario, overrides, step_size, parameters)
-    asked = wanted or CriticalRegion(0.1, 2.0, 0.2)
-    study = StudyCase.of(read.prepared, read.layers, step_size)
+def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
+    """Check a screening, and build the FMUs that it needs."""
+    region, sharing = request.region, cast("SharingRule | None", request.sharing)
+    read = read_operating_points(case, request, request.points, request.outages, request.scenario)
+    study = StudyCase.of(read.prepared, read.layers, request.step_size)
     tasks = []
     for first in range(0, len(read.items), STRETCH):
         part = read.items[first : first + STRETCH]
         point = read.points[part[0].point]
         anchor = Item(part[0].point, 0, point.values, point.out)
-        tasks.append(StretchTask(study, asked, anchor, part, whole, sharing))
-    return ScreeningPlan(**vars(read), wanted=asked, tasks=tuple(tasks))
+        tasks.append(StretchTask(study, region, anchor, part, request.whole, sharing))
+    return ScreeningPlan(**vars(read), wanted=region, tasks=tuple(tasks))
 
 
 @dataclass(frozen=True)

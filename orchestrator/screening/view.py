@@ -11,7 +11,6 @@ from rich.markup import escape as escape_markup
 
 from orchestrator.late import pd
 from orchestrator.operating_points.item import Status
-from orchestrator.points.study import PointStudy
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, colour, paragraphs
@@ -20,9 +19,8 @@ from orchestrator.report.table import Column, ColumnTable, Marked, damping
 from orchestrator.report.tables import eigenvalue_text
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import made_folder, write_text
-from orchestrator.screening.point import StretchTask
 from orchestrator.screening.stress import OutageRow, by_outage
-from orchestrator.screening.study import ScreenedItem, ScreeningResult, run_screening
+from orchestrator.screening.study import ScreenedItem, ScreeningResult
 from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration
 from orchestrator.screening.words import verdict_of, verdict_sentence, what_was_counted, where
 
@@ -355,6 +353,3 @@ def _ranking(summary: Summary) -> str:
         if (found := mode.worst.ranking())
     ]
     return "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"
-
-
-STUDY = PointStudy(run_screening, Screening, StretchTask)

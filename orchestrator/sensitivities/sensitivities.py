@@ -15,10 +15,11 @@ from orchestrator.analysis.coupled_state import CoupledState
 from orchestrator.analysis.eigenvalue_shift import eigenvalue_shift
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous, where_given
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
+from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.periodic import model_of
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.arrays import Numbers
+from orchestrator.asked import names as names_of
 from orchestrator.cases.idle_values import why_idle
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
@@ -28,6 +29,7 @@ from orchestrator.report.tables import first_few
 from orchestrator.sensitivities.derivative import Derivative, Shift, differentiate
 from orchestrator.sensitivities.limits_here import limits_that_act
 from orchestrator.sensitivities.parameters import SHARE, Parameter, parameters_of
+from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.study.modes import ModesResult, changed, modes_from, running
 
 CRITICAL = "critical"  # stands for the least damped mode of the range
@@ -114,31 +116,18 @@ def damping_change(eigenvalue: complex, change: complex) -> float:
     return float((eigenvalue.real * eigenvalue.imag * change.imag - eigenvalue.imag**2 * change.real) / size**3)
 
 
-def find_sensitivities(
-    prepared: PreparedScenario,
-    again: Again,
-    mode: str | None = None,
-    patterns: Sequence[str] = (),
-    *,
-    fixed: bool = False,
-    held: bool = False,
-    directional: bool = False,
-    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    report: Callable[[int, int], None] = lambda done, total: None,
-) -> SensitivityResult:
-    """Differentiate one mode by parameters.
-
-    ``mode``: name of one of the case's modes, or ``critical`` for the least damped one of the range; by default the
-    first named one, else the critical one.
-    ``held``: hold the operating point, which leaves the tunable parameters alone.
-    ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation.
-    ``frequency_range``: in which the mode is [Hz]."""
+def find_sensitivities(prepared: PreparedScenario, again: Again, request: SensitivitiesRequest) -> SensitivityResult:
+    """Differentiate one mode by parameters."""
+    mode, held, directional = request.mode, request.held, request.directional
+    patterns, report = names_of(request.parameters, "parameters"), request.report
+    if held and request.fixed:
+        raise InputError("--held holds the operating point, which a fixed parameter moves; give one of them")
     with running(prepared) as master:
         point = find_operating_point(master)
         blocks = Blocks(master, derivatives=True, directional=directional)
-        found = modes_from(prepared, master, point, blocks, frequency_range)
+        found = modes_from(prepared, master, point, blocks, request.frequencies)
         chosen = _chosen(found, mode)
-        parameters = parameters_of(master, patterns, fixed=fixed)
+        parameters = parameters_of(master, patterns, fixed=request.fixed)
         at = _Mode(found.model, where_given(lambda: continuous(blocks)) if blocks.serves_continuous else None, chosen)
         rows: dict[Parameter, Sensitivity] = {}
         anew: list[Parameter] = []

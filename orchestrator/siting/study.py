@@ -2,23 +2,23 @@
 
 import cmath
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
+from typing import Any, cast
 
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.arrays import Vector
-from orchestrator.asked import FILE, FREQUENCIES, NAME, OUTAGES, POSITIVE, RANKED, asked
+from orchestrator.asked import FILE, FREQUENCIES, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
 from orchestrator.cases.case import Case
-from orchestrator.cases.layers import OptionValues
-from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import ComponentTable, Value
+from orchestrator.cases.schema import ComponentTable
 from orchestrator.errors import CosimError, InputError
 from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import INTACT, read_outages
 from orchestrator.operating_points.preparation import ItemPreparation, failure
+from orchestrator.points.request import OfCase, of_scenario, of_values
 from orchestrator.sensitivities.sensitivities import damping_change
 from orchestrator.siting.confirmation import Confirmation, confirmed
 from orchestrator.siting.placing import converter, foreign, name_at, placed
@@ -28,32 +28,63 @@ from orchestrator.study.modes import running
 
 PODS = {"pod_p": ACTIVE, "pod_q": REACTIVE}
 DROOP = "droop"
+_DEVICE = FieldKind("DEVICE", str, lambda given, argument: str(text_or_none(str(given), argument)))
 HARDLY = 0.02  # A bus that moves a mode by less than this part of what the best bus does hardly reaches it
 
 
 @dataclass(frozen=True)
-class SiteRequest:
-    """What is asked; shifts are those of the least damped mode where none is damped less than ``below``."""
+class SiteRequest(OfCase):
+    """Where to put a converter: how far support at each bus moves each poorly damped mode.
 
-    device: str = asked(NAME, "pod_p", "pod_p (default), pod_q, droop, or a vendor's .fmu", "DEVICE")
-    binding: Path | None = asked(FILE, None, "binding of the vendor's FMU")
-    scenario: str | None = None
-    below: float = asked(POSITIVE, 10.0, "damping of poorly damped modes (default: 10)", "PERCENT")
+    Residues of the whole linear model between the frequency of a bus and P or Q injected there; the operating
+    point stays. The best buses are confirmed: a converter at rest is put there as an FMU, its POD is tuned, and
+    the coupled system's mode is compared.
+
+    Raises
+    ------
+    InputError
+        If the case has no network, no oscillation is in the range, or the device cannot be used.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> places = gfor.load("two_area_rms").site("pod_p", scenario="gfor", confirm=1)
+    >>> places.ranking, places.agrees
+    (('bus_2', 'bus_3'), True)
+    """
+
+    device: str | Path = asked(_DEVICE, "pod_p", "pod_p (default), pod_q, droop, or a vendor's .fmu")
+    scenario: str | None = of_scenario()
+    values: Mapping[str, Any] | None = of_values()
+    _: KW_ONLY
+    binding: str | Path | None = asked(FILE, None, "binding of the vendor's FMU")
+    below: float = asked(
+        POSITIVE, 10.0, "damping of poorly damped modes (default: 10)", "PERCENT",
+        python="damping [%] of the modes that are looked at; the least damped one where none is damped so little",
+    )  # fmt: skip
     frequencies: tuple[float, float] = asked(
         FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range"
     )
-    outages: str | None = asked(OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)")
-    confirm: int = asked(RANKED, 3, "confirm the best N by coupled FMUs (default: 3)")
-    rating: float = asked(POSITIVE, 100.0, "of the converter that confirms (default: 100)", "MVA")
+    outages: Names | None = asked(OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)")
+    confirm: int = asked(RANKED, 3, "confirm the best N by coupled FMUs (default: 3)", python="how many of the best "
+                         "buses are confirmed by coupled FMUs")  # fmt: skip
+    rating: float = asked(POSITIVE, 100.0, "of the converter that confirms (default: 100)", "MVA",
+                          python="of the converter that confirms [MVA]")  # fmt: skip
     gain: float = asked(POSITIVE, 200.0, "largest of its POD [pu of its rating] (default: 200)", "K")
-    overrides: Mapping[str, Value] = field(default_factory=dict)
-    parameters: Sequence[ParameterFile] = ()
-    step_size: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The device as text."""
+        return str(self.device)
+
+    @property
+    def binding_file(self) -> Path | None:
+        return None if self.binding is None else Path(self.binding)
 
     @property
     def controller(self) -> str | None:
         """The POD that is tuned; None for a device that is as it is."""
-        return self.device if self.device in PODS else None
+        return self.name if self.device in PODS else None
 
     @property
     def is_foreign(self) -> bool:
@@ -116,13 +147,12 @@ class SiteResult:
 
 def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], None] = lambda a, b: None) -> SiteResult:
     """Linearise the case with and without outages, shift its modes by a device at every bus, and confirm the best."""
-    if request.is_foreign and not request.device.lower().endswith(".fmu"):
+    if request.is_foreign and not request.name.lower().endswith(".fmu"):
         raise InputError(f"--device {request.device}: give pod_p, pod_q, droop or the path of an .fmu")
     scenario = request.scenario or next(iter(case.scenarios))
     open_case = replace(case, injections=True)
-    layers = (*request.parameters, *([OptionValues.of(request.overrides)] if request.overrides else []))
-    preparation = ItemPreparation(open_case, scenario, layers, request.step_size)
-    outages = read_outages(request.outages, preparation.elements)
+    preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
+    outages = read_outages(cast("str | None", request.outages), preparation.elements)
     total = len(outages) + request.confirm
     situations, not_judged = [], dict[str, str]()
     for k, outage in enumerate(outages):
@@ -156,7 +186,7 @@ def _shifted(
     elif request.device == DROOP:
         shifts[DEVICE] = _all_shifts(situations, _ideal(ACTIVE), tuned=False)
     else:
-        shifts[DEVICE] = shifts[PODS[request.device]]
+        shifts[DEVICE] = shifts[PODS[request.name]]
     found = SiteResult(case, request, tuple(situations), shifts, (), not_judged)
     buses = [bus for bus in situations[0].voltages if all(bus in s.voltages for s in situations)]
     return replace(found, ranking=tuple(sorted(buses, key=lambda bus: -found.least(bus)[0])))
@@ -189,7 +219,7 @@ def _of_foreign(
     intact = situations[0]
     there = active[intact.name][intact.modes[0].label]
     bus = max(there, key=lambda name: abs(there[name].change))
-    prepared = _prepared(placed(case, foreign(Path(request.device), request.binding), [bus]), request, scenario)
+    prepared = _prepared(placed(case, foreign(Path(request.device), request.binding_file), [bus]), request, scenario)
     with running(prepared) as master:
         find_operating_point(master)
         model = Blocks(master).components[name_at(bus)]
@@ -204,14 +234,14 @@ def _of_foreign(
 
 
 def _prepared(case: Case, request: SiteRequest, scenario: str) -> PreparedScenario:
-    (prepared,) = case.prepare([scenario], dict(request.overrides), request.step_size, None, request.parameters)
+    (prepared,) = case.prepare([scenario], request.overrides, request.step_size, None, request.files)
     return prepared
 
 
 def _with_confirmations(result: SiteResult, scenario: str, report: Callable[[int], None]) -> SiteResult:
     request, seen = result.request, result.intact.modes[0]
     device: ComponentTable = (
-        foreign(Path(request.device), request.binding)
+        foreign(Path(request.device), request.binding_file)
         if request.is_foreign
         else converter(result.prepared, request.rating, request.controller)
     )

@@ -106,7 +106,7 @@ def shown(result: SiteResult, damping: float) -> str:
 
 
 def device_title(result: SiteResult) -> str:
-    return TITLES.get(result.request.device, Path(result.request.device).name)
+    return TITLES.get(result.request.name, Path(result.request.device).name)
 
 
 def answer(result: SiteResult) -> str:

@@ -4,15 +4,14 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 
 from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.cases.build_choices import ALPHA
 from orchestrator.cases.case import Case
 from orchestrator.cases.idle_values import Idle, idle_everywhere
-from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -22,6 +21,7 @@ from orchestrator.points.task import StudyCase
 from orchestrator.sweep.axes import Axis, Vary, grid_places, refuse_doubles, resolve
 from orchestrator.sweep.limit import COARSE, Ending, ParameterLimit, Until, least_damping, mode_behind, search
 from orchestrator.sweep.point import PointRecord, SweepPointTask, compute_point
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.trajectories import GridPlace, Trajectory, find_trajectories
 
 REFINEMENTS = 5  # how often the way between two points is halved where a mode is not recognised from one to the other
@@ -117,30 +117,15 @@ class SweepResult:
                     yield sweep, place, error
 
 
-def plan_sweep(
-    case: Case,
-    vary: Sequence[Vary],
-    scenarios: Sequence[str] = (),
-    overrides: Mapping[str, Value] | None = None,
-    step_size: float | None = None,
-    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    parameters: Sequence[ParameterFile] = (),
-    until: Until | None = None,
-) -> SweepPlan:
-    """Check a sweep, and build the FMUs that it needs.
-
-    ``vary``: The varied parameters, one for each axis. Modes are followed along the last axis.
-    ``scenarios``: Names; all of them where empty.
-    ``overrides``: Values by ``component.variable`` that hold at every point; they go before the parameter files.
-    ``step_size``: Communication step [s]; the case's where None.
-    ``frequency_range``: Modes of these frequencies are followed [Hz].
-    ``parameters``: Parameter files whose values hold at every point; a later one goes before an earlier one.
-    ``until``: Search for the limit along the range of the only parameter."""
+def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
+    """Check a sweep, and build the FMUs that it needs."""
+    vary, until = cast("Sequence[Vary]", request.vary), cast("Until | None", request.until)
+    if not vary:
+        raise InputError("nothing is varied; give --vary, such as --vary grid.X_L=0.1:0.5:9, or --scr bus_9=5:1.2:5")
     vary = vary if until is None else [_searched(vary)]
-    prepared = case.prepare(scenarios, overrides, step_size, None, parameters)
-    layers = (*parameters, *([OptionValues.of(overrides)] if overrides else []))
+    prepared = case.prepare(request.scenarios, request.overrides, request.step_size, None, request.files)
     axes = tuple(resolve(one, prepared) for one in vary)
-    plan = SweepPlan(case, axes, tuple(prepared), layers, step_size, frequency_range, until=until)
+    plan = SweepPlan(case, axes, tuple(prepared), request.layers, request.step_size, request.frequencies, until=until)
     refuse_doubles(axes, prepared)
     ends = [plan.values(tuple(end % len(axis.values) for axis in axes)) for end in (0, -1)]
     idle = [_check_end(plan, varied) for varied in (ends if any(axis.key == ALPHA for axis in axes) else ends[:1])]

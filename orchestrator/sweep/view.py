@@ -7,14 +7,12 @@ from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.late import pd, xr
-from orchestrator.points.study import PointStudy
 from orchestrator.report.notebook import Axes, axes_or_new, page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 from orchestrator.sweep.dataset import Samples, save_sweep, sweep_dataset, sweep_json
-from orchestrator.sweep.point import SweepPointTask
-from orchestrator.sweep.sweep import SweepResult, run_sweep
+from orchestrator.sweep.sweep import SweepResult
 
 
 class ParameterSweep:
@@ -171,6 +169,3 @@ class ParameterSweep:
         words = {True: "stable at all points", False: "UNSTABLE at some points", None: "stability not known"}
         lines = [self._points(), *(f"{s.prepared.title}: {words[s.stable]}" for s in self.result.scenarios)]
         return page(repr(self).strip("<>").partition(":")[0], lines, self.table())
-
-
-STUDY = PointStudy(run_sweep, ParameterSweep, SweepPointTask, lambda plan: plan.scenarios)

@@ -21,6 +21,7 @@ from orchestrator.cli.check import _in_one_line
 from orchestrator.errors import CaseError
 from orchestrator.fmi.protection import NAMES
 from orchestrator.sweep.axes import parse_vary
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep
 from tests.acceptance.gallery.build import build
 from tests.acceptance.gallery.hostile import entities
@@ -258,7 +259,7 @@ def test_a_sweep_computes_anew_what_a_changed_binding_or_fmu_decides(gallery, ca
     path = case(fmu, binding)
 
     def key():
-        plan = plan_sweep(load_case(path), [parse_vary("grid.X_L=0.1,0.3")])
+        plan = plan_sweep(load_case(path), SweepRequest([parse_vary("grid.X_L=0.1,0.3")]))
         return plan.task(plan.scenarios[0], (1,)).key
 
     first, text = key(), binding.read_text(encoding="utf-8")

@@ -17,6 +17,7 @@ from orchestrator.operating_points.item import Status
 from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
 
 SAID = "states that nothing moves and that move nothing, as of a controller that is off: grid.clock.t; their zeros"
@@ -47,8 +48,10 @@ def test_screenings_and_designs_tell_it_at_their_points(monkeypatch, tmp_path):
     monkeypatch.setattr(LinearModel, "clocks", 0)  # its zero is not there
     case, store = load_case("two_area"), PointStore(tmp_path / "points")
     (tmp_path / "points.csv").write_text("name\nonly\n")
-    (item,) = run_screening(plan_screening(case, tmp_path / "points.csv", None, "gfor"), Work(Serial(), store)).items
-    plan = plan_points_design(case, PointsDesignRequest(("pod_p",), ranked=0), tmp_path / "points.csv", None)
+    (item,) = run_screening(
+        plan_screening(case, ScreeningRequest(tmp_path / "points.csv", None, "gfor")), Work(Serial(), store)
+    ).items
+    plan = plan_points_design(case, PointsDesignRequest(tmp_path / "points.csv", ranked=0))
     (found,) = modes_at(plan, plan.off, (), Work(Serial(), store))
     for warnings in (item.record.warnings, found.warnings):
         assert any("gfor.off.x; their zeros are not counted" in text for text in warnings)

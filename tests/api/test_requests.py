@@ -1,24 +1,31 @@
 """A request says once what may be asked; options and keywords come from it."""
 
 import argparse
-from dataclasses import dataclass
+import inspect
+from dataclasses import dataclass, fields
 
 import pytest
 
-from orchestrator.api.studies import Wanted, WantedInteractions, WantedOverPoints, WantedPlaces
+from orchestrator.api.case import Case
+from orchestrator.api.scenario import Scenario
 from orchestrator.asked import DAMPING, FLAG, NAMES, STAGES, asked, asked_of, checked
 from orchestrator.cli.arguments import add_request_arguments, asked_by
 from orchestrator.coordinated_design.study import PointsDesignRequest
 from orchestrator.errors import InputError
 from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.pod_design.design import DesignRequest
+from orchestrator.screening.request import ScreeningRequest
+from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.siting.study import SiteRequest
+from orchestrator.study.request import ModesRequest, StepsRequest
+from orchestrator.sweep.request import SweepRequest
+from tests.test_docstrings import explained
 
 
 @dataclass(frozen=True)
 class Some:
     damping: float | None = asked(DAMPING, None, "wanted")
-    least: float = asked(DAMPING, 0.05, "of others", option="--min-damping", keyword="least_damping")
+    least_damping: float = asked(DAMPING, 0.05, "of others", option="--min-damping")
     stages: int = asked(STAGES, 2, "of the filter")
     names: tuple[str, ...] = asked(NAMES, ("all",), "of converters", option="--name")
     refine: bool = asked(FLAG, False, "search")
@@ -58,14 +65,28 @@ def test_a_field_without_an_option_is_set_in_python_alone():
 
 
 @pytest.mark.parametrize(
-    ("request_class", "wanted", "files"),
+    ("method", "request_class"),
     [
-        (InteractionsRequest, WantedInteractions, {"devices", "bindings"}),
-        (DesignRequest, Wanted, set()),
-        (PointsDesignRequest, WantedOverPoints, set()),
-        (SiteRequest, WantedPlaces, set()),
+        (Case.sweep, SweepRequest),
+        (Case.screen, ScreeningRequest),
+        (Case.interactions, InteractionsRequest),
+        (Case.site, SiteRequest),
+        (Case.design, DesignRequest),
+        (Case.design_over_points, PointsDesignRequest),
+        (Scenario.modes, ModesRequest),
+        (Scenario.sensitivities, SensitivitiesRequest),
+        (Scenario.steps, StepsRequest),
     ],
 )
-def test_the_keywords_that_editors_see_are_those_of_the_request(request_class, wanted, files):
-    keywords = {one.keyword for one in asked_of(request_class).values()}
-    assert (keywords | files) - {"device"} == set(wanted.__annotations__)
+def test_a_method_has_the_keywords_and_the_words_of_its_request(method, request_class):
+    """What `help` and notebooks show; type checkers take it from the class of the request itself."""
+    keywords = list(inspect.signature(method).parameters)[1:]
+    assert sorted(keywords) == sorted(asked_of(request_class))
+    assert sorted(explained(inspect.cleandoc(method.__doc__))) == sorted(keywords)
+    by_place = [one.name for one in fields(request_class) if not one.kw_only]
+    assert keywords[: len(by_place)] == by_place
+
+
+def test_defaults_are_shown_in_pythons_units():
+    assert inspect.signature(Case.screen).parameters["damping"].default == 20
+    assert inspect.signature(Case.design).parameters["least_damping"].default == 5

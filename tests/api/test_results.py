@@ -176,9 +176,9 @@ def test_a_design_is_made_with_the_step_files_and_values_that_are_given(two_area
         pass
 
     def prepared(case, request, *_):
-        raise PreparedError(request.step_size, [one.values for one in request.parameters], dict(request.overrides))
+        raise PreparedError(request.step_size, [one.values for one in request.files], dict(request.overrides))
 
-    monkeypatch.setattr("orchestrator.api.studies.design_pod", prepared)
+    monkeypatch.setattr("orchestrator.coordinated_design.one_point.design_pod", prepared)
     with pytest.raises(PreparedError) as seen:
         two_area.design("pod_p", values={"gfor.P_0": 0.4}, step="50 us", parameters=file)
     assert seen.value.args == (5e-5, [{"grid.X_L": 0.15}], {"gfor.P_0": 0.4})

@@ -16,6 +16,7 @@ from orchestrator.operating_points.item import Status
 from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
 
 
@@ -35,7 +36,7 @@ def load_points(path, count):
 
 def screened(case, scenario, points, outages, folder):
     """Items, those with modes, and processor time of one screening, its FMUs built before [s]."""
-    plan = plan_screening(case, points, outages, scenario)
+    plan = plan_screening(case, ScreeningRequest(points, outages, scenario))
     before = processor_seconds()
     with alone():
         result = run_screening(plan, Work(Serial(), PointStore(folder)))

@@ -29,11 +29,12 @@ def sweep(points: int, executor: str, folder: str) -> None:
     from orchestrator.points.study import choose_executor  # noqa: PLC0415
     from orchestrator.sweep.axes import parse_vary  # noqa: PLC0415
     from orchestrator.sweep.point import SweepPointTask  # noqa: PLC0415
+    from orchestrator.sweep.request import SweepRequest  # noqa: PLC0415
     from orchestrator.sweep.sweep import plan_sweep, run_sweep  # noqa: PLC0415
 
     where = (int(executor), None) if executor.isdigit() else (None, executor)
     chosen = choose_executor(*where, [SweepPointTask.__module__])
-    plan = plan_sweep(load_case("two_area"), [parse_vary(f"grid.X_L=0.01:0.6:{points}")])
+    plan = plan_sweep(load_case("two_area"), SweepRequest([parse_vary(f"grid.X_L=0.01:0.6:{points}")]))
     start = time.perf_counter()
     result = run_sweep(plan, Work(chosen, PointStore(Path(folder))))
     chosen.close()

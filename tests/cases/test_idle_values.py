@@ -6,6 +6,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.idle_values import idle_everywhere, idle_values, why_idle
 from orchestrator.coupling.system import System
 from orchestrator.sweep.axes import parse_vary
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep
 
 CASE = load_case("two_area")
@@ -53,5 +54,5 @@ def test_lead_and_lag_of_a_gain_of_0_and_what_is_connected_with_nothing():
 
 @pytest.mark.parametrize(("scenarios", "told"), [(["gfor"], 1), (["gfor", "pod_p"], 0)])
 def test_a_sweep_tells_of_an_axis_that_acts_in_no_scenario(scenarios, told):
-    plan = plan_sweep(CASE, [parse_vary("gfor.pod_p.K=100:200:3")], scenarios)
+    plan = plan_sweep(CASE, SweepRequest([parse_vary("gfor.pod_p.K=100:200:3")], scenarios))
     assert [str(q).startswith("--vary gfor.pod_p.K: gfor.pod_p.K cannot act") for q in plan.idle] == [True] * told

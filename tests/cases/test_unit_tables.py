@@ -6,6 +6,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import read_parameter_file
 from orchestrator.errors import CaseError
 from orchestrator.sweep.axes import parse_vary
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep
 from tests.cases.test_network_sources import SMALL
 
@@ -112,8 +113,7 @@ def test_whose_share_counts(case, scenario, overrides, shares):
 def test_whose_share_counts_in_a_sweep(case, tmp_path, vary, fixed, shares):
     (tmp_path / "pf.toml").write_text('[set]\n"units.alpha.20" = 0.5\n', encoding="utf-8")
     file = read_parameter_file(tmp_path / "pf.toml")
-    planned = plan_sweep(case(), [parse_vary(vary)], ["plain"], fixed, None,
-                         parameters=[file])  # fmt: skip
+    planned = plan_sweep(case(), SweepRequest([parse_vary(vary)], ["plain"], fixed, parameters=[file]))
     task = planned.task(planned.scenarios[0], (0,))
     (ready,) = planned.case.prepare([task.scenario], task.overrides, None, None, task.study.layers)
     v = ready.values

@@ -53,7 +53,7 @@ def points(tmp_path):
 @pytest.fixture
 def planned(case, points):
     def plan(*controllers, outages=None, **wanted):
-        return plan_points_design(case, PointsDesignRequest(controllers, ranked=0, **wanted), points, outages)
+        return plan_points_design(case, PointsDesignRequest(points, controllers, outages, ranked=0, **wanted))
 
     return plan
 
@@ -80,7 +80,7 @@ def test_a_closed_loop_is_that_of_the_fmus(name, points, store, monkeypatch):
 
     Phasor converters know the communication step, and their POD-Q acts on an output at once.
     """
-    plan = plan_points_design(load_case(name), PointsDesignRequest(("pod_p", "pod_q"), ranked=0), points, None)
+    plan = plan_points_design(load_case(name), PointsDesignRequest(points, ("pod_p", "pod_q"), ranked=0))
     setting = {
         P: PodSetting(90.0, lead_lag_turning(-40.0, 4.0, 2)),
         Q: PodSetting(150.0, lead_lag_turning(25.0, 3.0, 2)),
@@ -176,8 +176,8 @@ def test_a_point_that_a_nominal_design_destabilises_is_seen(case, tmp_path, stor
     for name, rows in (("nominal", "short,0.02\n"), ("all", "short,0.02\nlong,0.6\n")):
         path = tmp_path / f"{name}.csv"
         path.write_text(f"name,grid.X_L\n{rows}")
-        request = PointsDesignRequest(("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
-        verdicts[name] = design_over_points(plan_points_design(case, request, path), Work(Serial(), store)).verdict
+        request = PointsDesignRequest(path, ("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
+        verdicts[name] = design_over_points(plan_points_design(case, request), Work(Serial(), store)).verdict
     assert verdicts["nominal"].stable is True
     assert verdicts["all"].stable is False
     assert [one.point.name for one in verdicts["all"].unstable] == ["long"]
@@ -218,8 +218,8 @@ def test_harm_that_the_search_did_not_show_is_told(case, tmp_path, store, monkey
     monkeypatch.setattr(study, "_frequency", lambda points: 3.6)
     path = tmp_path / "long.csv"
     path.write_text("name,grid.X_L\nlong,0.6\n")
-    request = PointsDesignRequest(("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
-    verdict = design_over_points(plan_points_design(case, request, path), Work(Serial(), store)).verdict
+    request = PointsDesignRequest(path, ("pod_p",), gain_bounds=(0.0, 4000.0), ranked=0, least_damping=0.0)
+    verdict = design_over_points(plan_points_design(case, request), Work(Serial(), store)).verdict
     assert verdict.stable is False
     assert len(verdict.unforeseen) == blind
     assert any("its linear models showed no harm to other modes, and there is" in t for t in remarks(verdict)) is blind
@@ -378,7 +378,7 @@ def test_a_column_for_what_is_designed_is_refused(case, tmp_path):
     path = tmp_path / "points.csv"
     path.write_text("name,gfor.pod_p.K\na,100\n")
     with pytest.raises(InputError, match=r"gfor\.pod_p\.K sets what is to be designed"):
-        plan_points_design(case, PointsDesignRequest(("pod_p",)), path)
+        plan_points_design(case, PointsDesignRequest(path))
 
 
 @pytest.mark.parametrize(

@@ -36,16 +36,14 @@ def written(name, *changes):
     return path
 
 
-def studied(path=None, overrides=None, **wanted):
+def studied(path=None, values=None, **wanted):
     """A study of the park, or of another case."""
-    plan = plan_interactions(
-        load_case(path or folder() / "park.toml"), InteractionsRequest(**wanted), overrides=overrides
-    )
+    plan = plan_interactions(load_case(path or folder() / "park.toml"), InteractionsRequest(values=values, **wanted))
     return Interactions(run_interactions(plan, Work(Serial(), PointStore(folder() / "points"))))
 
 
 park = cache(studied)
 """The guide's study, computed once."""
 
-swapped = cache(lambda: studied(swap=True, swapped=("west", "east")))
+swapped = cache(lambda: studied(swap=True, places=("west", "east")))
 """A and B at both of their places."""

@@ -44,7 +44,7 @@ def test_words_files_and_what_is_kept(gfor, results):
     [
         (("--place", "east"), "--place says where devices are swapped; give --swap or a --device as well"),
         (("--binding", "a.toml"), "--binding is of a --device"),
-        (("--scenario", "a", "--scenario", "b"), "interactions are those of one scenario"),
+        (("--scenario", "a", "--scenario", "b"), "gfor interactions is for one scenario"),
         (("--device", "none.fmu"), "none.fmu"),
         (("--threshold", "0.05"), "'0.05' is read in percent; write 5 for a ratio of 0.05"),
     ],

@@ -5,10 +5,11 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.cases.devices import Device
 from orchestrator.interactions.exchange import exchanged_case, stand_in_at, vendors_device_at
 from orchestrator.interactions.places import GENERATORS, GRID, places_of
 from orchestrator.interactions.point import compute_system
-from orchestrator.interactions.request import GivenDevice, InteractionsRequest
+from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.interactions.systems import NONE, Kind, SystemName
 from orchestrator.study.modes import compute_modes
@@ -37,13 +38,13 @@ def test_the_stand_in_neither_damps_nor_excites_a_swing():
 
 
 def test_a_network_of_phasors_has_a_stand_in_of_its_own():
-    plan = plan_interactions(load_case("two_area_rms"), InteractionsRequest(), "gfor")
+    plan = plan_interactions(load_case("two_area_rms"), InteractionsRequest("gfor"))
     assert plan.stand_in == "static_generation_phasor"
     assert plan.groups == {"gfor": "gfor_phasor", "sg1": GENERATORS, "sg2": GENERATORS, "grid": GRID}
 
 
 def test_converters_of_units_are_exchanged_as_well():
-    plan = plan_interactions(load_case("wscc9"), InteractionsRequest(), "gfor", {"units.alpha.3": 0.5})
+    plan = plan_interactions(load_case("wscc9"), InteractionsRequest("gfor", {"units.alpha.3": 0.5}))
     assert {name: place.vendor for name, place in plan.places.items()} == {"gfor3": "gfor"}
     (prepared,) = exchanged_case(plan.case, plan.systems[NONE]).prepare(
         [plan.prepared.name], {}, None, None, plan.layers
@@ -54,8 +55,8 @@ def test_converters_of_units_are_exchanged_as_well():
 
 def test_a_device_behind_a_binding_is_given_what_it_knows_and_damps_as_without(fmu_path, tmp_path):
     (tmp_path / "d.toml").write_text(GFOR_RATED, encoding="utf-8")
-    given = GivenDevice("D", fmu_path("gfor"), tmp_path / "d.toml")
-    request = InteractionsRequest(swap=True, devices=(given,), swapped=("east", "north"))
+    given = Device("D", fmu_path("gfor"), tmp_path / "d.toml")
+    request = InteractionsRequest(swap=True, devices=(given,), places=("east", "north"))
     plan = plan_interactions(load_case(folder() / "park.toml"), request)
     bound, own = (
         compute_system(plan.task(plan.systems[SystemName(Kind.ASSIGNMENT, (device, "C"))])) for device in "DC"

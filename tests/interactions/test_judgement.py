@@ -132,7 +132,7 @@ def test_a_component_that_was_identified_is_named():
 def test_different_settings_of_one_vendor_are_named():
     assert not swapped().warnings or not any("other settings" in text for text in swapped().warnings)
     path = written("same.toml", ('vendor = "B"', 'vendor = "A"'))
-    found = studied(path, swap=True, swapped=("north", "east"))
+    found = studied(path, swap=True, places=("north", "east"))
     assert any("A's converters have other settings at west than at east" in text for text in found.warnings)
 
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.cases.devices import Device
 from orchestrator.errors import CaseError, ErrorKind, InputError
 from orchestrator.interactions.exchange import stand_in_at
 from orchestrator.interactions.point import SystemRecord, compute_system
-from orchestrator.interactions.request import GivenDevice, InteractionsRequest
+from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
 from orchestrator.interactions.view import Interactions
@@ -79,8 +80,8 @@ def test_equal_places_may_change_their_devices():
 
 def test_an_identical_file_gives_the_same_figures(fmu_path, tmp_path):
     copied = shutil.copyfile(fmu_path("gfl"), tmp_path / "copy.fmu")
-    device = GivenDevice("copy", copied, None, {"reactive_power.mode": 1.0, "pll.f_0": 20.0})
-    found = studied(swap=True, devices=(device,), swapped=("east",)).judgement.systems
+    device = Device("copy", copied, None, {"reactive_power.mode": 1.0, "pll.f_0": 20.0})
+    found = studied(swap=True, devices=(device,), places=("east",)).judgement.systems
     own, same = found[assigned("B")].record, found[assigned("copy")].record
     assert same.modes == own.modes
     assert same.stability == own.stability
@@ -146,7 +147,7 @@ def test_a_system_at_another_operating_point_has_no_verdict():
 
 
 def test_what_grows_outside_of_the_range_counts():
-    found = studied(frequency_range=(0.1, 10.0)).judgement
+    found = studied(frequencies=(0.1, 10.0)).judgement
     assert max(mode.frequency_hz for mode in found.systems[pair("A", "B")].record.modes) <= 10.0
     assert found.worst_pair.vendors == ("A", "B")
     assert found.worst_pair.joint.least_damping == pytest.approx(-9.50, abs=0.01)
@@ -155,7 +156,7 @@ def test_what_grows_outside_of_the_range_counts():
 def test_values_stay_with_the_device_that_they_were_given_to():
     values = {"east.pll.f_0": 12.0, "*.pll.xi": 0.8, "*.native": False}
     plan = plan_interactions(
-        load_case(folder() / "park.toml"), InteractionsRequest(swap=True, swapped=("west", "east")), overrides=values
+        load_case(folder() / "park.toml"), InteractionsRequest(swap=True, places=("west", "east"), values=values)
     )
     tables = plan.systems[assigned("B", "A")]
     assert tables["west"].parameters["pll.f_0"] == 12.0
@@ -180,7 +181,7 @@ def test_another_file_of_the_same_name_is_computed_anew(fmu_path, tmp_path):
     target, keys = tmp_path / "device.fmu", []
     for model in ("gfl", "gfl_l2ep"):
         shutil.copyfile(fmu_path(model), target)
-        plan = planned(swap=True, devices=(GivenDevice("D", target),), swapped=("east",))
+        plan = planned(swap=True, devices=(Device("D", target),), places=("east",))
         keys.append(plan.task(plan.systems[assigned("D")]).key)
     assert keys[0] != keys[1]
 
@@ -204,8 +205,8 @@ def test_a_device_that_is_identified_damps_as_with_its_states(fmu_path, tmp_path
         for name in old.namelist():
             content = old.read(name)
             new.writestr(name, content.replace(b'settable="true"', b'settable="false"'))
-    devices = (GivenDevice("shown", shown), GivenDevice("hidden", hidden))
-    found = studied(swap=True, devices=devices, swapped=("east",), black_box=True)
+    devices = (Device("shown", shown), Device("hidden", hidden))
+    found = studied(swap=True, devices=devices, places=("east",), black_box=True)
     systems = found.judgement.systems
     own, same = systems[assigned("shown")], systems[assigned("hidden")]
     assert (own.record.identified, same.record.identified) == ((), ("east",))
@@ -229,8 +230,8 @@ def test_what_was_kept_is_not_computed_again():
     ("wanted", "text"),
     [
         ({"stand_in": "gfro"}, "stand-in: gfro at east, gfro at north, gfro at west: .*there is no model 'gfro'"),
-        ({"swap": True, "swapped": ("eest",)}, "--place eest: no converter stands there; the places of converters are"),
-        ({"swap": True, "swapped": ("east",)}, "nothing to swap: the only device at east is of B; give others"),
+        ({"swap": True, "places": ("eest",)}, "--place eest: no converter stands there; the places of converters are"),
+        ({"swap": True, "places": ("east",)}, "nothing to swap: the only device at east is of B; give others"),
     ],
 )
 def test_what_cannot_be_studied_is_refused(wanted, text):
@@ -239,7 +240,7 @@ def test_what_cannot_be_studied_is_refused(wanted, text):
 
 
 def test_too_many_assignments_are_refused_with_their_number(fmu_path):
-    devices = tuple(GivenDevice(name, fmu_path("gfl")) for name in "DE")
+    devices = tuple(Device(name, fmu_path("gfl")) for name in "DE")
     with pytest.raises(InputError, match="5 devices at 3 places make 125 assignments, more than the 64"):
         planned(swap=True, devices=devices)
 
@@ -260,4 +261,4 @@ def test_a_case_without_a_converter_or_with_several_scenarios_is_refused():
     with pytest.raises(InputError, match="several scenarios, and interactions are those of one; choose it with"):
         plan_interactions(case, InteractionsRequest())
     with pytest.raises(InputError, match="scenario 'base' has no converter"):
-        plan_interactions(case, InteractionsRequest(), "base")
+        plan_interactions(case, InteractionsRequest("base"))

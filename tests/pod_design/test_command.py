@@ -115,7 +115,7 @@ def test_no_stages_leave_the_lead_lag_out(design):
         (["--controller", "pod_x"], "invalid choice: 'pod_x'"),
         (["--scenario", "base"], "scenario 'base': no component has the controller pod_p"),
         (["--scenario", "none"], "--scenario: there is no scenario 'none'; the case has: base, gfor"),
-        (["--scenario", "gfor", "--scenario", "pod_q"], "a design is made for one scenario, not for gfor and pod_q"),
+        (["--scenario", "gfor", "--scenario", "pod_q"], "gfor design is for one scenario, not for gfor and pod_q"),
         (["--component", "sg*"], "--component sg*: scenario 'gfor' has no component of that name with pod_p; those"),
         (["--mode", "1-2"], "--mode: the case names no mode '1-2'; it names: electromechanical"),
         (["--damping", "5"], "--damping 5: without the controller the mode has 10.59 % already; ask for more"),

@@ -24,6 +24,7 @@ from orchestrator.points.failure import Failure
 from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
 
 ROOT = Path(__file__).parents[2]
@@ -74,7 +75,9 @@ def test_an_overloaded_converter_has_one_status_opened_anew_and_reset(tmp_path):
         path = tmp_path / f"{name}.csv"
         path.write_text("name,gfor.P_0\n" + rows)
         found.append(
-            run_screening(plan_screening(case, path, None, "gfor"), Work(Serial(), PointStore(tmp_path / name)))
+            run_screening(
+                plan_screening(case, ScreeningRequest(path, None, "gfor")), Work(Serial(), PointStore(tmp_path / name))
+            )
         )
     opened, reset = (result.items[-1].record for result in found)
     assert found[1].items[0].record.status is Status.COMPUTED

@@ -37,7 +37,7 @@ def closed_loop(d, overrides=None):
 @pytest.mark.parametrize("controller", PAPER)
 @pytest.mark.parametrize("overrides", [{}, SATURATED], ids=["plain", "saturated"])
 def test_the_papers_parameters(controller, overrides):
-    d = design(controller, overrides=overrides)
+    d = design(controller, values=overrides)
     T_S1, T_S2 = PAPER[controller]
     assert abs(d.filters.T_S1 - T_S1) < 0.01
     assert abs(d.filters.T_S2 - T_S2) < 0.01
@@ -49,7 +49,7 @@ def test_the_papers_parameters(controller, overrides):
 @pytest.mark.parametrize(("controller", "gain"), [("pod_p", 18.7), ("pod_q", 145)])
 def test_gains_before_the_floor_are_those_of_the_non_compensated_sensitivity(controller, gain):
     assert design(controller).gain_non_compensated == pytest.approx(gain, rel=0.02)
-    assert design(controller, overrides=SATURATED).gain_non_compensated == pytest.approx(gain, rel=0.02)
+    assert design(controller, values=SATURATED).gain_non_compensated == pytest.approx(gain, rel=0.02)
 
 
 @pytest.mark.parametrize(("controller", "times"), [("pod_p", (0.249, 0.300)), ("pod_q", (0.267, 0.280))])
@@ -78,7 +78,7 @@ def test_the_sensitivity_of_a_small_gain_predicts_a_small_step(controller):
     ],
 )
 def test_refined_designs_keep_what_they_promise_on_a_system_set_up_anew(controller, overrides):
-    d = design(controller, overrides=overrides, refine=True, gain_bounds=(0, 400))
+    d = design(controller, values=overrides, refine=True, gain_bounds=(0, 400))
     assert d.met
     assert d.achieved_damping == pytest.approx(d.required_damping, abs=1e-3)
     found = compute_modes(d.prepared)  # without the controller: where the design began
@@ -97,9 +97,9 @@ def test_the_refined_gain_is_the_smallest_that_does():
 @pytest.mark.slow
 def test_a_requirement_out_of_reach_is_said_to_be():
     overrides = {"grid.X_L": 0.01}
-    plain = design("pod_p", overrides=overrides)
+    plain = design("pod_p", values=overrides)
     assert (plain.met, plain.active_bound) == (False, "upper")
-    d = design("pod_p", overrides=overrides, refine=True)
+    d = design("pod_p", values=overrides, refine=True)
     assert not d.met
     assert len(d.refinement.sweeps) >= 3
     assert d.initial.imag > 6
@@ -114,7 +114,7 @@ def test_a_requirement_out_of_reach_is_said_to_be():
 def test_a_survey_finds_what_the_search_from_the_design_does_not():
     """The search ends at 15.0 %; far from the design there is a setting with the 15.9 % that are asked for."""
     overrides = {"grid.X_L": 0.01}
-    d = design("pod_p", overrides=overrides, refine=True, gain_bounds=(0, 400))
+    d = design("pod_p", values=overrides, refine=True, gain_bounds=(0, 400))
     assert d.met
     near = [s for s in d.refinement.sweeps if not s.why.startswith("surveyed")]
     assert max(s.chosen.damping_ratio for s in near) < d.required_damping - 0.005
@@ -125,9 +125,9 @@ def test_a_survey_finds_what_the_search_from_the_design_does_not():
 @pytest.mark.slow
 def test_no_other_mode_is_made_unstable_for_the_targets_sake():
     overrides = {"grid.X_L": 0.01}
-    plain = design("pod_q", overrides=overrides, gain_bounds=(200, 5000))
+    plain = design("pod_q", values=overrides, gain_bounds=(200, 5000))
     assert "unstable" in plain.broken
-    refined = design("pod_q", overrides=overrides, gain_bounds=(200, 5000), refine=True)
+    refined = design("pod_q", values=overrides, gain_bounds=(200, 5000), refine=True)
     assert refined.broken is None
     assert refined.after.growth == 0
     assert refined.stability.stable
@@ -142,7 +142,7 @@ def test_narrow_bounds_are_swept_as_well(gains):
 
 
 def test_margins_say_where_a_mode_is_lost():
-    d = design("pod_q", overrides={"grid.X_L": 0.01}, margins=True)
+    d = design("pod_q", values={"grid.X_L": 0.01}, margins=True)
     assert d.margins.down is None
     lost = d.margins.lost_up
     assert lost.real > 0

@@ -24,6 +24,7 @@ from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening import modes, study
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import Shard, plan_screening, run_screening
 from orchestrator.screening.summary import Summary, duration
 from orchestrator.study.modes import compute_modes
@@ -51,7 +52,7 @@ def screened(plan, folder, shard=None):
 
 def test_modes_are_those_of_the_system_without_a_step(two_area, day, tmp_path):
     case, _, _ = two_area
-    result = screened(plan_screening(case, day, None, "gfor"), tmp_path / "points")
+    result = screened(plan_screening(case, ScreeningRequest(day, None, "gfor")), tmp_path / "points")
     for item, line in zip(result.items, (0.1, 0.12, 0.15, 0.2), strict=False):
         values = {"grid.X_L": line} | {
             f"grid.{load}.scale": float(DAY.splitlines()[1 + "abcd".index(item.point.name)].split(",")[3])
@@ -65,7 +66,7 @@ def test_modes_are_those_of_the_system_without_a_step(two_area, day, tmp_path):
 
 
 def test_durations_add_up(two_area, day, tmp_path):
-    result = screened(plan_screening(two_area[0], day, None, "gfor"), tmp_path / "points")
+    result = screened(plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points")
     (mode,) = Summary(result).modes
     hours, percent = duration(mode)
     assert hours[-1] == 8
@@ -74,7 +75,7 @@ def test_durations_add_up(two_area, day, tmp_path):
 
 
 def test_the_worst_mode_is_moved_by_the_converter(two_area, day, tmp_path):
-    result = screened(plan_screening(two_area[0], day, None, "gfor"), tmp_path / "points")
+    result = screened(plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points")
     (mode,) = Summary(result).modes
     ((name, through_p, _),) = mode.worst.ranking()
     assert name == "gfor"
@@ -86,7 +87,7 @@ def test_a_residue_is_the_shift_by_unit_gain(two_area, tmp_path):
     case, prepared, _ = two_area
     path = tmp_path / "one.csv"
     path.write_text("name\nonly\n")
-    result = screened(plan_screening(case, path, None, "gfor"), tmp_path / "points")
+    result = screened(plan_screening(case, ScreeningRequest(path, None, "gfor")), tmp_path / "points")
     record = result.items[0].record
     k = record.critical[0]
     with PointBench() as bench:
@@ -257,7 +258,7 @@ def test_a_part_without_a_stretch_is_merged(gfor, day, tmp_path):
 
 def test_modes_are_followed_over_stretches(two_area, day, tmp_path, monkeypatch):
     monkeypatch.setattr(study, "STRETCH", 2)
-    result = screened(plan_screening(two_area[0], day, None, "gfor"), tmp_path / "points")
+    result = screened(plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points")
     assert len(result.plan.tasks) == 3
     assert len(Summary(result).modes) == 1
 
@@ -267,7 +268,7 @@ def test_a_unit_out_of_service_leaves_no_modes(two_area, tmp_path):
     case, _, _ = two_area
     path = tmp_path / "points.csv"
     path.write_text("name,gfor.in_service,grid.load_2.P\nout,0,1250 MW\n")
-    result = screened(plan_screening(case, path, None, "gfor"), tmp_path / "points")
+    result = screened(plan_screening(case, ScreeningRequest(path, None, "gfor")), tmp_path / "points")
     (prepared,) = case.prepare(["base"])
     expected = compute_modes(prepared)
     (item,) = result.items
@@ -364,7 +365,7 @@ def test_a_one_closes_what_the_case_has_open(two_area, tmp_path, monkeypatch):
 def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(two_area, day, tmp_path, monkeypatch):
     """Growth that only the count sees must not be lost behind items without modes."""
     monkeypatch.setattr(modes, "DENSE", 0)
-    result = screened(plan_screening(two_area[0], day, "L", "gfor"), tmp_path / "points")
+    result = screened(plan_screening(two_area[0], ScreeningRequest(day, "L", "gfor")), tmp_path / "points")
     assert result.items[-1].record.status is Status.ISLANDING
     computed = [item.record for item in result.items if item.record.status is Status.COMPUTED]
     assert computed[0].counted
@@ -375,7 +376,7 @@ def test_a_stretch_whose_end_fails_is_counted_at_its_last_point(two_area, day, t
 def test_a_stretch_counts_growth_at_its_ends_alone(two_area, day, tmp_path, monkeypatch):
     """What stands between them is followed, and would take many times as long to count."""
     monkeypatch.setattr(modes, "DENSE", 0)
-    result = screened(plan_screening(two_area[0], day, None, "gfor"), tmp_path / "points")
+    result = screened(plan_screening(two_area[0], ScreeningRequest(day, None, "gfor")), tmp_path / "points")
     counted = [item.record.counted for item in result.items if item.record.status is Status.COMPUTED]
     assert counted == [True, *[False] * (len(counted) - 2), True]
 
@@ -409,7 +410,7 @@ def test_a_part_ends_as_the_whole_does(gfor, day, tmp_path, monkeypatch):
 def test_a_dask_cluster_screens_what_one_process_does(two_area, day, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(study, "STRETCH", 2)
-    plan = plan_screening(two_area[0], day, None, "gfor")
+    plan = plan_screening(two_area[0], ScreeningRequest(day, None, "gfor"))
     alone = screened(plan, tmp_path / "alone")
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         together = run_screening(plan, Work(DaskCluster(cluster.scheduler_address), PointStore(tmp_path / "together")))

@@ -18,6 +18,7 @@ from orchestrator.operating_points.preparation import ItemPreparation
 from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
 from orchestrator.study.modes import compute_modes
 from tests.screening.five_machines import DROOPS, POWERS, RATINGS, five_machines
@@ -31,7 +32,7 @@ def five(tmp_path):
 def screened(case, folder, outages, text="name\nonly\n", sharing=None):
     path = folder / "points.csv"
     path.write_text(text)
-    plan = plan_screening(case, path, outages, "base", sharing=sharing)
+    plan = plan_screening(case, ScreeningRequest(path, outages, "base", sharing=sharing))
     return run_screening(plan, Work(Serial(), PointStore(folder / "points"))).items
 
 
@@ -260,7 +261,7 @@ def test_a_question_besides_does_not_change_the_kind(five, tmp_path):
 
 
 def test_without_points_the_case_itself_is_the_only_one(gfor, five, tmp_path):
-    plan = plan_screening(five, None, "sg2", "base")
+    plan = plan_screening(five, ScreeningRequest(None, "sg2", "base"))
     assert [(point.name, point.values, point.out) for point in plan.points] == [("case", {}, ())]
     code, _, error = gfor("screen", five.path, "--outages", "sg2", "--damping", "0.2", "--out", tmp_path / "out")
     assert code == 2

@@ -8,6 +8,7 @@ from rich.console import Console
 
 from orchestrator.operating_points.item import Status
 from orchestrator.screening.record import ItemRecord
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.stress import by_outage, not_judged
 from orchestrator.screening.study import ScreenedItem, ScreeningResult, plan_screening
 from orchestrator.screening.summary import Summary
@@ -22,7 +23,7 @@ POINTS = "name,load\nnight,0.7\nmorning,0.9\nnoon,1.1\nevening,1.2\n"
 def plan(tmp_path_factory):
     folder = tmp_path_factory.mktemp("five")
     (folder / "points.csv").write_text(POINTS)
-    return plan_screening(five_machines(folder), folder / "points.csv", "sg1,sg2,line_11_12", "base")
+    return plan_screening(five_machines(folder), ScreeningRequest(folder / "points.csv", "sg1,sg2,line_11_12", "base"))
 
 
 def mode(real, who=(0.8, 0.2), number=0, hertz=1.0):

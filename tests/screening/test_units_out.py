@@ -13,6 +13,7 @@ from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening import modes
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
 from orchestrator.study.modes import compute_modes
 
@@ -26,7 +27,7 @@ def screened(case, tmp_path, text, outages=None, scenario="base", sharing=None):
     tmp_path.mkdir(exist_ok=True)
     path = tmp_path / "points.csv"
     path.write_text(text)
-    plan = plan_screening(case, path, outages, scenario, sharing=sharing)
+    plan = plan_screening(case, ScreeningRequest(path, outages, scenario, sharing=sharing))
     return run_screening(plan, Work(Serial(), PointStore(tmp_path / "points")))
 
 

@@ -11,6 +11,7 @@ from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.record import ItemRecord
+from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
 from orchestrator.screening.summary import Summary
 from orchestrator.screening.view import as_json, remarks
@@ -42,8 +43,8 @@ def screened(tmp_path_factory):
     folder = tmp_path_factory.mktemp("words")
     path = folder / "points.csv"
     path.write_text("name,gfor.in_service,grid.load_2.P\nin,1,\nout,0,1250 MW\n")
-    wanted = replace(plan_screening(load_case("two_area"), path, None, "gfor").wanted, lowest_hz=1.0)
-    plan = plan_screening(load_case("two_area"), path, None, "gfor", wanted=wanted)
+    request = ScreeningRequest(path, None, "gfor", frequencies=(1.0, 2.0))
+    plan = plan_screening(load_case("two_area"), request)
     for _ in range(2):  # computed, and then kept
         result = run_screening(plan, Work(Serial(), PointStore(folder / "points")))
     return result
@@ -83,7 +84,7 @@ def test_an_item_is_stable_only_where_all_growth_was_counted(monkeypatch, tmp_pa
         monkeypatch.setattr("orchestrator.screening.modes._elsewhere", lambda *_: None)
     path = tmp_path / "points.csv"
     path.write_text("name,gfor.in_service\nin,1\n")
-    plan = plan_screening(load_case("two_area"), path, None, "gfor")
+    plan = plan_screening(load_case("two_area"), ScreeningRequest(path, None, "gfor"))
     for _ in range(2):  # computed, and then kept
         result = run_screening(plan, Work(Serial(), PointStore(tmp_path / "points")))
     (item,) = result.items

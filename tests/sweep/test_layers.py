@@ -9,6 +9,7 @@ from orchestrator.points.task import StudyCase
 from orchestrator.sweep import point
 from orchestrator.sweep.axes import Vary
 from orchestrator.sweep.point import SweepPointTask, compute_point
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep
 from tests.sweep.sweep_case import two_oscillators
 
@@ -66,14 +67,14 @@ def test_values_have_the_same_priority_as_in_a_scenario(case, write, lines, valu
 def test_a_later_file_goes_before_an_earlier_one_whatever_the_patterns(case, write, values_at):
     first, second = write('"a1.gain" = 9.0', '"?1.gain" = 4.0'), write('"a1.gain" = 8.0', name="later.toml")
     files = [read_parameter_file(path) for path in (first, second)]
-    planned = plan_sweep(case.file, [listed("slow.T", 0.1, 0.2)], ["one"], parameters=files)
+    planned = plan_sweep(case.file, SweepRequest([listed("slow.T", 0.1, 0.2)], ["one"], parameters=files))
     assert values_at(planned.task(planned.scenarios[0], (0,)))["a1.gain"] == 8.0
 
 
 @pytest.mark.parametrize("fixed", [{"a1.gain": 5.0}, {"a1.gain": 5.0, "a*.gain": 6.0}, {"?1.gain": 5.0}])
 def test_what_is_varied_goes_before_every_other_value(case, write, values_at, fixed):
     file = read_parameter_file(write('"a1.gain" = 9.0', '"?1.gain" = 4.0'))
-    planned = plan_sweep(case.file, [listed("a1.gain", 3.0, 7.0)], ["one"], fixed, parameters=[file])
+    planned = plan_sweep(case.file, SweepRequest([listed("a1.gain", 3.0, 7.0)], ["one"], fixed, parameters=[file]))
     for place, gain in (((0,), 3.0), ((1,), 7.0)):
         assert values_at(planned.task(planned.scenarios[0], place))["a1.gain"] == gain
 

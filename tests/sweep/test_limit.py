@@ -13,6 +13,7 @@ from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import parse_vary
 from orchestrator.sweep.limit import HALVINGS, Ending, Until, search
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep, run_sweep
 from tests.coupling.small_fmus import small_fmu
 
@@ -182,7 +183,7 @@ def test_on_the_terminal_the_answer_comes_first(gfor, loop):
 
 
 def planned(loop, *vary, **more):
-    return plan_sweep(load_case(loop), [parse_vary(text) for text in vary], **more)
+    return plan_sweep(load_case(loop), SweepRequest([parse_vary(text) for text in vary], **more))
 
 
 def test_several_parameters_take_one_value(loop):
@@ -215,8 +216,8 @@ def test_what_cannot_move_together_is_refused(loop, vary, said):
     [
         (["--vary", "one.T=0.1,0.2", "--until", "unstable"], "needs a range"),
         (["--vary", "one.T=0.1:0.2", "--vary", "two.T=0.1:0.2", "--until", "unstable"], "searches along one range"),
-        (["--vary", "one.T=0.1:0.2", "--until", "soon"], "until = 'soon'"),
-        (["--vary", "one.T=0.1:0.2", "--until", "120 %"], "until = '120 %'"),
+        (["--vary", "one.T=0.1:0.2", "--until", "soon"], "'soon' is none; give 'unstable'"),
+        (["--vary", "one.T=0.1:0.2", "--until", "120 %"], "'120 %' is none; give 'unstable'"),
     ],
 )
 def test_a_search_that_is_none_is_refused(gfor, loop, options, said):

@@ -9,13 +9,14 @@ from orchestrator.points.store import PointStore
 from orchestrator.sweep import point
 from orchestrator.sweep.axes import parse_vary
 from orchestrator.sweep.point import PointRecord, compute_point
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep
 from tests.sweep.sweep_case import two_oscillators
 
 
 @pytest.fixture
 def task(tmp_path):
-    plan = plan_sweep(load_case(two_oscillators(tmp_path)), [parse_vary("a1.gain=3:4:2")])
+    plan = plan_sweep(load_case(two_oscillators(tmp_path)), SweepRequest([parse_vary("a1.gain=3:4:2")]))
     return plan.task(plan.scenarios[0], (0,))
 
 
@@ -49,7 +50,7 @@ def test_what_a_library_does_ends_one_point_only_and_is_tried_again(task, monkey
 
 
 def test_what_an_fmu_of_ours_refuses_fails_alone_and_is_kept(tmp_path):
-    plan = plan_sweep(load_case(two_oscillators(tmp_path)), [parse_vary("slow.T=-1,1")])
+    plan = plan_sweep(load_case(two_oscillators(tmp_path)), SweepRequest([parse_vary("slow.T=-1,1")]))
     refused, fine = (compute_point(plan.task(plan.scenarios[0], (k,))) for k in (0, 1))
     assert "T must exceed 0" in refused.error
     assert refused.failure.kind is ErrorKind.START

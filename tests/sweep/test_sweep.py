@@ -22,6 +22,7 @@ from orchestrator.points.store import PointStore
 from orchestrator.sweep import sweep as sweep_module
 from orchestrator.sweep.axes import _axis, parse_vary, resolve
 from orchestrator.sweep.point import PointRecord, compute_point
+from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import ScenarioSweep, plan_sweep, run_sweep
 from tests.support.interruption import interrupted_after
 from tests.sweep.sweep_case import two_oscillators
@@ -41,7 +42,7 @@ def case(tmp_path):
 
 
 def sweep(case, folder, *vary, executor=None, **settings):
-    plan = plan_sweep(load_case(case), [parse_vary(text) for text in vary], **settings)
+    plan = plan_sweep(load_case(case), SweepRequest([parse_vary(text) for text in vary], **settings))
     return run_sweep(plan, Work(executor or Serial(), PointStore(folder)))
 
 
@@ -174,7 +175,7 @@ def test_one_variable_is_not_varied_twice(gfor, case, tmp_path, keys):
     assert code == 2
     shared = "b1.gain" if keys[1] == "b*.gain" else "a1.gain"
     assert f"--vary {keys[0]} and --vary {keys[1]}: both vary {shared}, which can have one value only" in err
-    assert plan_sweep(load_case(case), [parse_vary("a1.gain=1,2"), parse_vary("b?.gain=1,2")], ["one"])
+    assert plan_sweep(load_case(case), SweepRequest([parse_vary("a1.gain=1,2"), parse_vary("b?.gain=1,2")], ["one"]))
 
 
 def test_a_name_that_is_wrong_in_any_scenario_is_refused(case):
@@ -185,7 +186,7 @@ def test_a_name_that_is_wrong_in_any_scenario_is_refused(case):
         case.write_text(text.replace(f'title = "{title}"', f'title = "{title}"\n{own}'), encoding="utf-8")
         words = rf"--vary imperfections\.bias\.value: there is no imperfection 'bias'.* \(scenario {other}\)"
         with pytest.raises(InputError, match=words):
-            plan_sweep(load_case(case), [parse_vary("imperfections.bias.value=0.1,0.2")])
+            plan_sweep(load_case(case), SweepRequest([parse_vary("imperfections.bias.value=0.1,0.2")]))
 
 
 @pytest.mark.parametrize(("varied", "scenario"), [("slow.T=1,2", "two"), ("b1.gain=-1,1", "one")])
@@ -199,7 +200,7 @@ def test_both_scenarios_are_checked_with_what_is_varied(case, monkeypatch, varie
 
     monkeypatch.setattr(Case, "prepare", seen)
     vary = parse_vary(varied)
-    plan_sweep(load_case(case), [vary])
+    plan_sweep(load_case(case), SweepRequest([vary]))
     assert ((scenario,), {vary.key: vary.values[0]}) in checked
 
 
@@ -209,7 +210,9 @@ def test_a_scenario_is_swept_once(gfor, case):
 
 
 def test_units_logarithms_and_patterns(case):
-    plan = plan_sweep(load_case(case), [parse_vary("slow.T=log:10 ms:1:3"), parse_vary("b?.gain=1,2")], ["one"])
+    plan = plan_sweep(
+        load_case(case), SweepRequest([parse_vary("slow.T=log:10 ms:1:3"), parse_vary("b?.gain=1,2")], ["one"])
+    )
     assert [axis.values for axis in plan.axes] == [(0.01, 0.1, 1.0), (1.0, 2.0)]
     assert plan.values((1, 1)) == {"slow.T": 0.1, "b?.gain": 2.0}
     assert plan.values((1, 0.5)) == {"slow.T": 0.1, "b?.gain": 1.5}
@@ -251,7 +254,7 @@ def test_a_parameter_of_whole_numbers_is_known_as_one():
     ("values", "between"), [((0.0, 1.0, 2.0), set()), ((0.0, 3.0), {1.0, 2.0}), ((1.0, 9.0), {2.0, 3.0, 5.0, 7.0})]
 )
 def test_whole_numbers_have_only_whole_numbers_in_between(case, tmp_path, monkeypatch, values, between):
-    plan = plan_sweep(load_case(case), [parse_vary("a1.gain=3:4:2")], ["one"])
+    plan = plan_sweep(load_case(case), SweepRequest([parse_vary("a1.gain=3:4:2")], ["one"]))
     plan = replace(plan, axes=(replace(plan.axes[0], values=values, multiple_of=1.0),))
     fine, seen = compute_point(plan.task(plan.scenarios[0], (0,))), set()
     monkeypatch.setattr(sweep_module, "is_ambiguous", lambda *_: True)
@@ -263,7 +266,7 @@ def test_whole_numbers_have_only_whole_numbers_in_between(case, tmp_path, monkey
 
 
 def test_a_mode_beyond_the_range_is_not_followed_there(case, tmp_path):
-    result = sweep(case, tmp_path / "p", "a1.gain=6:60:19", scenarios=["two"], frequency_range=(0.5, 2.0))
+    result = sweep(case, tmp_path / "p", "a1.gain=6:60:19", scenarios=["two"], frequencies=(0.5, 2.0))
     frequencies = curve(result.scenarios[0], "first")
     inside = [g for g in np.linspace(6, 60, 19) if np.sqrt(g * FULL_TURN) / FULL_TURN <= 2.0]
     assert [place for (place,) in frequencies] == list(range(len(inside)))
@@ -296,15 +299,15 @@ def test_what_a_stored_point_depends_on(case, tmp_path):
     assert sweep(case, folder, "a1.gain=3:12:4").computed == 8
     assert sweep(case, folder, "a1.gain=3:15:5").computed == 2  # a longer sweep takes over what is there
     assert sweep(case, folder, "a1.gain=3:12:4", scenarios=["two"]).computed == 0
-    assert sweep(case, folder, "a1.gain=3:12:4", frequency_range=(0.2, 2.0)).computed == 8
-    assert sweep(case, folder, "a1.gain=3:12:4", step_size=2e-3).computed == 8
-    assert sweep(case, folder, "a1.gain=3:12:4", overrides={"b2.gain": -3.0}).computed == 8
+    assert sweep(case, folder, "a1.gain=3:12:4", frequencies=(0.2, 2.0)).computed == 8
+    assert sweep(case, folder, "a1.gain=3:12:4", step=2e-3).computed == 8
+    assert sweep(case, folder, "a1.gain=3:12:4", values={"b2.gain": -3.0}).computed == 8
     case.write_text(case.read_text(encoding="utf-8").replace("gain = 6.28", "gain = 6.29"), encoding="utf-8")
     assert sweep(case, folder, "a1.gain=3:12:4").computed == 8
 
 
 def test_a_worker_with_another_case_file_refuses(case):
-    plan = plan_sweep(load_case(case), [parse_vary("a1.gain=3:4:2")])
+    plan = plan_sweep(load_case(case), SweepRequest([parse_vary("a1.gain=3:4:2")]))
     task = plan.task(plan.scenarios[0], (0,))
     case.write_text(case.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
     with pytest.raises(InputError, match="this file has another text now than when the study loaded it"):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.certification.devices import devices_of
+from orchestrator.cases.devices import devices_of
 from orchestrator.errors import InputError
 
 

@@ -1,0 +1,60 @@
+"""Methods of a case made from the requests of its studies, with their signature and documentation."""
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, fields
+from inspect import Parameter, Signature, cleandoc, get_annotations
+from textwrap import indent
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from orchestrator.asked import Asked, asked_of, checked, require_known
+
+Asks = ParamSpec("Asks")
+Shown = TypeVar("Shown")
+
+
+def method(
+    name: str, request: Callable[Asks, Any], call: Callable[[Any, Any], Shown]
+) -> Callable[Concatenate[Any, Asks], Shown]:
+    """A method; ``name`` is such as ``Case.sweep``.
+
+    Its keywords are the fields of the request, and ``call`` computes what is asked of an object."""
+    assert isinstance(request, type)
+    signature, (owner, _, last) = _signature(request), name.partition(".")
+
+    def studied(self: Any, /, *given: Asks.args, **wanted: Asks.kwargs) -> Shown:
+        require_known(wanted, asked_of(request), last)
+        bound = signature.bind(self, *given, **wanted).arguments
+        return call(self, request(**checked(request, bound)))
+
+    studied.__name__, studied.__qualname__, studied.__module__ = last, name, f"orchestrator.api.{owner.lower()}"
+    studied.__signature__ = signature  # type: ignore[attr-defined] # what `help` and notebooks show
+    studied.__doc__ = _documentation(request)
+    return studied
+
+
+def _signature(request: type) -> Signature:
+    listed = [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)]
+    for one, asks in _listed(request):
+        kind = Parameter.KEYWORD_ONLY if one.kw_only else Parameter.POSITIONAL_OR_KEYWORD
+        default = Parameter.empty if asks.default is MISSING else asks.shown_default
+        listed.append(Parameter(one.name, kind, default=default, annotation=one.type))
+    return Signature(listed)
+
+
+def _listed(request: type) -> Iterable[tuple[Any, Asked]]:
+    """Fields in the order of their keywords: those that are given by place first, then the study's own."""
+    every = asked_of(request)
+    known = [one for one in fields(request) if one.name in every]
+    own = set(get_annotations(request))
+    known.sort(key=lambda one: (one.kw_only, one.name not in own))
+    return [(one, every[one.name]) for one in known]
+
+
+def _documentation(request: type) -> str:
+    """What the class of the request says, with its fields as parameters."""
+    text = cleandoc(request.__doc__ or "")
+    summary, *rest = re.split(r"\n(?=\w+\n---)", text, maxsplit=1)
+    lines = [f"{one.name}\n{indent(asks.meaning, '    ')}" for one, asks in _listed(request)]
+    parts = [summary.rstrip(), "\n".join(["Parameters", "----------", *lines]), *rest]
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,31 @@
+"""Places of a device: what users may ask, what they get, and what ``gfor site`` prints."""
+
+from collections.abc import Iterator
+
+from rich.console import RenderableType
+from rich.markup import escape
+
+from orchestrator.cases.case import Case
+from orchestrator.errors import NOT_MET
+from orchestrator.points.points import CountReport
+from orchestrator.points.study import StudyAtOnce
+from orchestrator.siting.study import SiteRequest, find_sites
+from orchestrator.siting.view import Siting, ranking_table
+
+
+def _compute(case: Case, request: SiteRequest, report: CountReport) -> Siting:
+    return Siting(find_sites(case, request, report))
+
+
+def _parts(found: Siting) -> Iterator[RenderableType]:
+    yield from map(escape, (found.answer, *found.remarks))
+    yield from ("", ranking_table(found.result), "")
+
+
+STUDY = StudyAtOnce(
+    request=SiteRequest, compute=_compute, prepared=lambda found: [found.result.prepared], parts=_parts,
+    code=lambda found, _: 0 if found.agrees else NOT_MET, counted="places",
+    files="site.json, buses.csv and site.html with a map",
+    warnings=lambda found: [f"scenario {found.result.prepared.name!r}: {text}"
+                            for text in found.result.intact.found.warnings],
+)  # fmt: skip
