@@ -15,9 +15,7 @@ LARGEST_DAMPING = 40.0  # with a higher damping [%] less than a fifteenth of an 
 LEAST_ENERGY = 1e-3  # least part of the energy of all oscillations in the window
 AGREE = 0.05  # largest distance, as a part of |λ|, to the same mode in another identification of the same signal
 STEEP = 10.0  # A straight line that changes by this many times the strongest oscillation may hide smaller ones
-TOLD_APART = (
-    0.75  # Two modes that lie d Hz apart need 0.75/d s: with 3 % of noise the damping is then right to 0.8 points
-)
+TOLD_APART = 0.75  # Two modes d Hz apart need 0.75/d s: with 3 % of noise the damping is right to 0.8 points then
 SHORTER, COARSER = 0.1, 30.0
 """The other identification leaves out this part of the window at its beginning, and takes singular values for noise
 that are this factor larger, so that its order is lower where noise made modes."""
