@@ -1,12 +1,13 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
+import json
+import re
+import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
-
-import pandas as pd
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.progress import shown_progress, shown_stages
@@ -22,7 +23,7 @@ from orchestrator.api.studies import (
     points_design_request,
 )
 from orchestrator.api.sweep import plan
-from orchestrator.api.values import Paths, Time, case_values, in_seconds, parameter_files
+from orchestrator.api.values import Paths, Time, case_values, in_seconds, keep, kept, parameter_files
 from orchestrator.asked import Names, checked, flag, require_known, text_or_none
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
@@ -38,6 +39,7 @@ from orchestrator.errors import InputError
 from orchestrator.interactions.study import plan_interactions
 from orchestrator.interactions.view import STUDY as INTERACTIONS
 from orchestrator.interactions.view import Interactions
+from orchestrator.late import pd
 from orchestrator.pod_design.view import ControllerDesign
 from orchestrator.points.store import POINTS
 from orchestrator.points.study import Plan, PointStudy, Result, Shown, choose_executor
@@ -65,11 +67,14 @@ def built_in_cases() -> tuple[str, ...]:
     return names_of_cases()
 
 
-def load(case: str | Path, *, trust_fmus: bool = False) -> "Case":
-    """Load a built-in case by name, or a case file or an SSP archive by path.
+def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "Case":
+    """Load a case.
 
     Parameters
     ----------
+    case
+        Name of a built-in case, path of a case file or an SSP archive, the text of a case file, or its tables. Of text
+        and tables, paths are relative to ``directory`` in them, or to where the program runs.
     trust_fmus
         Whether FMUs of others may run in this process, where the file says ``isolated = false``; they can do there
         whatever you can. Without it such a file is refused.
@@ -87,10 +92,16 @@ def load(case: str | Path, *, trust_fmus: bool = False) -> "Case":
     >>> gfor.load("infinite_bus").scenarios
     ('dip', 'load_step')
     """
+    trusted = flag(trust_fmus, "trust_fmus")
+    if isinstance(case, Mapping):
+        return Case(load_case(kept({"directory": str(Path.cwd()), **case}, "case.toml", "case"), trust_fmus=trusted))
+    if isinstance(case, str) and "\n" in case:
+        head = "" if re.search(r"(?m)^directory\s*=", case) else f"directory = {json.dumps(str(Path.cwd()))}\n"
+        return Case(load_case(keep(head + case, "case.toml"), trust_fmus=trusted))
     if not isinstance(case, str | Path) or not str(case):
         raise InputError(f"case = {case!r}; give a built-in case's name ({', '.join(names_of_cases())}) or a path")
     path_of(case, "case")
-    return Case(load_case(case, trust_fmus=flag(trust_fmus, "trust_fmus")))
+    return Case(load_case(case, trust_fmus=trusted))
 
 
 class Case:
@@ -123,6 +134,26 @@ class Case:
     def scenarios(self) -> tuple[str, ...]:
         """Names of the scenarios."""
         return tuple(self.file.scenarios)
+
+    def with_(self, **tables: Any) -> "Case":
+        """The case with other tables, such as ``events``, ``solver`` or ``network``; this one stays as it is.
+
+        Parameters
+        ----------
+        tables
+            As in a case file. Tables in tables are joined, lists replaced, and what is None is removed.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> shorter = gfor.load("infinite_bus").with_(solver={"stop_time": "3 s"}, scenarios={"dip": None})
+        >>> shorter.scenarios, shorter.scenario().prepared.stop_time
+        (('load_step',), 3.0)
+        """
+        return load(
+            {"directory": str(self.file.directory)} | _joined(tomllib.loads(self.file.text), tables),
+            trust_fmus=self.file.trust_fmus,
+        )
 
     def scenario(
         self,
@@ -294,7 +325,7 @@ class Case:
 
     def screen(
         self,
-        points: str | Path | None = None,
+        points: Any = None,
         outages: str | Sequence[str] | None = None,
         scenario: str | None = None,
         values: Mapping[str, Any] | None = None,
@@ -316,8 +347,8 @@ class Case:
         Parameters
         ----------
         points
-            CSV file, a row each: a column ``time`` or ``name``, and what differs from the case. The case as it is by
-            default.
+            CSV file or DataFrame, a row each: a column ``time`` or ``name``, and what differs from the case; or
+            ``{"night": {"load": 0.6}}``. The case as it is by default.
         outages
             ``"n-1"``, ``"lines"``, ``"units"``, or names, also as one text with commas; none by default.
         scenario
@@ -355,8 +386,8 @@ class Case:
         0  00:00          0.58            10.57
         """
         request = ScreeningRequest(**checked(ScreeningRequest, {
-            "points": points, "outages": outages, "sharing": sharing, "frequencies": frequencies, "damping": damping,
-            "whole": whole,
+            "points": None if points is None else kept(points, "points.csv", "points"), "outages": outages,
+            "sharing": sharing, "frequencies": frequencies, "damping": damping, "whole": whole,
         }))  # fmt: skip
         planned = partial(
             plan_screening, self.file, request.points, request.outages, scenario, case_values(values),
@@ -504,7 +535,7 @@ class Case:
 
     def design_over_points(
         self,
-        points: str | Path,
+        points: Any,
         controllers: Names = "pod_p",
         outages: str | None = None,
         scenario: str | None = None,
@@ -561,7 +592,7 @@ class Case:
         request = points_design_request(names_given(controllers, "controllers"), wanted, scenario=scenario,
                              overrides=case_values(values), parameters=parameter_files(parameters),
                              step_size=in_seconds(step, "step"))  # fmt: skip
-        planned = partial(plan_points_design, self.file, request, path_of(points, "points", "file"), outages)
+        planned = partial(plan_points_design, self.file, request, kept(points, "points.csv", "points"), outages)
         return _studied(COORDINATED_DESIGN, planned, (workers, scheduler, tls), folder, "Points", shown=progress)
 
     def __repr__(self) -> str:
@@ -571,6 +602,18 @@ class Case:
         titles = [table.title or name for name, table in self.file.scenarios.items()]
         table = pd.DataFrame({"scenario": self.scenarios, "title": titles})
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
+
+
+def _joined(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables with changes: inner tables are joined, and what is None is removed."""
+    found = {key: value for key, value in tables.items() if changes.get(key, value) is not None}
+    for key, new in changes.items():
+        if isinstance(new, Mapping):
+            old = tables.get(key)
+            found[key] = _joined(old if isinstance(old, Mapping) else {}, new)
+        elif new is not None:
+            found[key] = new
+    return found
 
 
 def _studied(

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.analysis.identification import IdentifiedMode
-from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.modes import Mode, eigenvalues
 from orchestrator.api.values import Time, moment
+from orchestrator.arrays import Complex
 from orchestrator.errors import CosimError, InputError
 from orchestrator.late import pd, xr
 from orchestrator.oscillations.reading import measurements_of
@@ -118,16 +119,33 @@ class Modes:
 
         return dict(modes_json([self.result]))
 
-    def plot(self, ax: Axes = None) -> Axes:
+    @property
+    def eigenvalues(self) -> Complex:
+        """All eigenvalues [rad/s] of the model that the verdict is on, complex, the largest real part first."""
+        found = eigenvalues(self.result.model)
+        return np.asarray(found[np.argsort(-found.real, kind="stable")])
+
+    def save(self, folder: str | Path) -> Path:
+        """Write what ``gfor modes --out`` leaves into a folder."""
+        from orchestrator.study.files import write_modes  # noqa: PLC0415 - plots: a second to import
+
+        place = made_folder(Path(folder), "folder")
+        write_modes([self.result], place)
+        return place
+
+    def plot(self, ax: Axes = None, *, radians: bool = False, annotate: bool = False) -> Axes:
         """Eigenvalue map with rays of equal damping; large crosses are modes with a name.
 
-        A mode lies at its real part [1/s] and its frequency [Hz]: annotate it at
-        ``(mode.eigenvalue.real, mode.frequency_hz)``, not at the imaginary part, which is in rad/s.
+        A mode lies at its real part [1/s] and its frequency [Hz].
 
         Parameters
         ----------
         ax
             Matplotlib Axes, such as those with another scenario's modes; by default those of a new figure.
+        radians
+            The imaginary part [rad/s] in the place of the frequency: both axes have one unit.
+        annotate
+            Write frequency and damping at each mode.
 
         Returns
         -------
@@ -145,7 +163,7 @@ class Modes:
         from orchestrator.study.mode_plots import draw_eigenvalues  # noqa: PLC0415 - a second to import
 
         axes = axes_or_new(ax, 7.2, 5.0)
-        draw_eigenvalues(axes, [self.result], curves_on(axes))
+        draw_eigenvalues(axes, [self.result], curves_on(axes), radians=radians, annotate=annotate)
         axes.legend(loc="best", fontsize="small")
         return axes
 
