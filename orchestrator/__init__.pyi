@@ -21,12 +21,6 @@ from orchestrator.api.results import Run as Run
 from orchestrator.api.saved import open as open
 from orchestrator.api.scenario import Scenario as Scenario
 from orchestrator.api.source import source as source
-from orchestrator.coordinated_design.view import CoordinatedDesign as CoordinatedDesign
 from orchestrator.errors import CosimError as CosimError
-from orchestrator.interactions.view import Interactions as Interactions
-from orchestrator.pod_design.view import ControllerDesign as ControllerDesign
 from orchestrator.screening.view import Screening as Screening
-from orchestrator.siting.view import Siting as Siting
-from orchestrator.study.signal_modes import RunComparison as RunComparison
-from orchestrator.study.signal_modes import SignalModes as SignalModes
 from orchestrator.sweep.view import ParameterSweep as ParameterSweep

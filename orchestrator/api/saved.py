@@ -18,19 +18,14 @@ class Saved(Mapping[str, Any]):
     """What a folder of results holds, by file; each is read, and compared with its manifest, where it is asked for.
 
     A ``.nc`` is an `xarray.Dataset`, a ``.csv`` a DataFrame, a ``.json`` what JSON makes of it.
-
-    Parameters
-    ----------
-    folder
-        Where ``gfor … --out``, or `save` of a result, wrote.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def __iter__(self) -> Iterator[str]:
-        found = (file for kind in ("nc", "csv", "json") for file in self.folder.rglob(f"*.{kind}"))
-        return (file.relative_to(self.folder).as_posix() for file in sorted(found) if file.name != MANIFEST)
+        found = (file for file in sorted(self.folder.rglob("*.*")) if file.suffix in (".nc", ".csv", ".json"))
+        return (file.relative_to(self.folder).as_posix() for file in found if file.name != MANIFEST)
 
     def __len__(self) -> int:
         return len(list(iter(self)))

@@ -7,8 +7,8 @@ import io
 import re
 from collections.abc import Sequence
 from contextlib import suppress
-from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,6 @@ _TIMES = ("time", "t", "timestamp", "datetime", "zeit", "temps", "tiempo")
 _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
 _TIME = re.compile(rf"\s*([-+]?\d*[.,]?\d+([eE][-+]?\d+)?|{_DATE.pattern})\s*")
-_LONGEST_HEAD = 100
 _EPOCH = 1e8
 """Numbers of seconds above it count from 1970, and are taken from the first sample on."""
 
@@ -34,7 +33,7 @@ def read_table(path: Path) -> xr.Dataset:
     """Read signals; headings such as ``f north [Hz]``, or a row of units below the names, give names and units.
 
     Lines above the headings, and columns without numbers, are left out."""
-    table = _excel(path) if path.suffix.lower() in EXCEL else _csv(path)
+    table = _table(path)
     first = str(table.columns[0]) if table.shape[1] else ""
     name, unit = _parts(first)
     kind = table[first].dtype.kind if len(table) else ""
@@ -62,32 +61,46 @@ def read_table(path: Path) -> xr.Dataset:
     return xr.Dataset(columns, {"time": times, LINE_FREQUENCY: 0.0})
 
 
-def _csv(path: Path) -> pd.DataFrame:
-    try:
-        text = _text(path.read_bytes())
-        heads = [list(islice(csv.reader(io.StringIO(text), delimiter=mark), _LONGEST_HEAD)) for mark in ";\t,"]
-        parted = [(mark, *_head(rows)) for mark, rows in zip(";\t,", heads, strict=True)]
-        mark, names, begin = next((one for one in parted if one[1]), (",", heads[2][0] if heads[2] else [], 1))
-        decimals = (".", ",") if mark != "," else (".",)
-        tables = [
-            pd.read_csv(io.StringIO(text), sep=mark, decimal=d, header=None, names=names, skiprows=begin,
-                        skipinitialspace=True)
-            for d in decimals
-        ]  # fmt: skip
-    except (OSError, ValueError, csv.Error) as error:
-        reason = (
-            getattr(error, "strerror", None) or "its lines do not have the columns of the first one, or are no text"
-        )
-        raise InputError(f"{path}: it cannot be read as CSV: {reason}") from error
-    table = max(tables, key=lambda one: one.select_dtypes("number").shape[1])
-    if not isinstance(table.index, pd.RangeIndex):  # what pandas makes of columns without a name
-        more = table.shape[1] + table.index.nlevels
+def _table(path: Path) -> pd.DataFrame:
+    """Names, and rows of numbers where a column has nothing else."""
+    if path.suffix.lower() in EXCEL:
+        mark, (names, rows) = "", _parted(_sheet(path))
+    else:
+        try:
+            text = _text(path.read_bytes())
+            parted = {mark: _parted(list(csv.reader(io.StringIO(text), delimiter=mark))) for mark in ";\t,"}
+        except (OSError, csv.Error) as error:
+            raise InputError(f"{path}: it cannot be read as CSV: {error}") from error
+        mark, (names, rows) = next((one for one in parted.items() if one[1][1]), (",", parted[","]))
+    if odd := next((row for row in rows if len(row) != len(names)), None):
         both = (
             "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between columns"
         )
-        remedy = both if mark == "," and more == 2 * table.shape[1] else "name them all"
-        raise InputError(f"{path}: its first line names {table.shape[1]} columns, and the others have {more}; {remedy}")
-    return table
+        remedy = both if mark == "," and len(rows[0]) == 2 * len(names) else "name them all"
+        raise InputError(f"{path}: the line above the numbers names {len(names)} columns, and {mark.join(odd)!r} has "
+                         f"{len(odd)}; {remedy}")  # fmt: skip
+    texts = pd.DataFrame(rows, columns=[f"{n} ({k})" if n in names[:k] else n for k, n in enumerate(names)], dtype=str)
+    return texts.apply(lambda column: _numbers(column, comma=mark != ","))
+
+
+def _numbers(column: pd.Series[Any], *, comma: bool) -> pd.Series[Any]:
+    column = column.str.strip().mask(lambda one: one.isin(["", "NaN", "nan", "NA", "N/A"]))
+    for texts in (column, column.str.replace(",", ".")) if comma else (column,):
+        with suppress(ValueError):
+            return pd.to_numeric(texts)
+    return column
+
+
+def _sheet(path: Path) -> list[list[str]]:
+    """Cells of the first sheet."""
+    try:
+        cells = pd.read_excel(path, header=None)
+    except ImportError as error:
+        remedy = "install it with `pip install openpyxl`, or save the sheet as CSV"
+        raise InputError(f"{path}: Excel files need the package openpyxl; {remedy}") from error
+    except Exception as error:
+        raise InputError(f"{path}: it cannot be read as Excel: {error}; save the sheet as CSV") from error
+    return [["" if pd.isna(x) else str(x) for x in row] for row in cells.itertuples(index=False)]
 
 
 def _text(content: bytes) -> str:
@@ -96,41 +109,20 @@ def _text(content: bytes) -> str:
         return content.decode("utf-16")
     with suppress(UnicodeDecodeError):
         return content.decode("utf-8-sig")
-    return content.decode("cp1252")
+    return content.decode("cp1252", "replace")
 
 
-def _excel(path: Path) -> pd.DataFrame:
-    """The first sheet."""
-    try:
-        cells = pd.read_excel(path, header=None)
-    except ImportError as error:
-        remedy = "install it with `pip install openpyxl`, or save the sheet as CSV"
-        raise InputError(f"{path}: Excel files need the package openpyxl; {remedy}") from error
-    except Exception as error:
-        raise InputError(f"{path}: it cannot be read as Excel: {error}; save the sheet as CSV") from error
-    top = [["" if pd.isna(x) else str(x) for x in row] for row in cells.head(_LONGEST_HEAD).itertuples(index=False)]
-    names, begin = _head(top)
-    table = cells.iloc[begin:].reset_index(drop=True).infer_objects()
-    table.columns = pd.Index(names or range(cells.shape[1]))
-    for place, column in enumerate(table.columns):
-        if table[column].dtype.kind == "M":
-            table.isetitem(place, table[column].astype(str))
-    return table
-
-
-def _head(rows: Sequence[Sequence[str]]) -> tuple[list[str], int]:
-    """Names of the columns, with units from a row of their own, and the index of the first row of numbers.
-
-    No names where no row begins with a time and has more columns."""
+def _parted(rows: Sequence[list[str]]) -> tuple[list[str], list[list[str]]]:
+    """Names of the columns, with units from a row of their own, and the rows from the first that begins with a time."""
+    rows = [row for row in rows if row]
     begin = next((k for k, row in enumerate(rows) if len(row) > 1 and row[1].strip() and _TIME.fullmatch(row[0])), 0)
     if not begin:
-        return [], 1
+        return (rows[0] if rows else []), []
     names, above = [cell.strip() for cell in rows[begin - 1]], rows[begin - 2] if begin > 1 else []
-    unit = names[0].strip("[]()") if names else ""
-    if above and len(above) == len(names) and unit in (*_SECONDS, "UTC"):
+    if above and len(above) == len(names) and names[0].strip("[]()") in (*_SECONDS, "UTC"):
         units = [cell.strip("[]()") for cell in names]
         names = [f"{name.strip()} [{unit}]" if unit else name.strip() for name, unit in zip(above, units, strict=True)]
-    return names, begin
+    return names, rows[begin:]
 
 
 def _seconds_of_dates(table: pd.DataFrame) -> Numbers | None:

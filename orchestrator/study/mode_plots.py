@@ -31,12 +31,10 @@ def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> 
         save_figure(figure, path)
 
 
-def draw_eigenvalues(
-    axis: Any, results: Sequence[ModesResult], first: int = 0, *, radians: bool = False, annotate: bool = False
-) -> None:
+def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0, *, radians: bool = False) -> None:
     """Eigenvalue map with rays of equal damping; other people's figures as open circles.
 
-    ``radians``: the imaginary part [rad/s] instead of the frequency. ``annotate``: figures at each mode."""
+    ``radians``: the imaginary part [rad/s] instead of the frequency."""
     turn = 2 * np.pi if radians else 1.0
     named = [m.frequency_hz for r in results for m in r.named.values()]
     highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
@@ -58,10 +56,6 @@ def draw_eigenvalues(
         for reference in result.references.values():
             real, hertz = _real_and_hz(reference)
             axis.scatter(real, hertz * turn, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)
-        for m in modes if annotate else ():
-            text = f"{m.frequency_hz:.3g} Hz, {m.damping_percent:.3g} %"
-            at = (m.eigenvalue.real, m.frequency_hz * turn)
-            axis.annotate(text, at, xytext=(6, 0), textcoords="offset points", fontsize="x-small", va="center")
     left = min([-1.0, *(1.1 * m.eigenvalue.real for modes in shown.values() for m in modes)])
     if first:
         left = min(left, axis.get_xlim()[0])

@@ -87,9 +87,9 @@ def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
         ("f,time\n1,2\n", "its first column is 'f'; it must be the time"),
         ("time [h],f\n1,2\n2,3\n", "must be the time, as numbers below"),
         ("time,f\n1,2\n1,3\n", "the time of its 2 rows does not rise"),
-        ("time,f\n1,2\n2,3,4,5\n", "its lines do not have the columns of the first one"),
+        ("time,f\n1,2\n2,3,4,5\n", "and '2,3,4,5' has 4; name them all"),
         ("time,f\n0,00,50,1\n0,02,50,2\n", "the comma both parts the columns and stands in the numbers"),
-        ("time,f\n0.1,1,\n0.2,2,\n", "its first line names 2 columns, and the others have 3; name them all"),
+        ("time,f\n0.1,1,\n0.2,2,\n", "names 2 columns, and '0.1,1,' has 3; name them all"),
         (
             "time,f\n0,1\n20,2\n40,3\n",
             "its times are 20 apart, perhaps in ms, and 'time' says no unit; write 'time [s]'",
@@ -99,7 +99,7 @@ def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
         ("time;P\n0;1.234,5\n0,1;1.235,5\n", "'P' has '1.234,5'; write its numbers without marks between thousands"),
         ('time,P\n0.0,"1,234"\n0.1,999\n', "without marks between thousands"),
         ("time,f\n0.0,1\n0.1,bad\n", "column 'f' has 'bad' among numbers; leave such cells empty"),
-        ("", "cannot be read as CSV"),
+        ("", "its first column is ''"),
     ):
         path.write_text(text)
         with pytest.raises(InputError, match=r"ring\.csv: ") as caught:
