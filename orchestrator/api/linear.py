@@ -74,19 +74,13 @@ class LinearSystem(StateSpace):
     def to_control(self) -> Any:
         """The model as a `StateSpace` of python-control, with the names of states, inputs and outputs.
 
-        What that package does not take in a name becomes ``_``: ``gfor.omega`` is ``gfor_omega``.
-
-        Raises
-        ------
-        InputError
-            If python-control is not installed.
-        """
+        What that package does not take in a name becomes ``_``: ``gfor.omega`` is ``gfor_omega``."""
         try:
             control = import_module("control")
         except ImportError as error:
             raise InputError("the package control is missing; install it with `pip install control`") from error
-        names = {kind: [re.sub(r"\W+", "_", name) for name in getattr(self, kind)]
-                 for kind in ("states", "inputs", "outputs")}  # fmt: skip
+        kinds = ("states", "inputs", "outputs")
+        names = {kind: [re.sub(r"\W+", "_", name) for name in getattr(self, kind)] for kind in kinds}
         return control.ss(self.A, self.B, self.C, self.D, self.step_size or 0, **names)
 
     def __repr__(self) -> str:

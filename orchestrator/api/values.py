@@ -81,15 +81,8 @@ def binding_path(given: Any) -> Path | None:
 
 
 def kept(given: Any, name: str, argument: str) -> Path:
-    """The path of a file that is given, or of one in the cache with what is given as a mapping or a table.
-
-    Parameters
-    ----------
-    given
-        Of a file ``.toml`` a mapping; of one ``.csv`` a table, or rows by the names of operating points.
-    name, argument
-        Of the file, and of the caller's argument.
-    """
+    """The path of a file that is given, or of one in the cache with what is given: for ``.toml`` a mapping, for
+    ``.csv`` a table, or rows by the names of operating points."""
     if not isinstance(given, Mapping) and not hasattr(given, "to_csv"):
         return path(given, argument)
     if name.endswith(".toml"):

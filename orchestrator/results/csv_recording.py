@@ -55,7 +55,7 @@ def read_table(path: Path) -> xr.Dataset:
             f"write '{first} [s]' or '{first} [ms]'"
         )
     _check_numbers(path, table)
-    found = {name: _parts(name) for name in map(str, table.columns[1:]) if table[name].dtype.kind in "if"}
+    found = {name: _parts(name) for name in map(str, table.columns[1:]) if name and table[name].dtype.kind in "if"}
     columns = {short: ("time", table[full].to_numpy(float), {"units": u}) for full, (short, u) in found.items()}
     times = np.round(times - times[0], 6) if times[0] > _EPOCH else times
     return xr.Dataset(columns, {"time": times, LINE_FREQUENCY: 0.0})
@@ -68,14 +68,14 @@ def _table(path: Path) -> pd.DataFrame:
     else:
         try:
             text = _text(path.read_bytes())
-            parted = {mark: _parted(list(csv.reader(io.StringIO(text), delimiter=mark))) for mark in ";\t,"}
+            for mark in ";\t,":
+                names, rows = _parted(list(csv.reader(io.StringIO(text), delimiter=mark)))
+                if rows:
+                    break
         except (OSError, csv.Error) as error:
             raise InputError(f"{path}: it cannot be read as CSV: {error}") from error
-        mark, (names, rows) = next((one for one in parted.items() if one[1][1]), (",", parted[","]))
     if odd := next((row for row in rows if len(row) != len(names)), None):
-        both = (
-            "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between columns"
-        )
+        both = "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between them"
         remedy = both if mark == "," and len(rows[0]) == 2 * len(names) else "name them all"
         raise InputError(f"{path}: the line above the numbers names {len(names)} columns, and {mark.join(odd)!r} has "
                          f"{len(odd)}; {remedy}")  # fmt: skip
@@ -95,11 +95,9 @@ def _sheet(path: Path) -> list[list[str]]:
     """Cells of the first sheet."""
     try:
         cells = pd.read_excel(path, header=None)
-    except ImportError as error:
-        remedy = "install it with `pip install openpyxl`, or save the sheet as CSV"
-        raise InputError(f"{path}: Excel files need the package openpyxl; {remedy}") from error
     except Exception as error:
-        raise InputError(f"{path}: it cannot be read as Excel: {error}; save the sheet as CSV") from error
+        remedy = "`pip install openpyxl` where that is missing, or save the sheet as CSV"
+        raise InputError(f"{path}: it cannot be read as Excel: {error}; {remedy}") from error
     return [["" if pd.isna(x) else str(x) for x in row] for row in cells.itertuples(index=False)]
 
 
