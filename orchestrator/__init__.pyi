@@ -12,11 +12,15 @@ from orchestrator.api.export import export as export
 from orchestrator.api.fmu import info as info
 from orchestrator.api.fmu import open_fmu as open_fmu
 from orchestrator.api.identification import identify as identify
+from orchestrator.api.linear import LinearSystem as LinearSystem
 from orchestrator.api.linear import read_linear_model as read_linear_model
 from orchestrator.api.models import build as build
 from orchestrator.api.nyquist import nyquist as nyquist
 from orchestrator.api.results import Modes as Modes
 from orchestrator.api.results import Run as Run
+from orchestrator.api.saved import open as open
 from orchestrator.api.scenario import Scenario as Scenario
 from orchestrator.api.source import source as source
 from orchestrator.errors import CosimError as CosimError
+from orchestrator.screening.view import Screening as Screening
+from orchestrator.sweep.view import ParameterSweep as ParameterSweep

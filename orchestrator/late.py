@@ -1,5 +1,5 @@
-"""Libraries that are imported where they are first used: pandas and xarray take most of a second, and the modes of a
-case need neither.
+"""Libraries that are imported where they are first used: pandas, xarray and scipy.optimize take a second, and the
+modes of a case need none of them.
 
 A module that may do without them imports them from here, and defers its annotations (``from __future__ import
 annotations``), which would use the library at once."""
@@ -24,8 +24,9 @@ class Late:
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from scipy import optimize, signal
 else:
-    pd, xr = Late("pandas"), Late("xarray")
+    pd, xr, optimize, signal = (Late(name) for name in ("pandas", "xarray", "scipy.optimize", "scipy.signal"))
 
 
 def import_xarray_alone() -> None:
@@ -44,4 +45,4 @@ def import_xarray_alone() -> None:
             del sys.modules[name]
 
 
-__all__ = ["import_xarray_alone", "pd", "xr"]
+__all__ = ["import_xarray_alone", "optimize", "pd", "signal", "xr"]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ LARGEST_DAMPING = 40.0  # with a higher damping [%] less than a fifteenth of an 
 LEAST_ENERGY = 1e-3  # least part of the energy of all oscillations in the window
 AGREE = 0.05  # largest distance, as a part of |λ|, to the same mode in another identification of the same signal
 STEEP = 10.0  # A straight line that changes by this many times the strongest oscillation may hide smaller ones
+TOLD_APART = 0.75  # Two modes d Hz apart need 0.75/d s: with 3 % of noise the damping is right to 0.8 points then
 SHORTER, COARSER = 0.1, 30.0
 """The other identification leaves out this part of the window at its beginning, and takes singular values for noise
 that are this factor larger, so that its order is lower where noise made modes."""
@@ -123,6 +125,18 @@ def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> 
         f"periods of its strongest oscillation at {strongest.frequency_hz:.4g} Hz, and modes need "
         f"{FEWEST_PERIODS:g} at least. Give an earlier start, a later stop, or a longer run."
     )
+
+
+def told_apart(modes: Sequence[IdentifiedMode], length: float) -> str:
+    """How far apart two modes must lie to be told from each other, and which of those found lie closer.
+
+    ``length``: of the window [s]."""
+    apart = TOLD_APART / length
+    swings = sorted(mode.frequency_hz for mode in modes if _swings(mode, length))
+    close = [pair for pair in pairwise(swings) if 0 < pair[1] - pair[0] < apart]
+    text = f"{length:.4g} s of record tell two modes apart that lie {apart:.2g} Hz or more from each other"
+    longer = [f"{a:.4g} and {b:.4g} Hz need {TOLD_APART / (b - a):.3g} s" for a, b in close]
+    return f"{text}{': ' * bool(longer)}{', '.join(longer)}."
 
 
 def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:

@@ -1,12 +1,13 @@
 """Cases: loaded by name or path, their scenarios chosen, and the studies of a whole case."""
 
-from collections.abc import Callable
+import json
+import re
+import tomllib
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from types import MethodType
 from typing import TYPE_CHECKING, Any, Concatenate, cast
-
-import pandas as pd
 
 from orchestrator.added import rooms, study_in
 from orchestrator.api.methods import Asks, Shown, method
@@ -19,10 +20,12 @@ from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.cases.forcing import forced
+from orchestrator.cases.given import keep, kept
 from orchestrator.coordinated_design.command import STUDY as COORDINATED_DESIGN
 from orchestrator.coordinated_design.one_point import design_controller
 from orchestrator.errors import InputError
 from orchestrator.interactions.command import STUDY as INTERACTIONS
+from orchestrator.late import pd
 from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.view import ControllerDesign
 from orchestrator.points.points import nobody
@@ -48,11 +51,14 @@ def built_in_cases() -> tuple[str, ...]:
     return names_of_cases()
 
 
-def load(case: str | Path, *, trust_fmus: bool = False) -> "Case":
-    """Load a built-in case by name, or a case file or an SSP archive by path.
+def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "Case":
+    """Load a case.
 
     Parameters
     ----------
+    case
+        Name of a built-in case, path of a case file or an SSP archive, the text of a case file, or its tables. Of text
+        and tables, paths are relative to ``directory`` in them, or to where the program runs.
     trust_fmus
         Whether FMUs of others may run in this process, where the file says ``isolated = false``; they can do there
         whatever you can. Without it such a file is refused.
@@ -70,10 +76,16 @@ def load(case: str | Path, *, trust_fmus: bool = False) -> "Case":
     >>> gfor.load("infinite_bus").scenarios
     ('dip', 'load_step')
     """
+    trusted = flag(trust_fmus, "trust_fmus")
+    if isinstance(case, Mapping):
+        return Case(load_case(kept({"directory": str(Path.cwd()), **case}, "case.toml", "case"), trust_fmus=trusted))
+    if isinstance(case, str) and "\n" in case:
+        head = "" if re.search(r"(?m)^directory\s*=", case) else f"directory = {json.dumps(str(Path.cwd()))}\n"
+        return Case(load_case(keep(head + case, "case.toml"), trust_fmus=trusted))
     if not isinstance(case, str | Path) or not str(case):
         raise InputError(f"case = {case!r}; give a built-in case's name ({', '.join(names_of_cases())}) or a path")
     path_of(case, "case")
-    return Case(load_case(case, trust_fmus=flag(trust_fmus, "trust_fmus")))
+    return Case(load_case(case, trust_fmus=trusted))
 
 
 def _scenario(case: "Case", request: ScenarioRequest) -> Scenario:
@@ -136,6 +148,26 @@ class Case:
         """Names of the scenarios."""
         return tuple(self.file.scenarios)
 
+    def with_(self, **tables: Any) -> "Case":
+        """The case with other tables, such as ``events``, ``solver`` or ``network``; this one stays as it is.
+
+        Parameters
+        ----------
+        tables
+            As in a case file. Tables in tables are joined, lists replaced, and what is None is removed.
+
+        Examples
+        --------
+        >>> import orchestrator as gfor
+        >>> shorter = gfor.load("infinite_bus").with_(solver={"stop_time": "3 s"}, scenarios={"dip": None})
+        >>> shorter.scenarios, shorter.scenario().prepared.stop_time
+        (('load_step',), 3.0)
+        """
+        return load(
+            {"directory": str(self.file.directory)} | _joined(tomllib.loads(self.file.text), tables),
+            trust_fmus=self.file.trust_fmus,
+        )
+
     scenario = method("Case.scenario", ScenarioRequest, _scenario)
     choose = method("Case.choose", ScenariosRequest, _chosen)
     sweep = of_study("sweep", SWEEP)
@@ -187,3 +219,15 @@ def _folder(given: str | Path) -> Path:
             f"folder = {str(place)!r}: points cannot be kept there: {error.strerror}; choose another"
         ) from error
     return place
+
+
+def _joined(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables with changes: inner tables are joined, and what is None is removed."""
+    found = {key: value for key, value in tables.items() if changes.get(key, value) is not None}
+    for key, new in changes.items():
+        if isinstance(new, Mapping):
+            old = tables.get(key)
+            found[key] = _joined(old if isinstance(old, Mapping) else {}, new)
+        elif new is not None:
+            found[key] = new
+    return found

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from orchestrator.analysis.stability import Stability
 from orchestrator.analysis.state_space import StateSpace
@@ -12,7 +15,7 @@ from orchestrator.analysis.state_space import read_linear_model as read_state_sp
 from orchestrator.analysis.steady_state import OperatingPoint
 from orchestrator.asked import path as path_of
 from orchestrator.errors import InputError
-from orchestrator.late import pd
+from orchestrator.late import pd, signal
 from orchestrator.report.notebook import page
 
 UNKNOWN = OperatingPoint(math.nan, math.nan, math.nan, 0, {})
@@ -60,6 +63,25 @@ class LinearSystem(StateSpace):
             raise InputError(f"there is no matrix {matrix!r}; there are A, B, C and D")
         rows, columns = rows_and_columns[matrix]
         return pd.DataFrame(getattr(self, matrix), index=list(rows), columns=list(columns))
+
+    def to_scipy(self) -> signal.StateSpace:
+        """The model as `scipy.signal.StateSpace`; of a step map with its step ``dt`` [s].
+
+        For the design of a controller linearise with ``continuous=True``."""
+        step = {} if self.step_size is None else {"dt": self.step_size}
+        return signal.StateSpace(self.A, self.B, self.C, self.D, **step)
+
+    def to_control(self) -> Any:
+        """The model as a `StateSpace` of python-control, with the names of states, inputs and outputs.
+
+        What that package does not take in a name becomes ``_``: ``gfor.omega`` is ``gfor_omega``."""
+        try:
+            control = import_module("control")
+        except ImportError as error:
+            raise InputError("the package control is missing; install it with `pip install control`") from error
+        kinds = ("states", "inputs", "outputs")
+        names = {kind: [re.sub(r"\W+", "_", name) for name in getattr(self, kind)] for kind in kinds}
+        return control.ss(self.A, self.B, self.C, self.D, self.step_size or 0, **names)
 
     def __repr__(self) -> str:
         kind = "continuous" if self.step_size is None else f"step map of {self.step_size:g} s"

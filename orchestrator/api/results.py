@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.analysis.identification import IdentifiedMode
-from orchestrator.analysis.modes import Mode
+from orchestrator.analysis.modes import Mode, eigenvalues
+from orchestrator.arrays import Complex
 from orchestrator.cases.given import Time, moment
 from orchestrator.errors import CosimError, InputError
 from orchestrator.late import pd, xr
@@ -79,14 +80,7 @@ class Modes:
         return self.result.modes[index]
 
     def table(self) -> pd.DataFrame:
-        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping ratio, name, states.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> gfor.load("two_area").scenario("gfor").modes().table().columns.tolist()
-        ['real', 'imag', 'frequency_hz', 'damping_percent', 'name', 'states']
-        """
+        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states."""
         rows = [
             {
                 **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
@@ -99,15 +93,7 @@ class Modes:
         return pd.DataFrame(rows, columns=columns, index=pd.RangeIndex(1, len(rows) + 1, name="mode"))
 
     def participation(self) -> pd.DataFrame:
-        """Participation of every state (row) in every mode (column, as in `table`).
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> factors = gfor.load("two_area").scenario("gfor").modes().participation()
-        >>> factors.sum().round(6).unique().tolist()
-        [1.0]
-        """
+        """Participation of every state (row) in every mode (column, as in `table`)."""
         columns = {number: dict(mode.participation) for number, mode in enumerate(self.result.modes, start=1)}
         table = pd.DataFrame(columns, index=list(self.result.model.names))
         return table.rename_axis(index="state", columns="mode")
@@ -118,20 +104,31 @@ class Modes:
 
         return dict(modes_json([self.result]))
 
-    def plot(self, ax: Axes = None) -> Axes:
+    @property
+    def eigenvalues(self) -> Complex:
+        """All eigenvalues [rad/s] of the model that the verdict is on, complex, the largest real part first."""
+        found = eigenvalues(self.result.model)
+        return np.asarray(found[np.argsort(-found.real, kind="stable")])
+
+    def save(self, folder: str | Path) -> Path:
+        """Write what ``gfor modes --out`` leaves into a folder."""
+        from orchestrator.study.files import write_modes  # noqa: PLC0415 - plots: a second to import
+
+        place = made_folder(Path(folder), "folder")
+        write_modes([self.result], place)
+        return place
+
+    def plot(self, ax: Axes = None, *, radians: bool = False) -> Axes:
         """Eigenvalue map with rays of equal damping; large crosses are modes with a name.
 
-        A mode lies at its real part [1/s] and its frequency [Hz]: annotate it at
-        ``(mode.eigenvalue.real, mode.frequency_hz)``, not at the imaginary part, which is in rad/s.
+        A mode lies at its real part [1/s] and its frequency [Hz].
 
         Parameters
         ----------
         ax
             Matplotlib Axes, such as those with another scenario's modes; by default those of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
+        radians
+            The imaginary part [rad/s] in the place of the frequency: both axes have one unit.
 
         Examples
         --------
@@ -145,7 +142,7 @@ class Modes:
         from orchestrator.study.mode_plots import draw_eigenvalues  # noqa: PLC0415 - a second to import
 
         axes = axes_or_new(ax, 7.2, 5.0)
-        draw_eigenvalues(axes, [self.result], curves_on(axes))
+        draw_eigenvalues(axes, [self.result], curves_on(axes), radians=radians)
         axes.legend(loc="best", fontsize="small")
         return axes
 
@@ -255,13 +252,6 @@ class Run:
         ------
         InputError
             If it was not recorded.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> run = gfor.load("infinite_bus").scenario("dip").run(stop=1.2)
-        >>> run.signal("gfor.omega").dims
-        ('time',)
         """
         return recorded(self.dataset, expression, self.result.modes.prepared.name)
 
@@ -288,11 +278,7 @@ class Run:
     def save(self, folder: str | Path) -> Path:
         """Write what ``gfor run`` leaves of this scenario in its folder, for `compare`, ``gfor report`` and others.
 
-        Parameters
-        ----------
-        folder
-            Other scenarios' results that are in it stay, but for the tables of all together.
-        """
+        Other scenarios' results that are in the folder stay, but for the tables of all together."""
         from orchestrator.results.recording import TRAJECTORY  # noqa: PLC0415 - as below
         from orchestrator.results.storage import save_netcdf  # noqa: PLC0415 - as below
         from orchestrator.study.files import save_run, save_study  # noqa: PLC0415 - plots: a second to import
@@ -315,21 +301,10 @@ class Run:
         ax
             Matplotlib Axes, such as those with another run's signal; by default those of a new figure.
 
-        Returns
-        -------
-        matplotlib.axes.Axes
-
         Raises
         ------
         InputError
             If the signal was not recorded.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> run = gfor.load("infinite_bus").scenario("dip").run(stop=1.2)
-        >>> run.plot("grid.v").get_ylabel()
-        'grid.v [pu]'
         """
         from orchestrator.study.signal_plots import draw_signal  # noqa: PLC0415 - a second to import
 

@@ -238,8 +238,8 @@ def load_case(name_or_path: str | Path, *, trust_fmus: bool = False) -> Case:
     if (source := _SOURCES.get(path.suffix.lower())) is not None:
         what, section, key = source
         raise InputError(
-            f"{name_or_path}: this is {what}, not a case; write a case file (.toml) whose [{section}] has "
-            f'{key} = "{path.name}", and give that'
+            f"{name_or_path}: this is {what}, not a case; `gfor new` writes one (.toml), whose [{section}] has "
+            f'{key} = "{path.name}"; give that'
         )
     text, raw = read_toml(path, "the case file", "make it readable for you")
     return case_of_text(text, raw, path, trust_fmus=trust_fmus)
@@ -249,7 +249,7 @@ def case_of_text(text: str, raw: dict[str, Any], path: Path, *, trust_fmus: bool
     """The case of a text that is, or is to be, in a file; ``raw`` is what TOML makes of it."""
     table, problems = _validate(raw, text, path)
     table = table if table.models is None or problems else of_kind(table, table.models)
-    return _case(table, text, path, problems, path.parent, trust_fmus=trust_fmus)
+    return _case(table, text, path, problems, path.parent / (table.directory or ""), trust_fmus=trust_fmus)
 
 
 def _from_ssp(path: Path, trust_fmus: bool) -> Case:

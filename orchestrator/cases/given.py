@@ -5,6 +5,7 @@ Each reader here raises an `InputError` that says which argument it was, the val
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from orchestrator.asked import Value, number_in, path, plain_value
 from orchestrator.errors import InputError
+from orchestrator.late import pd
 
 if TYPE_CHECKING:
     from orchestrator.cases.parameter_files import ParameterFile
@@ -74,8 +76,37 @@ def _keys(values: Mapping[Any, Any]) -> Iterable[Any]:
 
 
 def binding_path(given: Any) -> Path | None:
-    """The path of a binding; None for None."""
-    return None if given is None else path(given, "binding")
+    """The path of a binding, which may be given as a mapping; None for None."""
+    return None if given is None else kept(given, "binding.toml", "binding")
+
+
+def kept(given: Any, name: str, argument: str) -> Path:
+    """The path of a file that is given, or of one in the cache with what is given: for ``.toml`` a mapping, for
+    ``.csv`` a table, or rows by the names of operating points."""
+    if not isinstance(given, Mapping) and not hasattr(given, "to_csv"):
+        return path(given, argument)
+    if name.endswith(".toml"):
+        import tomli_w  # noqa: PLC0415 - a path needs none
+
+        try:
+            text = tomli_w.dumps(given)
+        except (TypeError, ValueError, AttributeError) as error:
+            raise InputError(f"{argument}: {error}; give what TOML has: tables, lists, numbers and text") from error
+        return keep(text, name)
+    table = given if hasattr(given, "to_csv") else pd.DataFrame.from_dict(given, orient="index")
+    named = {"time", "name"} & set(table.columns)
+    return keep(table.to_csv(index=not named, index_label=None if named else "name"), name)
+
+
+def keep(text: str, name: str) -> Path:
+    """A text as a file in the cache, where workers find it."""
+    from fmus.toolchain.cache import cache_directory  # noqa: PLC0415 - a record needs no cache
+    from orchestrator.safe_files import write_text  # noqa: PLC0415 - as above
+
+    place = cache_directory("given") / hashlib.sha256(text.encode()).hexdigest()[:16] / name
+    if not place.is_file():
+        write_text(place, text)
+    return place
 
 
 def in_seconds(time: Time | None, argument: str) -> float | None:

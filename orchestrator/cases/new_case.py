@@ -46,6 +46,7 @@ class WantedCase:
     is_dll: bool = False
     models: str | None = None
     frequency: str | None = None
+    slack: str | None = None
     leave_out: tuple[str, ...] = ()
     dyr_leave_out: tuple[str, ...] = ()
     command: str = "gfor new"
@@ -197,7 +198,7 @@ record_interval = "10 ms"
 record = ["*.omega", "grid.*.v"{record}]
 {other}
 [power_flow]
-grid = "grid"
+grid = "grid"{slack}
 
 [components.grid]
 model = "{grid}"
@@ -277,6 +278,7 @@ class _Text:
             step=steps[kind],
             record=', "grid.line_*.p"' * lines + ', "gfor.*"' * (place is not None),
             other=rest + stray[other] if w.device is None else "",
+            slack=f"\nslack = {_quoted(w.slack)}" if w.slack else "",
             grid="grid" if kind == "emt" else "phasor_grid",
             network=f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
             more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "") + stray["emt"] * (kind == "emt")

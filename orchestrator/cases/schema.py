@@ -575,11 +575,13 @@ class ConventionsTable(Table):
 
 
 class CaseTable(Table):
-    """A whole case file; ``meant`` names values ``component.variable`` that are unusual on purpose."""
+    """A whole case file; ``meant`` names values ``component.variable`` that are unusual on purpose, ``directory`` is
+    what paths are relative to, the file's own folder where None."""
 
     name: FileName
     title: str = ""
     source: str = ""
+    directory: str | None = None
     meant: list[str] = []
     models: Literal["emt", "phasor"] | None = None
     emt: KindTable = KindTable()

@@ -66,7 +66,8 @@ def _remedy(model: str) -> str:
         return f"take {phasor!r}, or model = 'grid' for the network and EMT models for all"
     if model in model_names():
         return "it has no phasor form: take another model, or model = 'grid' for the network and EMT models for all"
-    return f"an FMU needs the outputs {', '.join(_PHASOR_PORT)} for that, or give the network the model 'grid'"
+    needed = f"an FMU needs the outputs {', '.join(_PHASOR_PORT)} for that"
+    return f"{needed}, or give the network the model 'grid', a case with `models` by --set models=emt"
 
 
 def _place_of_model(draft: Draft, name: str) -> str:

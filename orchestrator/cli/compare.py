@@ -14,7 +14,7 @@ from orchestrator.report.tables import make_table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("first", type=Path, metavar="A",
-                        help="folder of a scenario's results, its trajectory.nc, or COMTRADE (.cfg, .cff)")  # fmt: skip
+                        help="folder of a scenario's results, its trajectory.nc, COMTRADE, CSV or Excel")  # fmt: skip
     parser.add_argument("second", type=Path, metavar="B", help="the other one")
     parser.add_argument("--signal", action="append", metavar="SIGNAL",
                         help="'a.b' or 'a.b - c.d' (repeatable; default: those that differ most)")  # fmt: skip

@@ -17,7 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "exponentials. '?' marks a mode in doubt, with the reasons below the table."
     )
     parser.add_argument("run", type=Path, metavar="RUN",
-                        help="folder of a scenario's results, its trajectory.nc, COMTRADE or CSV")  # fmt: skip
+                        help="folder of a scenario's results, its trajectory.nc, COMTRADE, CSV or Excel")  # fmt: skip
     parser.add_argument("signal", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'")
     option(parser, "--start", "T", "beginning of the free response [s] (2)", read=seconds_or_none, default=2.0)
     option(parser, "--stop", "T", "its end [s] (default: the run's)", read=seconds)

@@ -88,15 +88,9 @@ def _compute(
         results = compute_all_modes(prepared, request.frequencies, request.critical, directional=request.directional)
     written = []
     if folder:
-        from orchestrator.results.staging import new_run_id, staged  # noqa: PLC0415 - only here
-        from orchestrator.results.storage import save_json  # noqa: PLC0415 - only here
-        from orchestrator.study.files import save_modes  # noqa: PLC0415 - plots: a second to import
+        from orchestrator.study.files import write_modes  # noqa: PLC0415 - plots: a second to import
 
-        written = ["modes.csv", "participation.csv", "mode_shapes.csv"]
-        with staged(folder, new_run_id()) as staging:
-            plots = [path.name for path in save_modes(results, staging)]
-            save_json(modes_json(results), staging / "modes.json")
-            written += ["modes.json", *sorted(path.name for path in staging.glob("power_flow_*.csv")), *plots]
+        written = write_modes(results, folder)
     weights = [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
     if options.json:
         print_json(modes_json(results, weights))

@@ -28,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--models", choices=("emt", "phasor"), help="default: phasor, with a vendor's file EMT")
     parser.add_argument("--frequency", metavar="HZ", help="'60 Hz', where the network's file does not say it")
+    parser.add_argument("--slack", metavar="NAME", help="unit or bus that feeds what is left, where no file says it")
     parser.add_argument("--leave-out", action="append", default=[], metavar="KIND", help="elements of the network that "
                         "may go, where a message asks for it (repeatable)")  # fmt: skip
     repeatable(parser, "--dyr-leave-out", "MODEL", "records of dynamics data that may go (repeatable)")
@@ -75,8 +76,9 @@ def _wanted(options: argparse.Namespace) -> WantedCase:
         raise InputError(f"--out {out}: a case file ends in .toml")
     return WantedCase(
         tuple(options.files), out, None if options.converter is None else read_converter(options.converter), device,
-        options.binding, options.dll is not None, options.models, options.frequency, tuple(options.leave_out),
-        tuple(options.dyr_leave_out), f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
+        options.binding, options.dll is not None, options.models, options.frequency, options.slack,
+        tuple(options.leave_out), tuple(options.dyr_leave_out),
+        f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
     )  # fmt: skip
 
 

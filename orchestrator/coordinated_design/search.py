@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-import scipy.optimize
 
 from orchestrator.arrays import Numbers
 from orchestrator.coordinated_design.objective import RatedPoint, Watched, Worth, together
 from orchestrator.coordinated_design.settings import SettingSpace
+from orchestrator.late import optimize
 from orchestrator.pod_design.lead_lag import angle_deg, compensation_deg
 from orchestrator.sensitivities.sensitivities import damping_change
 
@@ -157,7 +157,7 @@ class SettingSearch:
 
         ends = {"maxfev": _POLISHING * size, "xatol": 1e-4, "fatol": 1e-6}
         options = {"initial_simplex": simplex, "adaptive": size > 3, **ends}
-        scipy.optimize.minimize(cost, start.x, method="Nelder-Mead", options=options)
+        optimize.minimize(cost, start.x, method="Nelder-Mead", options=options)
         return best
 
     def _program(self, x: Numbers) -> "_Program":
@@ -227,7 +227,7 @@ class _Program:
         limits = [(max(-radius, low), min(radius, high)) for low, high in zip(self._lowest, self._highest, strict=True)]
         cost = np.zeros(len(limits) + 3)
         cost[-3:] = _BESIDE - 1.0, -_BESIDE, _PRICE
-        solved = scipy.optimize.linprog(
+        solved = optimize.linprog(
             cost, self._matrix, self._right, bounds=[*limits, (None, 1.0), (None, 1.0), (0.0, None)], method="highs"
         )
         return None if solved.x is None else np.asarray(solved.x[: len(limits)])

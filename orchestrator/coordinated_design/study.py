@@ -3,13 +3,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, MISSING, dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from orchestrator.analysis.modes import Mode
-from orchestrator.asked import DAMPING, FILE, GAIN_BOUNDS, NAMES, OUTAGES, RANKED, STAGES, Names, asked
+from orchestrator.asked import DAMPING, GAIN_BOUNDS, NAMES, OUTAGES, RANKED, STAGES, Names, asked
 from orchestrator.cases.case import Case
 from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.layers import OptionValues
@@ -28,7 +27,7 @@ from orchestrator.operating_points.plan import OperatingPoints, read_operating_p
 from orchestrator.pod_design.closed_loop import PodSetting, check_tunable
 from orchestrator.pod_design.target import check_range, find_target, require_controllers, with_controller
 from orchestrator.points.points import Work, nobody
-from orchestrator.points.request import OverCluster, of_scenario, of_values
+from orchestrator.points.request import POINTS_FILE, OverCluster, of_scenario, of_values
 from orchestrator.points.task import StudyCase
 from orchestrator.study.naming import modes_named
 
@@ -62,7 +61,7 @@ class PointsDesignRequest(OverCluster):
     True
     """
 
-    points: str | Path = asked(FILE, MISSING, "operating points: a CSV file, as gfor screen has it")
+    points: Any = asked(POINTS_FILE, MISSING, "operating points: a CSV file, as gfor screen has it")
     controllers: Sequence[str] = asked(
         NAMES, ("pod_p",), '``"pod_p"``, ``"pod_q"``, or both; each gets a setting of its own', option=None
     )

@@ -68,19 +68,7 @@ class CoordinatedDesign:
     def save(self, path: str | Path, command: str | None = None) -> list[Path]:
         """Write the parameter file, and beside it JSON, a row for each point and a row for each converter.
 
-        Parameters
-        ----------
-        path
-            Path of the parameter file, which ``--parameters`` and `Case.scenario` take.
-        command
-            The command that the file names as its origin; by default the call in Python.
-
-        Raises
-        ------
-        InputError
-            If the path is none, or ends in ``.json``.
-        ResultsError
-            If a file cannot be written.
+        ``command``: what the file names as its origin; by default the call in Python.
         """
         file = parameter_file_path(path)
         said = command or f"gfor.load({self.result.plan.case.name!r}).design_over_points(…) in Python"

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import scipy.optimize
 
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import ZERO
 from orchestrator.arrays import Matrix, Vector
 from orchestrator.errors import AnalysisError
+from orchestrator.late import optimize
 
 _FREQUENCIES = (0.01, 500.0)  # range of frequencies in which the loop is examined [Hz]
 _POINTS_PER_DECADE = 150
@@ -94,7 +94,7 @@ def _crossings(around: _Loop, grid: Vector, values: Vector) -> Iterator[tuple[fl
     for k in range(values.shape[1]):
         size = partial(_log_size, around, k)
         for i in np.flatnonzero(np.sign(sizes[:-1, k]) != np.sign(sizes[1:, k])):
-            w = float(scipy.optimize.brentq(size, grid[i], grid[i + 1], rtol=1e-10))
+            w = float(optimize.brentq(size, grid[i], grid[i + 1], rtol=1e-10))
             yield w, complex(around.eigenvalues(w)[k])
 
 

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.optimize
 from numpy.typing import NDArray
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.analysis.stability import grows
 from orchestrator.errors import AnalysisError
+from orchestrator.late import optimize
 from orchestrator.pod_design.closed_loop import PodLoop, PodSetting
 from orchestrator.pod_design.guard import guarded
 from orchestrator.pod_design.kept import digest
@@ -118,7 +118,7 @@ class _Ground:
 
         first = np.array(start) / scale
         simplex = [first, *(first + step for step in np.diag([-0.1 * np.sign(first[0] or 1), -0.3, -0.1]))]
-        result = scipy.optimize.minimize(
+        result = optimize.minimize(
             worth, first, method="Nelder-Mead", options={"maxfev": _EVALUATIONS, "initial_simplex": simplex}
         )
         turn, centre, gain = (result.x * scale).tolist()

@@ -58,6 +58,7 @@ def find_target(
     plans = {name: case.components_of(name, overrides, parameters) for name in names}
     if scenario is None:
         fitting = [name for name, plan in plans.items() if with_controller(plan, controller) and _all_off(plan)]
+        fitting = [name for name in fitting if case.scenarios[name].events is None] or fitting  # no fault's, say
         if len(fitting) != 1:
             what = "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
             raise InputError(

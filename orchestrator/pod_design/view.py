@@ -72,19 +72,7 @@ class ControllerDesign:
     def save(self, path: str | Path, command: str | None = None) -> Path:
         """Write the parameter file, which ``--parameters`` and `Case.scenario` take, and its JSON for ``gfor report``.
 
-        Parameters
-        ----------
-        path
-            Path of the parameter file; the JSON gets the same path with the suffix ``.json``.
-        command
-            The command that the file names as its origin; by default the call in Python.
-
-        Raises
-        ------
-        InputError
-            If the path is none, or ends in ``.json``: the JSON would take the parameter file's place.
-        ResultsError
-            If a file cannot be written.
+        ``command``: what the file names as its origin; by default the call in Python.
 
         Examples
         --------

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from orchestrator.asked import FLAG, NAMES, FieldKind, asked, text_or_none
-from orchestrator.cases.given import Paths, Time, case_values, in_seconds, parameter_files
+from orchestrator.cases.given import Paths, Time, case_values, in_seconds, kept, parameter_files
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import Value
@@ -17,6 +17,9 @@ def _as_it_is(given: Any, argument: str) -> Any:
     return given
 
 
+POINTS_FILE = FieldKind(
+    "FILE", Path, lambda given, argument: None if given is None else kept(given, "points.csv", argument)
+)
 ANYTHING = FieldKind("", str, _as_it_is)
 _VALUES = FieldKind("", str, case_values)
 _STEP = FieldKind("", str, in_seconds)

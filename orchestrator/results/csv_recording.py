@@ -1,8 +1,11 @@
-"""A CSV file as a dataset over the time, such as a run gives: the time first, then a column for each signal."""
+"""A table over the time, CSV or Excel, as a dataset such as a run gives: the time first, then a column each signal."""
 
 from __future__ import annotations
 
+import csv
+import io
 import re
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -14,20 +17,28 @@ from orchestrator.errors import InputError
 from orchestrator.late import pd, xr
 from orchestrator.results.comtrade.reading import LINE_FREQUENCY
 
+EXCEL = (".xlsx", ".xlsm")
+SUFFIXES = (".csv", ".tsv", *EXCEL)
 _HEADING = re.compile(r"\s*(.*?)\s*(?:[\[(]([^])]*)[])])?\s*")
 _SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}
-_TIMES = ("time", "t", "timestamp", "datetime")
+_TIMES = ("time", "t", "timestamp", "datetime", "zeit", "temps", "tiempo")
 _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
+_DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
+_TIME = re.compile(rf"\s*([-+]?\d*[.,]?\d+([eE][-+]?\d+)?|{_DATE.pattern})\s*")
+_EPOCH = 1e8
+"""Numbers of seconds above it count from 1970, and are taken from the first sample on."""
 
 
-def read_csv(path: Path) -> xr.Dataset:
-    """Read signals; headings such as ``f north [Hz]`` give a name and a unit. Columns without numbers are left out."""
+def read_table(path: Path) -> xr.Dataset:
+    """Read signals; headings such as ``f north [Hz]``, or a row of units below the names, give names and units.
+
+    Lines above the headings, and columns without numbers, are left out."""
     table = _table(path)
     first = str(table.columns[0]) if table.shape[1] else ""
     name, unit = _parts(first)
     kind = table[first].dtype.kind if len(table) else ""
-    stamps = _seconds_of_dates(table[first]) if kind and kind not in "if" else None
-    if name.lower() not in _TIMES or unit not in _SECONDS or (stamps is None and kind not in ("i", "f")):
+    stamps = _seconds_of_dates(table) if kind and kind not in "if" else None
+    if stamps is None and ((name.lower() not in _TIMES and not unit) or unit not in _SECONDS or kind not in ("i", "f")):
         raise InputError(
             f"{path}: its first column is {first!r}; it must be the time, as numbers below 'time', 't' or 'time [ms]', "
             "or as dates such as 2025-03-01 12:00:00.020, and a first line names the columns"
@@ -44,40 +55,89 @@ def read_csv(path: Path) -> xr.Dataset:
             f"write '{first} [s]' or '{first} [ms]'"
         )
     _check_numbers(path, table)
-    found = {name: _parts(name) for name in map(str, table.columns[1:]) if table[name].dtype.kind in "if"}
+    found = {name: _parts(name) for name in map(str, table.columns[1:]) if name and table[name].dtype.kind in "if"}
     columns = {short: ("time", table[full].to_numpy(float), {"units": u}) for full, (short, u) in found.items()}
+    times = np.round(times - times[0], 6) if times[0] > _EPOCH else times
     return xr.Dataset(columns, {"time": times, LINE_FREQUENCY: 0.0})
 
 
 def _table(path: Path) -> pd.DataFrame:
+    """Names, and rows of numbers where a column has nothing else."""
+    if path.suffix.lower() in EXCEL:
+        mark, (names, rows) = "", _parted(_sheet(path))
+    else:
+        try:
+            text = _text(path.read_bytes())
+            for mark in ";\t,":
+                names, rows = _parted(list(csv.reader(io.StringIO(text), delimiter=mark)))
+                if rows:
+                    break
+        except (OSError, csv.Error) as error:
+            raise InputError(f"{path}: it cannot be read as CSV: {error}") from error
+    if odd := next((row for row in rows if len(row) != len(names)), None):
+        both = "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between them"
+        remedy = both if mark == "," and len(rows[0]) == 2 * len(names) else "name them all"
+        raise InputError(f"{path}: the line above the numbers names {len(names)} columns, and {mark.join(odd)!r} has "
+                         f"{len(odd)}; {remedy}")  # fmt: skip
+    texts = pd.DataFrame(rows, columns=[f"{n} ({k})" if n in names[:k] else n for k, n in enumerate(names)], dtype=str)
+    return texts.apply(lambda column: _numbers(column, comma=mark != ","))
+
+
+def _numbers(column: pd.Series[Any], *, comma: bool) -> pd.Series[Any]:
+    column = column.str.strip().mask(lambda one: one.isin(["", "NaN", "nan", "NA", "N/A"]))
+    for texts in (column, column.str.replace(",", ".")) if comma else (column,):
+        with suppress(ValueError):
+            return pd.to_numeric(texts)
+    return column
+
+
+def _sheet(path: Path) -> list[list[str]]:
+    """Cells of the first sheet."""
     try:
-        with path.open(encoding="utf-8-sig") as file:
-            heading = file.readline()
-        mark = next((mark for mark in ";\t" if mark in heading), ",")
-        decimals = (".", ",") if mark != "," else (".",)
-        tables = [pd.read_csv(path, sep=mark, decimal=d, encoding="utf-8-sig", skipinitialspace=True) for d in decimals]
-    except (OSError, ValueError) as error:
-        reason = (
-            getattr(error, "strerror", None) or "its lines do not have the columns of the first one, or are no text"
-        )
-        raise InputError(f"{path}: it cannot be read as CSV: {reason}") from error
-    table = max(tables, key=lambda one: one.select_dtypes("number").shape[1])
-    if not isinstance(table.index, pd.RangeIndex):  # what pandas makes of columns without a name
-        more = table.shape[1] + table.index.nlevels
-        both = (
-            "the comma both parts the columns and stands in the numbers: write decimal points, or ';' between columns"
-        )
-        remedy = both if mark == "," and more == 2 * table.shape[1] else "name them all"
-        raise InputError(f"{path}: its first line names {table.shape[1]} columns, and the others have {more}; {remedy}")
-    return table
+        cells = pd.read_excel(path, header=None)
+    except Exception as error:
+        remedy = "`pip install openpyxl` where that is missing, or save the sheet as CSV"
+        raise InputError(f"{path}: it cannot be read as Excel: {error}; {remedy}") from error
+    return [["" if pd.isna(x) else str(x) for x in row] for row in cells.itertuples(index=False)]
 
 
-def _seconds_of_dates(column: pd.Series[Any]) -> Numbers | None:
+def _text(content: bytes) -> str:
+    """As Excel and recorders write it: with a mark of the code, in UTF-8, or in Windows' own."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return content.decode("utf-16")
+    with suppress(UnicodeDecodeError):
+        return content.decode("utf-8-sig")
+    return content.decode("cp1252", "replace")
+
+
+def _parted(rows: Sequence[list[str]]) -> tuple[list[str], list[list[str]]]:
+    """Names of the columns, with units from a row of their own, and the rows from the first that begins with a time."""
+    rows = [row for row in rows if row]
+    begin = next((k for k, row in enumerate(rows) if len(row) > 1 and row[1].strip() and _TIME.fullmatch(row[0])), 0)
+    if not begin:
+        return (rows[0] if rows else []), []
+    names, above = [cell.strip() for cell in rows[begin - 1]], rows[begin - 2] if begin > 1 else []
+    if above and len(above) == len(names) and names[0].strip("[]()") in (*_SECONDS, "UTC"):
+        units = [cell.strip("[]()") for cell in names]
+        names = [f"{name.strip()} [{unit}]" if unit else name.strip() for name, unit in zip(above, units, strict=True)]
+    return names, rows[begin:]
+
+
+def _seconds_of_dates(table: pd.DataFrame) -> Numbers | None:
     """Seconds from the first of some dates or times of day; None where they are none."""
-    texts = column.astype(str).str.replace(",", ".")
-    for day in ("", "2000-01-01T"):
+    texts = table.iloc[:, 0].astype(str).str.strip().str.replace(",", ".")
+    if not texts.str.fullmatch(_DATE).all():
+        return None
+    clock = table.iloc[:, 1].astype(str).str.strip().str.replace(",", ".") if table.shape[1] > 1 else texts
+    if texts.str.len().max() <= 10 and not texts.str.contains(":").any() and clock.str.fullmatch(_DATE).all():
+        texts = texts + " " + clock
+    if texts.str.contains("/").all() and texts.str.split(" ").str[0].nunique() == 1:
+        texts = texts.str.split(" ", n=1).str[-1]  # whichever is the month: all are of one day
+    texts = texts.str.replace(r"^(\d{2})\.(\d{2})\.(\d{4})", r"\3-\2-\1", regex=True)
+    form = "mixed" if texts.str.contains("[AP]M$").all() else "ISO8601"
+    for day in ("", "2000-01-01 "):
         with suppress(ValueError, TypeError):
-            stamps = pd.to_datetime(day + texts, format="ISO8601")
+            stamps = pd.to_datetime(day + texts, format=form)
             return np.asarray((stamps - stamps.iloc[0]).dt.total_seconds(), dtype=float)
     return None
 

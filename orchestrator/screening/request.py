@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.asked import FILE, FLAG, FREQUENCIES, OUTAGES, FieldKind, Names, asked, one_of, percent, read_percent
+from orchestrator.asked import FLAG, FREQUENCIES, OUTAGES, FieldKind, Names, asked, one_of, percent, read_percent
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import InputError
-from orchestrator.points.request import OverCluster, of_scenario, of_values
+from orchestrator.points.request import POINTS_FILE, OverCluster, of_scenario, of_values
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 
 _MOST = 100 * MOST_DAMPING
@@ -29,8 +28,7 @@ class ScreeningRequest(OverCluster):
     Examples
     --------
     >>> import orchestrator as gfor
-    >>> from pathlib import Path
-    >>> lines = "time,grid.X_L", "00:00,0.1", "01:00,0.5"
+    >>>     >>> lines = "time,grid.X_L", "00:00,0.1", "01:00,0.5"
     >>> _ = Path("day.csv").write_text(chr(10).join(lines))
     >>> screening = gfor.load("two_area").screen("day.csv", scenario="gfor")
     >>> screening.stable
@@ -40,10 +38,10 @@ class ScreeningRequest(OverCluster):
     0  00:00          0.58            10.57
     """
 
-    points: str | Path | None = asked(
-        FILE, None, "operating points: a CSV file, a row each (default: the case as it is)",
-        python="CSV file, a row each: a column ``time`` or ``name``, and what differs from the case; the case as it is "
-        "by default",
+    points: Any = asked(
+        POINTS_FILE, None, "operating points: a CSV file, a row each (default: the case as it is)",
+        python="CSV file or DataFrame, a row each: a column ``time`` or ``name``, and what differs from the case; or "
+        '``{"night": {"load": 0.6}}``; the case as it is by default',
     )  # fmt: skip
     outages: Names | None = asked(
         OUTAGES, None, "n-1, lines, units, or names such as line_1_2,sg3 or line_1_2+sg3 (repeatable)"

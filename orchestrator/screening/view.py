@@ -56,6 +56,11 @@ class Screening:
         """The verdict in one sentence."""
         return verdict_sentence(self.summary)
 
+    def table(self) -> pd.DataFrame:
+        """Of each outage the worst point, as in `items`: not judged first, then the least damped."""
+        rows = self.items().sort_values("least_damping_percent", na_position="first", kind="stable")
+        return rows.drop_duplicates("outage").set_index("outage")
+
     def items(self) -> pd.DataFrame:
         """One row for each operating point with each outage: status, verdict and least damping [%]."""
         return items_table(self.summary).frame()

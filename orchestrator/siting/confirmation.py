@@ -31,7 +31,6 @@ _TURNS, _PARTS = (-30.0, 0.0, 30.0), (1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 """Settings that are tried: turns beside the residue's angle [°], as the POD sees the frequency that it changes itself;
 and parts of the largest gain."""
 
-_ROUNDS = 12  # rounds in which a prediction settles: a device that moves the mode answers at the mode where it is then
 _EQUAL = 2e-4  # least damping ratios in the same part of this size are equally good
 _SAME = 0.5  # least similarity with which a mode of the system with the device is taken for the one without it
 
@@ -128,10 +127,7 @@ def _with_pod(
 
 def _predicted(master: Master, model: ComponentLinearization, bus: str, seen: SeenMode) -> complex:
     """λ with a component, whose answer is that at λ itself."""
-    eigenvalue = start = seen.mode.eigenvalue
-    for _ in range(_ROUNDS):
-        eigenvalue = start + seen.shift(bus, response_of(master, model, eigenvalue))
-    return eigenvalue
+    return seen.mode.eigenvalue + seen.settled(bus, lambda at: response_of(master, model, at))
 
 
 def _tuned(loop: PodLoop, by_gain: complex, eigenvalue: complex, most: float) -> PodSetting:

@@ -1,7 +1,7 @@
 """Modes as the buses see them: how a current at each bus drives a mode, and how the mode shows in the voltage there."""
 
 import cmath
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,8 @@ from orchestrator.arrays import Matrix, Vector
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.study.modes import ModesResult, modes_from, running
+
+_ROUNDS = 12  # in which a shift settles
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,17 @@ class SeenMode:
         moves the mode little; what it does to its own bus is taken in."""
         at_mode = np.linalg.solve(np.eye(2) - response @ self.impedance[bus], response)
         return complex(self.drive[bus] @ at_mode @ self.shown[bus])
+
+    def settled(self, bus: str, response: Callable[[complex], Vector]) -> complex:
+        """The same of a device that moves the mode farther: it answers at the mode where that is then. Of one that
+        moves it by more than the mode's own size, the shift by its answer at the mode as it was."""
+        start = eigenvalue = self.mode.eigenvalue
+        first = self.shift(bus, response(start))
+        for _ in range(_ROUNDS):
+            eigenvalue = start + self.shift(bus, response(eigenvalue))
+            if not abs(eigenvalue - start) < abs(start):
+                return first
+        return eigenvalue - start
 
 
 @dataclass(frozen=True)

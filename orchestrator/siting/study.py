@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from orchestrator.analysis.linearization import Blocks
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, damping_percent
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.arrays import Vector
 from orchestrator.asked import FILE, FREQUENCIES, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
@@ -19,7 +18,6 @@ from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import INTACT, read_outages
 from orchestrator.operating_points.preparation import ItemPreparation, failure
 from orchestrator.points.request import OfCase, of_scenario, of_values
-from orchestrator.sensitivities.sensitivities import damping_change
 from orchestrator.siting.confirmation import Confirmation, confirmed
 from orchestrator.siting.placing import converter, foreign, name_at, placed
 from orchestrator.siting.residues import SeenMode, Situation, situation_of
@@ -107,7 +105,7 @@ class SupportShift:
 
 DEVICE = "device"
 ByMode = Mapping[str, Mapping[str, SupportShift]]
-Response = Callable[[Situation, str, SeenMode], Vector]
+Shift = Callable[[Situation, str, SeenMode], complex]
 
 
 @dataclass(frozen=True)
@@ -192,20 +190,20 @@ def _shifted(
     return replace(found, ranking=tuple(sorted(buses, key=lambda bus: -found.least(bus)[0])))
 
 
-def _ideal(kind: str) -> Response:
-    return lambda at, bus, seen: ideal_support(kind, at.voltages[bus], seen.mode.eigenvalue)
+def _ideal(kind: str) -> Shift:
+    return lambda at, bus, seen: seen.shift(bus, ideal_support(kind, at.voltages[bus], seen.mode.eigenvalue))
 
 
-def _all_shifts(situations: Sequence[Situation], response: Response, *, tuned: bool) -> dict[str, ByMode]:
+def _all_shifts(situations: Sequence[Situation], shift: Shift, *, tuned: bool) -> dict[str, ByMode]:
     found: dict[str, ByMode] = {}
     for at in situations:
         by_mode = dict[str, Mapping[str, SupportShift]]()
         for seen in at.modes:
-            changes = {bus: seen.shift(bus, response(at, bus, seen)) for bus in at.voltages}
+            changes = {bus: shift(at, bus, seen) for bus in at.voltages}
             most = max(map(abs, changes.values())) or 1.0
-            eigenvalue = seen.mode.eigenvalue
+            eigenvalue, before = seen.mode.eigenvalue, seen.mode.damping_percent
             by_mode[seen.label] = {
-                bus: SupportShift(c, 100 * damping_change(eigenvalue, -abs(c) if tuned else c), abs(c) / most)
+                bus: SupportShift(c, damping_percent(eigenvalue + (-abs(c) if tuned else c)) - before, abs(c) / most)
                 for bus, c in changes.items()
             }
         found[at.name] = by_mode
@@ -223,14 +221,12 @@ def _of_foreign(
     with running(prepared) as master:
         find_operating_point(master)
         model = Blocks(master).components[name_at(bus)]
-        modes = [seen.mode.eigenvalue for at in situations for seen in at.modes]
-        answers = {eigenvalue: response_of(master, model, eigenvalue) for eigenvalue in modes}
 
-    def response(at: Situation, other: str, seen: SeenMode) -> Vector:
-        ahead = cmath.phase(at.voltages[other] / intact.voltages[bus])
-        return turned(answers[seen.mode.eigenvalue], ahead)
+        def shift(at: Situation, other: str, seen: SeenMode) -> complex:
+            ahead = cmath.phase(at.voltages[other] / intact.voltages[bus])
+            return seen.settled(other, lambda there: turned(response_of(master, model, there), ahead))
 
-    return _all_shifts(situations, response, tuned=False)
+        return _all_shifts(situations, shift, tuned=False)
 
 
 def _prepared(case: Case, request: SiteRequest, scenario: str) -> PreparedScenario:

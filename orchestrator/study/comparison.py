@@ -15,7 +15,7 @@ from orchestrator.analysis.window_halves import WindowPart, part_of
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade
-from orchestrator.results.csv_recording import read_csv
+from orchestrator.results.csv_recording import SUFFIXES, read_table
 from orchestrator.results.manifest import MANIFEST, ResultsWarning, checked
 from orchestrator.results.recorded import open_recording, open_whole
 from orchestrator.results.recording import FOLDER, TRAJECTORY, parts_of
@@ -51,7 +51,7 @@ class Comparison:
 def open_trajectory(path: Path) -> xr.Dataset:
     """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it; also one that is not finished.
 
-    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE; CSV is read as well.
+    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE; CSV and Excel are read as well.
 
     Warns
     -----
@@ -60,8 +60,8 @@ def open_trajectory(path: Path) -> xr.Dataset:
     """
     if is_comtrade(path):
         return read_comtrade(path)
-    if path.suffix.lower() == ".csv" and path.is_file():
-        return read_csv(path)
+    if path.suffix.lower() in SUFFIXES and path.is_file():
+        return read_table(path)
     if parts_of(path / FOLDER):
         dataset = open_recording(path / FOLDER)
         if not dataset.sizes["time"]:
@@ -80,7 +80,7 @@ def open_trajectory(path: Path) -> xr.Dataset:
     except (OSError, ValueError) as error:
         raise InputError(
             f"{file}: it cannot be read as NetCDF, or is damaged; give the folder of a scenario's results, its "
-            "trajectory.nc, a measured recording in COMTRADE (.cfg, .cff) or in CSV (.csv)"
+            "trajectory.nc, a measured recording in COMTRADE (.cfg, .cff), in CSV (.csv) or Excel (.xlsx)"
         ) from error
     if not dataset.sizes.get("time"):
         raise InputError(f"{file}: nothing was recorded in it; run the scenario again")

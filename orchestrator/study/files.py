@@ -15,13 +15,13 @@ from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recorded import in_memory, open_whole
 from orchestrator.results.recording import TRAJECTORY
 from orchestrator.results.signals import relative_difference
-from orchestrator.results.staging import ScenarioFolder
+from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
 from orchestrator.safe_files import write_text
 from orchestrator.study.answers import of_run
 from orchestrator.study.early_end import EarlyEnd
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
-from orchestrator.study.modes import ModesResult
+from orchestrator.study.modes import ModesResult, modes_json
 from orchestrator.study.run import RunResult
 from orchestrator.study.signal_plots import plot_signals
 
@@ -59,6 +59,15 @@ def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
         if plot(results, folder / name):
             plots.append(folder / name)
     return plots
+
+
+def write_modes(results: Sequence[ModesResult], folder: Path) -> list[str]:
+    """Write what ``gfor modes --out`` leaves, all of it at once; return the files' names."""
+    with staged(folder, new_run_id()) as staging:
+        plots = [path.name for path in save_modes(results, staging)]
+        save_json(modes_json(results), staging / "modes.json")
+        flows = sorted(path.name for path in staging.glob("power_flow_*.csv"))
+    return ["modes.csv", "participation.csv", "mode_shapes.csv", "modes.json", *flows, *plots]
 
 
 def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd | None = None) -> list[Path]:

@@ -1,14 +1,15 @@
 """A scenario's trajectory as another master would give it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
-
-import xarray as xr
 
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.observers import Observer
 from orchestrator.interop.emulation import emulate
 from orchestrator.interop.rules import MasterRules
+from orchestrator.late import xr
 from orchestrator.results.storage import trajectory_dataset
 
 

@@ -58,14 +58,19 @@ def linear_model(
 
     The verdict on the continuous model is its own; beside it stands what is to be said of the step map.
 
-    ``inputs`` and ``outputs``: names ``component.variable``.
+    ``inputs`` and ``outputs``: names ``component.variable``; an output may be a difference ``a.b - c.d``.
     ``as_continuous``: A model in continuous time instead of the map over one communication step."""
+    parts = {output: variables_of(output) for output in outputs}
+    if phasors := [output for output in outputs if "|" in output]:
+        raise InputError(f"outputs: {phasors[0]!r}: a magnitude is not linear; give its two parts")
+    wanted, outputs = list(outputs), list(dict.fromkeys(name for names in parts.values() for name in names))
+    select = np.array([[(n == parts[w][0]) - 1.0 * (n in parts[w][1:]) for n in outputs] for w in wanted])
     with running(prepared) as master:
         point = find_operating_point(master)
         blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)
         examined = examine(master, blocks, compose(blocks, master.schedule), continuous_model(master, blocks))
         if not as_continuous:
-            return state_space(blocks, master.schedule), point, examined
+            return _selected(state_space(blocks, master.schedule), select, wanted), point, examined
         if not blocks.serves_continuous:
             blocks = Blocks(master, inputs=inputs, outputs=outputs, without_step=True)
         space = state_space(blocks, None)
@@ -75,7 +80,11 @@ def linear_model(
             own = replace(own, stable=None, reason=examined.stability.reason)
         elif examined.stability.stable is not own.stable:
             warnings = (f"with the communication step the system is {examined.stability.sentence()}", *warnings)
-        return space, point, Examination(own, warnings)
+        return _selected(space, select, wanted), point, Examination(own, warnings)
+
+
+def _selected(space: StateSpace, select: Matrix, outputs: Sequence[str]) -> StateSpace:
+    return replace(space, C=select @ space.C, D=select @ space.D, outputs=tuple(outputs)) if outputs else space
 
 
 def response_at_steady_state(prepared: PreparedScenario) -> xr.Dataset:

@@ -31,18 +31,21 @@ def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> 
         save_figure(figure, path)
 
 
-def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0) -> None:
-    """Eigenvalue map with rays of equal damping; other people's figures as open circles."""
+def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0, *, radians: bool = False) -> None:
+    """Eigenvalue map with rays of equal damping; other people's figures as open circles.
+
+    ``radians``: the imaginary part [rad/s] instead of the frequency."""
+    turn = 2 * np.pi if radians else 1.0
     named = [m.frequency_hz for r in results for m in r.named.values()]
     highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
     if first:
-        highest_hz = max(highest_hz, axis.get_ylim()[1])
+        highest_hz = max(highest_hz, axis.get_ylim()[1] / turn)
     shown = {id(r): [m for m in r.modes if m.frequency_hz <= highest_hz and m.eigenvalue.real > -3] for r in results}
     for index, result in enumerate(results, start=first):
         modes = shown[id(result)]
         axis.scatter(
             [m.eigenvalue.real for m in modes],
-            [m.frequency_hz for m in modes],
+            [m.frequency_hz * turn for m in modes],
             marker="x",
             s=[70 if result.name_of(m) else 30 for m in modes] or 30,  # the legend takes its mark from here
             linewidths=[2.0 if result.name_of(m) else 1.0 for m in modes] or 1.0,
@@ -51,18 +54,18 @@ def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0) 
             zorder=3,
         )
         for reference in result.references.values():
-            at = _real_and_hz(reference)
-            axis.scatter(*at, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)
+            real, hertz = _real_and_hz(reference)
+            axis.scatter(real, hertz * turn, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)
     left = min([-1.0, *(1.1 * m.eigenvalue.real for modes in shown.values() for m in modes)])
     if first:
         left = min(left, axis.get_xlim()[0])
     axis.set_xlim(left, 0.35)
-    axis.set_ylim(0, highest_hz)
-    damping_rays(axis, left, highest_hz)
+    axis.set_ylim(0, highest_hz * turn)
+    damping_rays(axis, left, highest_hz * turn, turn)
     if not first:
         axis.axvline(0, color="#888888", linewidth=0.8)
     axis.set_xlabel("Real part [1/s]")
-    axis.set_ylabel("Frequency [Hz]")
+    axis.set_ylabel("Imaginary part [rad/s]" if radians else "Frequency [Hz]")
 
 
 def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:
@@ -73,8 +76,8 @@ def _real_and_hz(reference: ReferenceModeTable) -> tuple[float, float]:
     return float(-ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * reference.frequency_hz), reference.frequency_hz
 
 
-def damping_rays(axis: Any, left: float, highest_hz: float) -> None:
-    """Rays of equal damping ratio from 5 to 30 %, between a real part [1/s] and a frequency [Hz].
+def damping_rays(axis: Any, left: float, highest: float, turn: float = 1.0) -> None:
+    """Rays of equal damping ratio from 5 to 30 %, between a real part [1/s] and a frequency [Hz, or times ``turn``].
 
     Each has its label on it, inside of the Axes, whose limits must be set before. Rays that the Axes have are replaced.
     """
@@ -83,8 +86,8 @@ def damping_rays(axis: Any, left: float, highest_hz: float) -> None:
     labels: list[tuple[float, float]] = []
     for percent in (5, 10, 15, 20, 30):
         ratio = percent / 100
-        slope = ratio / np.sqrt(1 - ratio**2) * 2 * np.pi  # −Re λ per Hz
-        end = min(highest_hz, -left / slope)
+        slope = ratio / np.sqrt(1 - ratio**2) * 2 * np.pi / turn  # −Re λ per unit of the axis
+        end = min(highest, -left / slope)
         axis.plot([0, -slope * end], [0, end], color="#b0b0b0", linewidth=0.7, linestyle="--", zorder=1, gid=_RAY)
         labels.append(_place_of_label(axis, slope, labels))
         behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from orchestrator.analysis.identification import IdentifiedMode, Sampling
-from orchestrator.analysis.mode_doubts import is_trend, nothing_swings, over_a_trend, short_window
+from orchestrator.analysis.mode_doubts import is_trend, nothing_swings, over_a_trend, short_window, told_apart
 from orchestrator.late import pd
 from orchestrator.report.notebook import page
 from orchestrator.results.mode_json import eigenvalue_json
@@ -63,8 +63,8 @@ class SignalModes:
     @property
     def remarks(self) -> list[str]:
         """Sentences on the highest frequency that the samples can show, on the modes near it, on a window that is too
-        short, on a trend that may hide modes, on a window
-        without oscillations, and on each mode in doubt."""
+        short (for two close modes as well), on a trend that may hide modes, on a window without oscillations, and on
+        each mode in doubt."""
         highest = 0.5 / self.interval
         texts = [
             f"The samples used, every {self.interval:g} s, show nothing above {highest:.4g} Hz: "
@@ -80,6 +80,7 @@ class SignalModes:
         about = [
             nothing_swings(self.modes, length),
             short_window(self.modes, self.start, self.stop),
+            told_apart(self.modes, length) if len(self.modes) > 1 else "",
             over_a_trend(self.modes, length, self.line),
         ]
         doubtful = [m for m in self.modes if m.doubts and not self.is_trend(m)]

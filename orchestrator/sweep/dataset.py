@@ -1,5 +1,7 @@
 """A sweep as a labelled dataset, as a long table, and as JSON."""
 
+from __future__ import annotations
+
 import fnmatch
 import itertools
 import json
@@ -8,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from orchestrator.analysis.modes import damping_percent
+from orchestrator.late import xr
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.storage import provenance, save_netcdf, save_table
 from orchestrator.sweep.axes import grid_places

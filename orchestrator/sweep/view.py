@@ -48,15 +48,7 @@ class ParameterSweep:
     def __getitem__(self, name: str) -> xr.Dataset:
         """One mode as it was followed, over scenario and varied parameters; NaN where it is not.
 
-        Parameters
-        ----------
-        name
-            Of the followed mode, as `table` has it under ``mode``.
-
-        Raises
-        ------
-        InputError
-            If no mode was followed under this name, with the names that there are.
+        ``name``: of the followed mode, as `table` has it under ``mode``.
 
         Examples
         --------
@@ -105,30 +97,7 @@ class ParameterSweep:
         return sweep_json(self.samples)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write ``sweep.nc``, ``sweep.csv`` and the plots, as ``gfor sweep`` does.
-
-        Parameters
-        ----------
-        folder
-            Folder for the files; it is made where it is missing.
-
-        Returns
-        -------
-        list of Path
-            Paths of the files.
-
-        Raises
-        ------
-        InputError
-            If the folder cannot be made.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> sweep = gfor.load("infinite_bus").sweep(["gfor.P_0=0.4,0.6"], ["dip"], frequencies=(0, 100))
-        >>> [path.name for path in sweep.save("results")][:2]
-        ['sweep.nc', 'sweep.csv']
-        """
+        """Write ``sweep.nc``, ``sweep.csv`` and the plots, as ``gfor sweep`` does; return their paths."""
         from orchestrator.sweep.plots import save_sweep_plots  # noqa: PLC0415 - a second to import
 
         place = made_folder(Path(folder))
@@ -138,17 +107,7 @@ class ParameterSweep:
         return [place / name for name in (*tables, *(path.name for path in plots))]
 
     def plot(self, ax: Axes = None) -> Axes:
-        """The modes in the complex plane; a circle where each begins.
-
-        Parameters
-        ----------
-        ax
-            Matplotlib Axes; by default those of a new figure.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-        """
+        """The modes in the complex plane, on Matplotlib Axes or a new figure's; a circle where each begins."""
         from orchestrator.sweep.plots import draw_trajectories  # noqa: PLC0415 - a second to import
 
         axes = axes_or_new(ax, 8.0, 6.2)

@@ -47,6 +47,14 @@ def test_a_window_needs_two_periods(stop, told):
     assert modes.as_json()[0]["doubts"] == list(modes.modes[0].doubts)
 
 
+def test_the_record_that_two_close_modes_need_is_said():
+    modes = found(lambda t: swing(t, 0.86, 2) + swing(t, 0.95, 2, 0.8), stop=6.0)
+    (text,) = [text for text in modes.remarks if "tell two modes apart" in text]
+    hertz = sorted(mode.frequency_hz for mode in modes if not modes.is_trend(mode))
+    assert f"that lie {0.75 / (modes.stop - modes.start):.2g} Hz or more" in text
+    assert f"need {0.75 / (hertz[1] - hertz[0]):.3g} s" in text
+
+
 @pytest.mark.parametrize(("damping", "told"), [(30, False), (60, True)])
 def test_a_damping_that_leaves_nothing_is_in_doubt(damping, told):
     modes = found(lambda t: swing(t, 0.6, 5) + swing(t, 1.1, damping))

@@ -11,7 +11,7 @@ import orchestrator
 MODULES = (
     *(f"api.{name}" for name in ("acceptance", "admittance", "binding", "case", "certification", "comparison")),
     *(f"api.{name}" for name in ("comtrade", "export", "fmu", "identification", "linear")),
-    *(f"api.{name}" for name in ("models", "nyquist", "results", "scenario", "source")),
+    *(f"api.{name}" for name in ("models", "nyquist", "results", "saved", "scenario", "source")),
     *(f"{name}.view" for name in ("coordinated_design", "interactions", "pod_design", "screening", "sensitivities")),
     *("siting.view", "sweep.view"),
 )

@@ -8,6 +8,7 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import read_parameter_file
+from orchestrator.pod_design.target import find_target
 
 
 @pytest.fixture(autouse=True)
@@ -161,6 +162,11 @@ def test_a_case_whose_scenarios_leave_it_open(gfor, tmp_path):
     assert code == 2
     assert "more than one scenario (gfor, second) has components with pod_p and every POD off" in err
     assert "name one with --scenario" in err
+    text = text.replace("[scenarios.second]", "[scenarios.second]\nevents = []")
+    (tmp_path / "open.toml").write_text(text, encoding="utf-8")
+    chosen = find_target(load_case(tmp_path / "open.toml"), "pod_p", scenario=None, pattern=None, stages=None,
+                         overrides={}, parameters=())  # fmt: skip
+    assert chosen.scenario == "gfor"
 
 
 UNSTABLE = ("--set", "sg1.exciter.K_IR=100")

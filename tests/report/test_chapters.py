@@ -29,6 +29,9 @@ CERTIFICATE = {"sentence": "It passes at all.", "verdict": "passes", "passed": T
                "judged": "9 of 9", "missing": [], "departures": []}  # fmt: skip
 COMPARISON = [{"expression": "sg1.omega", "unit": "pu", "deviations": [1, 2], "largest": 0.5, "at": 1.2, "rms": 0.1}]
 
+IDENTIFIED = [{"real": -0.3, "imag": 5.8, "frequency_hz": 0.923, "damping_percent": 5.2, "amplitude": 0.1,
+               "doubts": []}]  # fmt: skip
+
 
 @pytest.fixture
 def folders(tmp_path):
@@ -36,10 +39,11 @@ def folders(tmp_path):
     for name, file, content in (
         ("design", "pod_p.json", SHEET), ("screen", "screening.json", SCREENING), ("check", "check.json", CHECK),
         ("certify", "certificate.json", CERTIFICATE), ("compare", "differences.json", COMPARISON),
+        ("ring", "ring.json", IDENTIFIED),
     ):  # fmt: skip
         (tmp_path / name).mkdir()
         (tmp_path / name / file).write_text(json.dumps(content), encoding="utf-8")
-    return [tmp_path / name for name in ("design", "screen", "check", "certify", "compare")]
+    return [tmp_path / name for name in ("design", "screen", "check", "certify", "compare", "ring")]
 
 
 def written(folders, tmp_path, **more):
@@ -55,7 +59,7 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
         "mon, sg3: no power flow: sg5 would need 129 %",
         "growth outside of the range was counted at some points only",
         "vendor.fmu: wrong rated frequency", "anything after it", "It passes at all.", "judged: 9 of 9",
-        "sg1.omega differs most, by 0.5 pu at 1.200 s", "two modes are close",
+        "sg1.omega differs most, by 0.5 pu at 1.200 s", "two modes are close", "strongest: 0.923 Hz, 5.20 %",
     ):  # fmt: skip
         assert said in first
     assert 'class="bad">not as required' in first

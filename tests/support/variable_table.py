@@ -10,11 +10,9 @@ from fmus.toolchain.variables import CalculatedParameter, Input, Output, Paramet
 ROOT = Path(__file__).parents[2]
 LEAFLETS = {
     "gfor": ROOT / "gfor_fmu" / "README.md",
-    "gfor_abc": ROOT / "gfor_fmu" / "README.md",
     "synchronous_generator_ac4a": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "synchronous_generator_st1": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "synchronous_generator_st4b": ROOT / "fmus" / "synchronous_generator" / "README.md",
-    "gfor_phasor": ROOT / "gfor_fmu" / "README.md",
     "synchronous_generator_ac4a_phasor": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "synchronous_generator_st1_phasor": ROOT / "fmus" / "synchronous_generator" / "README.md",
     "synchronous_generator_st4b_phasor": ROOT / "fmus" / "synchronous_generator" / "README.md",
@@ -35,6 +33,9 @@ LEAFLETS = {
     "probe_a": ROOT / "fmus" / "probe" / "README.md",
     "probe_b": ROOT / "fmus" / "probe" / "README.md",
 }
+FAMILY = ("gfor", "gfor_abc", "gfor_phasor")
+"""Models with one table for all of them."""
+
 KINDS = {Input: "input", Output: "output", Parameter: "parameter", CalculatedParameter: "calculated", State: "state"}
 
 
@@ -59,9 +60,37 @@ def _row(v: Variable) -> str:
     return f"| `{v.name}` | {kind} | {v.unit} | {start} | {bounds} | {v.text.replace('|', 'abs ')} | {source} |"
 
 
+def family_table() -> str:
+    """Inputs, outputs and parameters of the family, each once: both PODs in one row, ``*`` where it is tunable; states
+    by name."""
+    found: dict[str, dict[str, list[Variable]]] = {}
+    for name in FAMILY:
+        for v in build_model(name).variables:
+            key = v.name.replace("pod_p.", "pod_q.").replace("delta_q_pod", "delta_p_pod")
+            found.setdefault(key, {}).setdefault(name, []).append(v)
+    rows = ["|Name|Unit|Start|Range|What|", "|---|---|---|---|---|"]
+    states = []
+    for key, by_model in found.items():
+        first = next(iter(by_model.values()))
+        if isinstance(first[0], State | CalculatedParameter):
+            states.append(f"`{key}`")
+            continue
+        starts = dict.fromkeys(_row(v).split(" | ")[3] for all_of in by_model.values() for v in all_of)
+        only = "" if len(by_model) == len(FAMILY) else f"{', '.join(m.removeprefix('gfor_') for m in by_model)}: "
+        names = ",".join(f"`{v.name}`" for v in first)
+        mark = "*" if isinstance(first[0], Parameter) and first[0].tunable else ""
+        text = re.sub(r" \[.*\]| \(.*\)| of POD-[PQ]|; .*", "", first[0].text.replace("|", "abs ")).strip()
+        bounds = _row(first[0]).split(" | ")[4].replace(" ", "")
+        kind = KINDS[type(first[0])]
+        said = f"{only}{kind + ': ' if kind != 'parameter' else ''}{text}"
+        rows.append(f"|{names}{mark}|{first[0].unit}|{','.join(starts).replace(' ', '')}|{bounds}|{said}|")
+    table = "\n".join(rows)
+    return f"{table}\n\nStates and calculated values: {', '.join(states)}."
+
+
 def section(name: str) -> str:
     """The generated part of a leaflet, markers included."""
-    table = variable_table(build_model(name))
+    table = family_table() if name == "gfor" else variable_table(build_model(name))
     return f"<!-- variables:{name} -->\n{table}\n<!-- /variables:{name} -->"
 
 

@@ -195,6 +195,16 @@ def _comparison(file: Path, signals: Any) -> Chapter:
                    table("Differences", columns, rows, left=2))  # fmt: skip
 
 
+def _identified(file: Path, modes: Any) -> Chapter:
+    rows = [[f"{m['frequency_hz']:.4f}", damping(m["damping_percent"]), f"{m['amplitude']:.3g}",
+             escape("; ".join(m["doubts"]))] for m in modes]  # fmt: skip
+    swing = next((m for m in modes if m["frequency_hz"]), None)
+    figures = f"{swing['frequency_hz']:.3f} Hz, {swing['damping_percent']:.2f} %" if swing else "no oscillation"
+    sure = f"{sum(not m['doubts'] for m in modes)} of {len(modes)} modes without a doubt"
+    return Chapter(file, "With which modes does a record ring?", f"strongest: {figures}", None, sure, (),
+                   table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0))  # fmt: skip
+
+
 _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"device", "buses", "confirmed", "answer"}, _site),
     ({"counted_at_all_frequencies", "failures", "modes"}, _screening),
@@ -205,6 +215,7 @@ _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"trusted", "checks", "faults"}, _check),
     ({"scenarios", "facts", "step_size_s"}, _modes),
     ({"expression", "deviations", "rms"}, _comparison),
+    ({"amplitude", "doubts"}, _identified),
 )
 """What the JSON of each study has, the first that fits."""
 

@@ -1,0 +1,106 @@
+"""Cases, points and bindings as Python has them, what was saved, and models for control design."""
+
+import sys
+import tomllib
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import orchestrator as gfor
+from orchestrator.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def case():
+    return gfor.load("infinite_bus")
+
+
+def test_a_case_is_loaded_from_tables_and_from_text(case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = case.file.text
+    for given in (text, tomllib.loads(text)):
+        found = gfor.load(given)
+        assert found.scenarios == case.scenarios
+        assert found.file.directory == tmp_path
+    with pytest.raises(InputError, match=r"case: .*give what TOML has"):
+        gfor.load({"name": object()})
+
+
+def test_changes_join_tables_and_leave_the_case(case):
+    changed = case.with_(solver={"stop_time": "3 s"}, scenarios={"dip": None})
+    assert changed.scenarios == ("load_step",)
+    assert changed.scenario().prepared.stop_time == 3.0
+    assert changed.scenario().prepared.step_size == case.scenario("dip").prepared.step_size
+    assert changed.file.directory == case.file.directory
+    assert case.scenarios == ("dip", "load_step")
+
+
+def test_points_are_tables_and_mappings():
+    case = gfor.load("two_area_rms")
+    frame = pd.DataFrame({"name": ["short", "long"], "grid.X_L": [0.1, 0.2]})
+    rows = {"short": {"grid.X_L": 0.1}, "long": {"grid.X_L": 0.2}}
+    of_frame, of_rows = (case.screen(points, scenario="gfor", outages="units") for points in (frame, rows))
+    assert of_frame.items().equals(of_rows.items())
+    assert of_frame.items()["point"].unique().tolist() == ["short", "long"]
+    table = of_frame.table()
+    assert table.index.is_unique
+    assert table["least_damping_percent"].dropna().is_monotonic_increasing
+    with pytest.raises(InputError, match=r"points\.csv, line 1: column 'grid\.X_l'"):
+        case.screen({"short": {"grid.X_l": 0.1}}, scenario="gfor")
+
+
+def test_a_binding_is_a_mapping():
+    binding = tomllib.loads(gfor.bind(gfor.build("gfor")))
+    with pytest.raises(gfor.CosimError, match=r"binding\.toml"):
+        gfor.open_fmu(gfor.build("gfor"), binding=binding | {"voltage": {}})
+
+
+@pytest.fixture(scope="module")
+def modes():
+    return gfor.load("two_area_rms").scenario("gfor").modes()
+
+
+def test_what_was_saved_is_opened(case, modes, tmp_path):
+    modes.save(tmp_path / "dip")
+    saved = gfor.open(tmp_path / "dip")
+    assert saved["modes.json"]["scenarios"][0]["name"] == "gfor"
+    assert saved["modes.csv"]["frequency [Hz]"].size == len(modes)
+    with pytest.raises(InputError, match=r"holds no 'modes\.nc'; it holds: .*modes\.csv"):
+        saved["modes.nc"]
+    case.scenario("dip").modes().save(tmp_path / "none")
+    assert gfor.open(tmp_path / "none")["modes.csv"].empty
+    with pytest.raises(InputError, match="there are no results"):
+        gfor.open(tmp_path / "x")
+    (tmp_path / "dip" / "modes.csv").write_text("changed")
+    with pytest.raises(InputError):
+        saved["modes.csv"]
+
+
+def test_all_eigenvalues_and_the_map_in_one_unit(modes):
+    assert len(modes.eigenvalues) == modes.stability.eigenvalues
+    assert all(np.abs(modes.eigenvalues - mode.eigenvalue).min() < 1e-6 * abs(mode.eigenvalue) for mode in modes)
+    axes = modes.plot(radians=True)
+    assert axes.get_ylabel() == "Imaginary part [rad/s]"
+    points = next(c for c in axes.collections if len(c.get_offsets()))
+    assert list(points.get_offsets()[0]) == pytest.approx([modes[0].eigenvalue.real, modes[0].eigenvalue.imag])
+
+
+def test_linear_models_go_to_scipy_and_control(case, monkeypatch):
+    scenario, inputs = case.scenario("load_step"), ["gfor.droop.delta_P_ref"]
+    parts = scenario.linearize(inputs, ["gfor.omega", "gfor.p"], continuous=True)
+    both = scenario.linearize(inputs, ["gfor.p - gfor.omega", "gfor.p"], continuous=True)
+    assert both.outputs == ("gfor.p - gfor.omega", "gfor.p")
+    np.testing.assert_allclose(both.C, [parts.C[1] - parts.C[0], parts.C[1]], rtol=1e-9, atol=1e-12)
+    with pytest.raises(InputError, match="a magnitude is not linear"):
+        scenario.linearize(inputs, ["|gfor.i|"])
+    assert np.array_equal(both.to_scipy().A, both.A)
+    assert scenario.linearize(inputs, ["gfor.p"]).to_scipy().dt == scenario.prepared.step_size
+    monkeypatch.setitem(sys.modules, "control", None)
+    with pytest.raises(InputError, match="pip install control"):
+        both.to_control()
+    monkeypatch.setitem(sys.modules, "control", SimpleNamespace(ss=lambda *a, **names: (a[4], names)))
+    step, names = both.to_control()
+    assert (step, names["inputs"]) == (0, ["gfor_droop_delta_P_ref"])
+    assert names["outputs"] == ["gfor_p_gfor_omega", "gfor_p"]
