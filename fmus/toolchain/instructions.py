@@ -4,6 +4,8 @@ from collections.abc import Iterator
 
 import casadi as ca
 
+from fmus.toolchain.kernel import scalar_function
+
 CODES = {
     # CasADi's operation -> code of a tape, as `c/tape.c` and `tape_in_python.py` know it
     **{ca.OP_ADD: 0, ca.OP_SUB: 1, ca.OP_MUL: 2, ca.OP_DIV: 3, ca.OP_POW: 4, ca.OP_CONSTPOW: 4, ca.OP_ATAN2: 5},
@@ -24,8 +26,7 @@ def instructions(function: ca.Function, name: str) -> Iterator[tuple[int, list[i
 
     Sources and targets are numbers of registers, which are used again and again; of `INPUT` the source, and of
     `OUTPUT` the target, is an argument's or result's number and the element in it. The value is that of `CONSTANT`."""
-    arguments = [ca.SX.sym("a", function.sparsity_in(k)) for k in range(function.n_in())]
-    dense = ca.Function(name, arguments, [ca.densify(result) for result in function.call(arguments)])
+    dense = scalar_function(function, name)
     codes = CODES | _OTHERS
     for k in range(dense.n_instructions()):
         code = codes.get(operation := dense.instruction_id(k))

@@ -30,7 +30,12 @@ def c_source(model: Model, further: Mapping[str, ca.Function] | None = None) -> 
 
     ``further``: Functions by name whose code is wanted beside the kernel's own; the enumerator ``NWD`` is the room they
     need."""
-    functions = kernel_functions(model)
+    functions = {
+        "initialise": model.initialise,
+        "outputs": model.outputs_function,
+        "derivatives": model.derivatives,
+        "requirements": model.requirements,
+    }
     further = dict(further or {})
     sizes = {
         "NP": len(model.parameters),
@@ -68,16 +73,6 @@ def _tables(lists: Mapping[str, list[int]]) -> str:
     return "\n".join(
         f"static const int {name}[] = {{{', '.join(map(str, values))}}};" for name, values in lists.items()
     )
-
-
-def kernel_functions(model: Model) -> dict[str, ca.Function]:
-    """The functions of a kernel by name."""
-    return {
-        "initialise": model.initialise,
-        "outputs": model.outputs_function,
-        "derivatives": model.derivatives,
-        "requirements": model.requirements,
-    }
 
 
 def scalar_function(function: ca.Function, name: str) -> ca.Function:
