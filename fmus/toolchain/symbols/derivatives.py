@@ -64,10 +64,11 @@ def _moved(values: Vector, symbols: Mapping[Expr, dict[int, Expr]]) -> list[dict
     return [moves[value] for value in values]
 
 
-def _partials(node: Expr) -> _Partials:
-    """Derivatives of an operation by its first and by its second operand."""
-    found = _DERIVATIVES.get(node.op)
-    return found(node, node.a, node.b) if found is not None else (ZERO, ZERO)  # comparisons, logic, floor
+def _partials(f: Expr) -> _Partials:
+    """Derivatives of an operation by its first and by its second operand; none of comparisons, logic, floor."""
+    if (by_two := _BY_TWO.get(f.op)) is not None:
+        return by_two(f, f.a, f.b)
+    return _BY_ONE[f.op](f, f.a) if f.op in _BY_ONE else ZERO, ZERO
 
 
 def _of_power(f: Expr, x: Expr, y: Expr) -> _Partials:
@@ -85,27 +86,14 @@ def _of_angle(_: Expr, x: Expr, y: Expr) -> _Partials:
     return y / length, -x / length
 
 
-_DERIVATIVES: dict[int, Callable[[Expr, Expr, Expr], _Partials]] = {
-    Op.ADD: lambda f, x, y: (ONE, ONE),
-    Op.SUB: lambda f, x, y: (ONE, MINUS_ONE),
-    Op.MUL: lambda f, x, y: (y, x),
-    Op.DIV: lambda f, x, y: (1 / y, -f / y),
-    Op.POW: _of_power,
-    Op.CONSTPOW: _of_power,
-    Op.FMIN: _of_extreme,
-    Op.FMAX: _of_extreme,
-    Op.ATAN2: _of_angle,
-    Op.COPYSIGN: lambda f, x, y: (sign(x) * copysign(1, y), ZERO),
-    Op.NEG: lambda f, x, _: (MINUS_ONE, ZERO),
-    Op.TWICE: lambda f, x, _: (TWO, ZERO),
-    Op.SQ: lambda f, x, _: (x + x, ZERO),
-    Op.INV: lambda f, x, _: (-f * f, ZERO),
-    Op.SQRT: lambda f, x, _: (1 / (f + f), ZERO),
-    Op.EXP: lambda f, x, _: (f, ZERO),
-    Op.LOG: lambda f, x, _: (1 / x, ZERO),
-    Op.SIN: lambda f, x, _: (cos(x), ZERO),
-    Op.COS: lambda f, x, _: (-sin(x), ZERO),
-    Op.TAN: lambda f, x, _: (1 / sq(cos(x)), ZERO),
-    Op.ATAN: lambda f, x, _: (1 / (1 + x * x), ZERO),
-    Op.FABS: lambda f, x, _: (sign(x), ZERO),
-}
+_BY_ONE: dict[int, Callable[[Expr, Expr], Expr]] = {
+    Op.NEG: lambda f, x: MINUS_ONE, Op.TWICE: lambda f, x: TWO, Op.SQ: lambda f, x: x + x,
+    Op.INV: lambda f, x: -f * f, Op.SQRT: lambda f, x: 1 / (f + f), Op.EXP: lambda f, x: f,
+    Op.LOG: lambda f, x: 1 / x, Op.SIN: lambda f, x: cos(x), Op.COS: lambda f, x: -sin(x),
+    Op.TAN: lambda f, x: 1 / sq(cos(x)), Op.ATAN: lambda f, x: 1 / (1 + x * x), Op.FABS: lambda f, x: sign(x),
+}  # fmt: skip
+_BY_TWO: dict[int, Callable[[Expr, Expr, Expr], _Partials]] = {
+    Op.ADD: lambda f, x, y: (ONE, ONE), Op.SUB: lambda f, x, y: (ONE, MINUS_ONE), Op.MUL: lambda f, x, y: (y, x),
+    Op.DIV: lambda f, x, y: (1 / y, -f / y), Op.POW: _of_power, Op.CONSTPOW: _of_power, Op.FMIN: _of_extreme,
+    Op.FMAX: _of_extreme, Op.ATAN2: _of_angle, Op.COPYSIGN: lambda f, x, y: (sign(x) * copysign(1, y), ZERO),
+}  # fmt: skip

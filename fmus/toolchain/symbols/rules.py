@@ -154,26 +154,17 @@ logic_not, logic_and, logic_or = _of_one(Op.NOT), _of_two(Op.AND), _of_two(Op.OR
 
 
 RULES |= {
-    Op.ADD: _add,
-    Op.SUB: _sub,
-    Op.MUL: _mul,
-    Op.DIV: _div,
-    Op.POW: _pow,
+    Op.ADD: _add, Op.SUB: _sub, Op.MUL: _mul, Op.DIV: _div, Op.POW: _pow, Op.TWICE: _twice, Op.SQ: _squared,
+    Op.IF_ELSE_ZERO: _if_else_zero, Op.NEG: lambda x, _: -x, Op.INV: _undone(Op.INV, Op.INV),
+    Op.LOG: _undone(Op.LOG, Op.EXP), Op.NOT: _undone(Op.NOT, Op.NOT),
     Op.LT: lambda x, y: ZERO if _nonnegative(_sub(x, y)) else node(Op.LT, x, y),
     Op.LE: lambda x, y: ONE if _nonnegative(_sub(y, x)) else node(Op.LE, x, y),
     Op.EQ: lambda x, y: ONE if _same(x, y) else node(Op.EQ, x, y),
     Op.NE: lambda x, y: ZERO if _same(x, y) else node(Op.NE, x, y),
-    Op.IF_ELSE_ZERO: _if_else_zero,
-    Op.TWICE: _twice,
-    Op.NEG: lambda x, _: -x,
-    Op.SQ: _squared,
     Op.FABS: lambda x, _: fabs(x.a) if x.op == Op.NEG else node(Op.FABS, x, x),
     Op.SQRT: lambda x, _: fabs(x.a) if x.op == Op.SQ else node(Op.SQRT, x, x),
     Op.COS: lambda x, _: cos(x.a) if x.op in (Op.NEG, Op.FABS) else node(Op.COS, x, x),
-    Op.INV: _undone(Op.INV, Op.INV),
-    Op.LOG: _undone(Op.LOG, Op.EXP),
-    Op.NOT: _undone(Op.NOT, Op.NOT),
-}
+}  # fmt: skip
 
 
 def if_else(condition: Scalar, if_true: Scalar, if_false: Scalar) -> Expr:
