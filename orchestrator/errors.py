@@ -113,7 +113,7 @@ class Problem:
     kind: ErrorKind = ErrorKind.VALUES
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.text}" if self.place else self.text
+        return spelled(f"{self.place}: {self.text}" if self.place else self.text)
 
 
 MOST_PROBLEMS = 200

@@ -29,6 +29,11 @@ COMMANDS_ALONE = {
 FOREIGN = {"ipv", "loglevel", "port", "local", "timeout", "federates"}  # of helics_broker
 
 
+def test_questions_name_keywords_too():
+    with pytest.warns(UserWarning, match=r"values gfor.pod_p.K: .* cannot act"):
+        gfor.load("two_area").scenario("gfor", {"gfor.pod_p.K": 30.0})
+
+
 @pytest.mark.parametrize(
     ("text", "python"),
     [
