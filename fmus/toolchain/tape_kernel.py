@@ -1,7 +1,6 @@
 """A tape executed in pure Python, where no library for it fits the platform.
 
-The FMU takes this file along as a module of its own. It is not imported by the toolchain and needs a Python and nothing
-else. Operations and their order are those of ``c/tape.c``, so both give the same results to rounding."""
+The FMU takes this file along as a module of its own, so it needs a Python and nothing else. Operations and their order are those of ``c/tape.c``, so both give the same results to rounding."""
 
 import math
 import struct

@@ -1,7 +1,10 @@
 """Operations of expressions: their numbers, which are CasADi's, what they are in Python and C, and their values."""
 
+import math
 from collections.abc import Callable
 from typing import Any
+
+from fmus.toolchain.tape_kernel import NAMES
 
 
 class Op:
@@ -13,44 +16,6 @@ class Op:
     FMIN, FMAX, INV = range(34, 37)
     ATAN2, CONST, INPUT, OUTPUT, SYMBOL = range(43, 48)
 
-
-ARITHMETIC = """import math
-from math import atan, atan2, copysign, fabs, floor, inf, isfinite, nan
-
-
-# Arithmetic as in C: what is undefined becomes inf or nan and is found by its name after the step.
-
-
-def divide(a, b):
-    try:
-        return a / b
-    except ZeroDivisionError:
-        return copysign(inf, a) * copysign(1.0, b) if a == a and a != 0.0 else nan
-
-
-def power(a, b):
-    try:
-        return math.pow(a, b)
-    except (ValueError, OverflowError):
-        return nan if a < 0.0 else inf
-
-
-def as_in_c(function, overflow):
-    def evaluate(a):
-        try:
-            return function(a)
-        except (ValueError, OverflowError):
-            return overflow(a)
-
-    return evaluate
-
-
-sqrt = as_in_c(math.sqrt, lambda a: nan)
-log = as_in_c(math.log, lambda a: -inf if a == 0.0 else nan)
-exp = as_in_c(math.exp, lambda a: inf)
-sin, cos, tan = (as_in_c(f, lambda a: nan) for f in (math.sin, math.cos, math.tan))
-"""
-"""The beginning of a module with operations in Python."""
 
 _SAME = {
     Op.ADD: "{0} + {1}", Op.SUB: "{0} - {1}", Op.MUL: "{0} * {1}", Op.NEG: "-{0}", Op.TWICE: "2.0 * {0}",
@@ -67,7 +32,7 @@ PYTHON = _SAME | {
     Op.NOT: "0.0 if {0} else 1.0", Op.IF_ELSE_ZERO: "{1} if {0} else 0.0",
     Op.SIGN: "(0.0 < {0}) - (0.0 > {0}) + 0.0 * {0}",
 }  # fmt: skip
-"""An operation in Python; what it calls is in `ARITHMETIC`."""
+"""An operation in Python; what it calls is in the `NAMES` of a tape's kernel."""
 
 C = _SAME | {
     Op.DIV: "{0} / {1}", Op.INV: "1. / {0}", Op.SQ: "{0} * {0}", Op.POW: "pow({0}, {1})",
@@ -80,8 +45,7 @@ C = _SAME | {
 UNARY = {op for op, form in PYTHON.items() if "{1}" not in form}
 """Operations of one operand."""
 
-_scope: dict[str, Any] = {}
-exec(ARITHMETIC, _scope)
+_scope: dict[str, Any] = {**NAMES, "atan": math.atan}
 VALUE: dict[int, Callable[[float, float], float]] = {
     operation: eval(f"lambda a, b: {form.format('a', 'b')}", _scope) for operation, form in PYTHON.items()
 }
