@@ -160,12 +160,9 @@ def limited_current(limit: CurrentLimit, demanded: Phasor, k_p: Expr) -> Limited
     clamped = demanded.clamped(limit.box.i_q_max, limit.box.i_d_max)
     of_box = fmax(fabs(demanded.re) / limit.box.i_q_max, fabs(demanded.im) / limit.box.i_d_max)
     return LimitedCurrent(
-        demanded,
-        _where(box, clamped, passed),
-        missing,
-        _where(limit.is_kind(SATURATION_INFORMED), missing, ZERO),
+        demanded, _where(box, clamped, passed), missing, _where(limit.is_kind(SATURATION_INFORMED), missing, ZERO),
         if_else(box, of_box, size / free),
-    )
+    )  # fmt: skip
 
 
 def _where(condition: Expr, then: Phasor, otherwise: Phasor) -> Phasor:

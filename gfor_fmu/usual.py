@@ -13,13 +13,9 @@ _POD = {
 }
 
 FORMING = {
-    **CONVERTER,
-    "droop.R_f": Usual(0.001, 0.3, DROOP, or_zero=True),
-    "droop.R_V": Usual(0.001, 0.5, VOLTAGE_DROOP, or_zero=True),
-    "droop.tau_P": Usual(0.002, 2, CONTROL),
-    "droop.tau_Q": Usual(0.002, 2, CONTROL),
-    "voltage_control.tau": Usual(0.002, 0.5, CONTROL),
-    "voltage_control.i_q_max": Usual(0.5, 5, CURRENT),
-    "voltage_control.i_d_max": Usual(0.5, 5, CURRENT),
+    **CONVERTER, "droop.R_f": Usual(0.001, 0.3, DROOP, or_zero=True),
+    "droop.R_V": Usual(0.001, 0.5, VOLTAGE_DROOP, or_zero=True), "droop.tau_P": Usual(0.002, 2, CONTROL),
+    "droop.tau_Q": Usual(0.002, 2, CONTROL), "voltage_control.tau": Usual(0.002, 0.5, CONTROL),
+    "voltage_control.i_q_max": Usual(0.5, 5, CURRENT), "voltage_control.i_d_max": Usual(0.5, 5, CURRENT),
     **{f"{pod}.{name}": usual for pod in ("pod_p", "pod_q") for name, usual in _POD.items()},
-}
+}  # fmt: skip

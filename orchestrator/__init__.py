@@ -13,33 +13,14 @@ Examples
 from importlib import import_module
 
 _HOMES = {
-    "Case": "api.case",
-    "CosimError": "errors",
-    "LinearSystem": "api.linear",
-    "Modes": "api.results",
-    "ParameterSweep": "sweep.view",
-    "Run": "api.results",
-    "Scenario": "api.scenario",
-    "Screening": "screening.view",
-    "admittance": "api.admittance",
-    "bind": "api.binding",
-    "build": "api.models",
-    "built_in_cases": "api.case",
-    "certify": "api.certification",
-    "check": "api.acceptance",
-    "compare": "api.comparison",
-    "export": "api.export",
-    "export_comtrade": "api.comtrade",
-    "identify": "api.identification",
-    "info": "api.fmu",
-    "load": "api.case",
-    "nyquist": "api.nyquist",
-    "open": "api.saved",
-    "open_fmu": "api.fmu",
-    "read_linear_model": "api.linear",
-    "source": "api.source",
-    "verify": "api.certification",
-}
+    "Case": "api.case", "CosimError": "errors", "LinearSystem": "api.linear", "Modes": "api.results",
+    "ParameterSweep": "sweep.view", "Run": "api.results", "Scenario": "api.scenario", "Screening": "screening.view",
+    "admittance": "api.admittance", "bind": "api.binding", "build": "api.models", "built_in_cases": "api.case",
+    "certify": "api.certification", "check": "api.acceptance", "compare": "api.comparison", "export": "api.export",
+    "export_comtrade": "api.comtrade", "identify": "api.identification", "info": "api.fmu", "load": "api.case",
+    "nyquist": "api.nyquist", "open": "api.saved", "open_fmu": "api.fmu", "read_linear_model": "api.linear",
+    "source": "api.source", "verify": "api.certification",
+}  # fmt: skip
 """Name → module of this package that defines it."""
 
 __all__ = [*_HOMES]  # noqa: PLE0604 - names all the same

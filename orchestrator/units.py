@@ -12,15 +12,11 @@ _TURNS = ("turn", "revolution")
 
 USUAL: dict[str, dict[str, float]] = {
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
-    "Hz": {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6},
-    "MW": {"MW": 1.0, "W": 1e-6, "kW": 1e-3, "GW": 1e3},
+    "Hz": {"Hz": 1.0, "mHz": 1e-3, "kHz": 1e3, "MHz": 1e6}, "MW": {"MW": 1.0, "W": 1e-6, "kW": 1e-3, "GW": 1e3},
     "MVA": {"MVA": 1.0, "VA": 1e-6, "kVA": 1e-3, "GVA": 1e3},
-    "Mvar": {"Mvar": 1.0, "var": 1e-6, "kvar": 1e-3, "Gvar": 1e3},
-    "kV": {"kV": 1.0, "V": 1e-3},
-    "rad": {"rad": 1.0},
-    "deg": {"deg": 1.0},
-    "pu": {"pu": 1.0},
-}
+    "Mvar": {"Mvar": 1.0, "var": 1e-6, "kvar": 1e-3, "Gvar": 1e3}, "kV": {"kV": 1.0, "V": 1e-3}, "rad": {"rad": 1.0},
+    "deg": {"deg": 1.0}, "pu": {"pu": 1.0},
+}  # fmt: skip
 """Declared unit → factor of the units that it is usually given in. They are pint's own factors, to the last bit: a case
 that is written in them is read without pint, which takes half a second to import.
 """

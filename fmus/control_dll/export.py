@@ -85,13 +85,9 @@ def _check(p: Parameter, value: float) -> None:
 
 
 def write_dll(
-    part: ControlPart,
-    folder: Path,
-    platforms: tuple[str, ...] = tuple(DLL_TARGETS),
-    sample_time: float = SAMPLE_TIME,
-    values: Mapping[str, float] | None = None,
-    report: Callable[[str], None] = lambda text: None,
-) -> WrittenDll:
+    part: ControlPart, folder: Path, platforms: tuple[str, ...] = tuple(DLL_TARGETS), sample_time: float = SAMPLE_TIME,
+    values: Mapping[str, float] | None = None, report: Callable[[str], None] = lambda text: None,
+) -> WrittenDll:  # fmt: skip
     """Write the libraries, each into the folder of its platform, and the data sheet beside these folders.
 
     ``part``: As `control_part_of` gives it.

@@ -103,14 +103,9 @@ def _parameters(part: ControlPart) -> str:
 
     rows = [
         [
-            f"`{c_name(p.name)}`",
-            f"{p.start:.10g}",
-            p.unit,
-            bound(p.minimum),
-            bound(p.maximum),
-            "any time" if p.tunable else "before the start",
-            p.text,
+            f"`{c_name(p.name)}`", f"{p.start:.10g}", p.unit, bound(p.minimum), bound(p.maximum),
+            "any time" if p.tunable else "before the start", p.text,
         ]
         for p in part.model.parameters
-    ]
+    ]  # fmt: skip
     return _table(("Name", "Default", "Unit", "Least", "Most", "May change", "Meaning"), rows)

@@ -51,15 +51,11 @@ def _declarations(model: Model, sample_time: float) -> str:
     numbers = [f"static const {kind} {name}[] = {{{', '.join(row)}}};" for name, (kind, row) in rows.items()]
     lines = [
         f"enum {{ NR = {len(model.requirement_texts)}, INTERNAL_STEP = {model.value_references['internal_step']} }};",
-        f"static const double SAMPLE_TIME = {sample_time!r};",
-        f"struct parameters {{{members} }};",
-        *numbers,
-        *_texts(model),
-        _table("dll_signal", "INPUTS", [_signal(v) for v in model.inputs]),
+        f"static const double SAMPLE_TIME = {sample_time!r};", f"struct parameters {{{members} }};", *numbers,
+        *_texts(model), _table("dll_signal", "INPUTS", [_signal(v) for v in model.inputs]),
         _table("dll_signal", "OUTPUTS", [_signal(v) for v in model.outputs]),
-        _table("dll_parameter", "PARAMETERS", [_parameter(p) for p in parameters]),
-        _info(model, sample_time),
-    ]
+        _table("dll_parameter", "PARAMETERS", [_parameter(p) for p in parameters]), _info(model, sample_time),
+    ]  # fmt: skip
     return "\n".join(lines)
 
 

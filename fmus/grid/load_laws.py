@@ -69,14 +69,9 @@ class FollowingLoad:
 
 
 def declare_following_load(
-    m: ModelBuilder,
-    load: Load,
-    declared: DeclaredLoad,
-    buses: dict[str, Bus],
-    omega_b: Scalar | None,
-    *,
+    m: ModelBuilder, load: Load, declared: DeclaredLoad, buses: dict[str, Bus], omega_b: Scalar | None, *,
     phasors: bool = False,
-) -> FollowingLoad:
+) -> FollowingLoad:  # fmt: skip
     """Make a declared load follow its laws.
 
     ``load``: the load's bus, name and laws; ``declared``: the same load as a constant impedance, as `declare_load`

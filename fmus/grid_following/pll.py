@@ -28,13 +28,9 @@ class LoopDefaults:
 
 
 def phase_locked_loop(
-    m: ModelBuilder,
-    angle_0: Scalar,
-    omega_b: Expr,
-    measured: Phasor,
-    defaults: LoopDefaults = LoopDefaults(),
+    m: ModelBuilder, angle_0: Scalar, omega_b: Expr, measured: Phasor, defaults: LoopDefaults = LoopDefaults(),
     running: Expr | None = None,
-) -> Frame:
+) -> Frame:  # fmt: skip
     """Declare the loop: w = 1 + k_p·u_⊥ + x, dx/dt = k_i·u_⊥, dθ/dt = ω_b·(w − 1), with u_⊥ = −u_d.
 
     For a voltage of 1 pu the angle follows as (2ξω_0·s + ω_0²)/(s² + 2ξω_0·s + ω_0²).

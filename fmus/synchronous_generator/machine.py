@@ -217,17 +217,9 @@ def _saturation_factor(
 
 
 def _operating_point(
-    m: ModelBuilder,
-    port: DevicePort,
-    R_s: Expr,
-    R_t: Expr,
-    X_t: Expr,
-    d_data: AxisData,
-    q_data: AxisData,
-    use_exact: Expr,
-    saturation: Expr,
-    stator_flux: FluxDeclaration,
-) -> tuple[Start, Axis, Axis, Expr]:
+    m: ModelBuilder, port: DevicePort, R_s: Expr, R_t: Expr, X_t: Expr, d_data: AxisData, q_data: AxisData,
+    use_exact: Expr, saturation: Expr, stator_flux: FluxDeclaration,
+) -> tuple[Start, Axis, Axis, Expr]:  # fmt: skip
     """Circuit of both axes, rotor angle and every flux of the steady state."""
     reactances = {}
     for axis, data in {"d": d_data, "q": q_data}.items():
@@ -246,12 +238,9 @@ def _operating_point(
             f"machine: no circuit fits the {axis}-axis data; check X, X', X'' and the time constants",
         )
         X_sub = m.calculated(
-            f"X_m{axis}2",
-            1 / (1 / X_m + 1 / branches.X_1 + 1 / branches.X_2),
-            "pu",
-            f"Subtransient X''_{axis} − X_l",
+            f"X_m{axis}2", 1 / (1 / X_m + 1 / branches.X_1 + 1 / branches.X_2), "pu", f"Subtransient X''_{axis} − X_l",
             "S_n",
-        )
+        )  # fmt: skip
         reactances[axis] = X_m, branches, X_sub, X_sub + data.X_l + X_t
 
     v_t = port.v_0 + Phasor(R_t, X_t) * port.i_0

@@ -22,15 +22,9 @@ _GROUPS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "Ini
 
 
 def model_description(
-    model: Model,
-    guid: str,
-    identifier: str,
-    tool: str,
-    *,
-    native: bool = False,
-    listed: bool = True,
+    model: Model, guid: str, identifier: str, tool: str, *, native: bool = False, listed: bool = True,
     source_file: str = "",
-) -> bytes:
+) -> bytes:  # fmt: skip
     """Return the file's text.
 
     ``guid``, ``identifier``: As in the standard; the identifier also names the binaries.
@@ -41,16 +35,11 @@ def model_description(
     root = root_element(model, "2.0", {"guid": guid}, tool)
     root.set("numberOfEventIndicators", "0")
     kind = SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=identifier,
-        needsExecutionTool="false" if native else "true",
-        canHandleVariableCommunicationStepSize="true",
-        canNotUseMemoryManagementFunctions="true",
-        canGetAndSetFMUstate="true",
-        canSerializeFMUstate="true",
+        root, "CoSimulation", modelIdentifier=identifier, needsExecutionTool="false" if native else "true",
+        canHandleVariableCommunicationStepSize="true", canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate="true", canSerializeFMUstate="true",
         providesDirectionalDerivative="true" if native else "false",
-    )
+    )  # fmt: skip
     if source_file:
         SubElement(SubElement(kind, "SourceFiles"), "File", name=source_file)
     write_definitions(root, model, "fmi2")

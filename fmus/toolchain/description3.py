@@ -24,15 +24,10 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
     ``tool``: Name and version for ``generationTool``."""
     root = root_element(model, "3.0", {"instantiationToken": token}, tool)
     SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=identifier,
-        canHandleVariableCommunicationStepSize="true",
-        canGetAndSetFMUState="true",
-        canSerializeFMUState="true",
-        providesDirectionalDerivatives="true",
+        root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
+        canGetAndSetFMUState="true", canSerializeFMUState="true", providesDirectionalDerivatives="true",
         providesAdjointDerivatives="true",
-    )
+    )  # fmt: skip
     write_definitions(root, model, "fmi3")
     _variables(root, model)
     _structure(root, model)
@@ -57,15 +52,9 @@ def _variables(root: Element, model: Model) -> None:
         more = {} if state is None else {"derivative": str(state)}
         SubElement(variables, _TYPES[variable.kind], {**variable.attributes, **variable.own, **more})
     SubElement(
-        variables,
-        "Float64",
-        name="time",
-        valueReference=str(len(model.value_references)),
-        description="Time",
-        causality="independent",
-        variability="continuous",
-        unit="s",
-    )
+        variables, "Float64", name="time", valueReference=str(len(model.value_references)), description="Time",
+        causality="independent", variability="continuous", unit="s",
+    )  # fmt: skip
 
 
 def _structure(root: Element, model: Model) -> None:

@@ -34,13 +34,9 @@ def root_element(model: Model, version: str, identity: Mapping[str, str], tool: 
     ``identity``: The attribute that tells one FMU from another.
     ``tool``: Name and version for ``generationTool``. No date is written: equal contents give equal files."""
     attributes = {
-        "fmiVersion": version,
-        "modelName": model.name,
-        **identity,
-        "description": model.title,
-        "generationTool": tool,
+        "fmiVersion": version, "modelName": model.name, **identity, "description": model.title, "generationTool": tool,
         "variableNamingConvention": "structured",
-    }
+    }  # fmt: skip
     return Element("fmiModelDescription", attributes)
 
 
@@ -60,12 +56,9 @@ def described_variables(model: Model) -> Iterator[DescribedVariable]:
         name = f"der({state.name})"
         reference = model.value_references[name]
         yield DescribedVariable(
-            reference,
-            _named(name, reference, f"Time derivative of {state.name}") | _CALCULATED,
-            "Real",
-            {"unit": _derivative_unit(state)},
-            model.value_references[state.name],
-        )
+            reference, _named(name, reference, f"Time derivative of {state.name}") | _CALCULATED, "Real",
+            {"unit": _derivative_unit(state)}, model.value_references[state.name],
+        )  # fmt: skip
 
 
 def unknowns(model: Model, *, listed: bool = True) -> dict[str, tuple[Unknown, ...]]:

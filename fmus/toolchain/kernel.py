@@ -35,12 +35,9 @@ def c_source(model: Model, further: Mapping[str, Function] | None = None) -> str
     functions = kernel_functions(model)
     further = dict(further or {})
     sizes = {
-        "NP": len(model.parameters),
-        "NC": len(model.calculated),
-        "NU": len(model.inputs),
-        "NX": len(model.states),
+        "NP": len(model.parameters), "NC": len(model.calculated), "NU": len(model.inputs), "NX": len(model.states),
         "NY": len(model.outputs),
-    }
+    }  # fmt: skip
     tables = ""
     if model.integrator == "sdirk":
         elimination = plan_elimination(model)

@@ -31,15 +31,9 @@ class ModelBuilder:
     for electromagnetic transients. ``usual``: ranges of parameters by their full name."""
 
     def __init__(
-        self,
-        name: str,
-        title: str,
-        internal_step: float = 1e-4,
-        longest_step: float = 2e-4,
-        *,
-        kind: Kind = "",
+        self, name: str, title: str, internal_step: float = 1e-4, longest_step: float = 2e-4, *, kind: Kind = "",
         usual: Mapping[str, Usual] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.name, self.title, self.kind, self._usual = name, title, kind, usual or {}
         self._prefix: list[str] = []
         self._declared: dict[str, tuple[Variable, Expr]] = {}
@@ -51,13 +45,10 @@ class ModelBuilder:
         self._algebraic: list[tuple[Expr, Expr]] = []
         self._nodes: Nodes | None = None
         self.internal_step = self.parameter(
-            "internal_step",
-            internal_step,
-            "s",
+            "internal_step", internal_step, "s",
             "Longest internal Runge-Kutta step; a communication step is cut into equal parts no longer than this",
-            minimum=1e-6,
-            maximum=longest_step,
-        )
+            minimum=1e-6, maximum=longest_step,
+        )  # fmt: skip
 
     # -- names -------------------------------------------------------------------------------
 
@@ -93,19 +84,9 @@ class ModelBuilder:
         self.output(variable.name, value, variable.unit, variable.description, variable.base)
 
     def parameter(
-        self,
-        name: str,
-        start: float,
-        unit: str,
-        description: str,
-        *,
-        base: str = "",
-        minimum: float | None = None,
-        maximum: float | None = None,
-        tunable: bool = False,
-        type: VariableType = "Real",
-        source: str = "",
-    ) -> Expr:
+        self, name: str, start: float, unit: str, description: str, *, base: str = "", minimum: float | None = None,
+        maximum: float | None = None, tunable: bool = False, type: VariableType = "Real", source: str = "",
+    ) -> Expr:  # fmt: skip
         """Declare a parameter.
 
         ``name``: without the scope; ``base``: what 1 pu is, such as ``"S_n"``; required where the unit is ``pu``;

@@ -53,12 +53,8 @@ def note_of(entry: EntryPoint, asked: str) -> Path | None:
     if entry.module.partition(".")[0] not in _OWN:
         return None
     parts = [
-        entry.value,
-        asked,
-        _code_loaded(),
-        *machine(),
-        *(f"{name} {installed_version(name)}" for name in _LIBRARIES),
-    ]
+        entry.value, asked, _code_loaded(), *machine(), *(f"{name} {installed_version(name)}" for name in _LIBRARIES),
+    ]  # fmt: skip
     return cache_directory("notes") / f"{hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]}.json"
 
 

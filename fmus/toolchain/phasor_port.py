@@ -49,24 +49,15 @@ class MasterStep:
 def declare_master_step(m: ModelBuilder) -> MasterStep:
     """Declare the master's step and delay as parameters."""
     step = m.parameter(
-        "communication_step",
-        0.0,
-        "s",
+        "communication_step", 0.0, "s",
         "Communication step of the master: emf and admittance are given for the middle of the step to come; 0: for now",
-        minimum=0.0,
-        maximum=0.1,
-        tunable=True,
-    )
+        minimum=0.0, maximum=0.1, tunable=True,
+    )  # fmt: skip
     late = m.parameter(
-        "steps_late",
-        0,
-        "1",
+        "steps_late", 0, "1",
         "Steps by which the bus voltage comes late: 0 where the master steps devices and then the grid; Jacobi: 1",
-        minimum=0,
-        maximum=2,
-        tunable=True,
-        type="Integer",
-    )
+        minimum=0, maximum=2, tunable=True, type="Integer",
+    )  # fmt: skip
     return MasterStep(step, late)
 
 

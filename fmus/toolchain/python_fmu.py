@@ -102,14 +102,11 @@ def _slave_data(model: Model) -> dict[str, object]:
         "name": model.name,
         "names": list(model.value_references),
         "counts": {
-            "parameters": len(model.parameters),
-            "calculated": len(model.calculated),
-            "inputs": len(model.inputs),
-            "states": len(model.states),
-            "outputs": len(model.outputs),
+            "parameters": len(model.parameters), "calculated": len(model.calculated), "inputs": len(model.inputs),
+            "states": len(model.states), "outputs": len(model.outputs),
         },
         "parameters": [[p.type, p.minimum, p.maximum, p.tunable] for p in model.parameters],
         "start": start,
         "requirements": list(model.requirement_texts),
         "internal_step": model.value_references["internal_step"],
-    }
+    }  # fmt: skip

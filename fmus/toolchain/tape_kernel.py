@@ -1,6 +1,7 @@
 """A tape executed in pure Python, where no library for it fits the platform.
 
-The FMU takes this file along as a module of its own, so it needs a Python and nothing else. Operations and their order are those of ``c/tape.c``, so both give the same results to rounding."""
+The FMU takes this file along as a module of its own, so it needs a Python and nothing else. Operations and their order
+are those of ``c/tape.c``, so both give the same results to rounding."""
 
 import math
 import struct
@@ -43,14 +44,11 @@ def as_in_c(function, overflow):
 
 
 NAMES = {
-    "divide": divide,
-    "power": power,
-    "sqrt": as_in_c(math.sqrt, lambda a: nan),
-    "log": as_in_c(math.log, lambda a: -inf if a == 0.0 else nan),
-    "exp": as_in_c(math.exp, lambda a: inf),
+    "divide": divide, "power": power, "sqrt": as_in_c(math.sqrt, lambda a: nan),
+    "log": as_in_c(math.log, lambda a: -inf if a == 0.0 else nan), "exp": as_in_c(math.exp, lambda a: inf),
     **{f.__name__: as_in_c(f, lambda a: nan) for f in (math.sin, math.cos, math.tan)},
     **{f.__name__: f for f in (math.atan2, math.copysign, math.fabs, math.floor)},
-}
+}  # fmt: skip
 FORMS = (
     *("{0} + {1}", "{0} - {1}", "{0} * {1}", "divide({0}, {1})", "power({0}, {1})", "atan2({0}, {1})"),
     *("copysign({0}, {1})", "min({0}, {1})", "max({0}, {1})"),

@@ -19,13 +19,9 @@ def terminals_and_icons(model: Model) -> bytes:
     """Return the file's text, for a model that has a port."""
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     terminal = SubElement(
-        SubElement(root, "Terminals"),
-        "Terminal",
-        name="bus",
-        matchingRule="bus",
-        terminalKind=KIND,
+        SubElement(root, "Terminals"), "Terminal", name="bus", matchingRule="bus", terminalKind=KIND,
         description=f"Electrical port of {model.name} in the network frame: bus voltage and injected current",
-    )
+    )  # fmt: skip
     for name, kind in _MEMBERS.items():
         SubElement(terminal, "TerminalMemberVariable", variableName=name, memberName=name, variableKind=kind)
     indent(root)

@@ -45,14 +45,10 @@ def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
         # Not sys.path: Python-backed FMUs lengthen it, and Linux takes no variable of more than 128 KiB.
         search = filter(None, [str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH")])
         process = subprocess.Popen(
-            [sys.executable, "-m", reader, str(path), str(answer), *more],
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(search)},
-            start_new_session=True,
-        )
+            [sys.executable, "-m", reader, str(path), str(answer), *more], cwd=folder, stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(search)}, start_new_session=True,
+        )  # fmt: skip
         note = note_beside(answer)
         try:
             in_time = _wait(process, note, longest)

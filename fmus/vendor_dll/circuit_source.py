@@ -14,21 +14,10 @@ _KERNEL = {"initialise": "circuit_initialise", "outputs": "circuit_outputs", "de
            "requirements": "circuit_requirements", "advance": "circuit_advance_parts",
            "workspace_size": "circuit_workspace"}  # fmt: skip
 _PLACES = {
-    "AT_ANGLE": ANGLE,
-    "AT_INTERNAL_STEP": "internal_step",
-    "AT_FREQUENCY": "f_n",
-    "AT_V_RE": "v_re",
-    "AT_V_IM": "v_im",
-    "AT_V_0": "v_0",
-    "AT_THETA_0": "theta_0",
-    "AT_P_0": "P_0",
-    "AT_Q_0": "Q_0",
-    "AT_P": "p",
-    "AT_Q": "q",
-    "AT_TRIM_P": "trim.P",
-    "AT_TRIM_Q": "trim.Q",
-    "AT_TRIM_V": "trim.V",
-}
+    "AT_ANGLE": ANGLE, "AT_INTERNAL_STEP": "internal_step", "AT_FREQUENCY": "f_n", "AT_V_RE": "v_re", "AT_V_IM": "v_im",
+    "AT_V_0": "v_0", "AT_THETA_0": "theta_0", "AT_P_0": "P_0", "AT_Q_0": "Q_0", "AT_P": "p", "AT_Q": "q",
+    "AT_TRIM_P": "trim.P", "AT_TRIM_Q": "trim.Q", "AT_TRIM_V": "trim.V",
+}  # fmt: skip
 
 
 def kernel_source(model: Model) -> str:

@@ -23,14 +23,9 @@ _LONGEST_WHY = 500
 
 
 def dll_description(
-    interface: DllInterface,
-    trial: Trial,
-    variables: tuple[HostVariable, ...],
-    guid: str,
-    identifier: str,
-    tool: str,
+    interface: DllInterface, trial: Trial, variables: tuple[HostVariable, ...], guid: str, identifier: str, tool: str,
     circuit: Model | None = None,
-) -> bytes:
+) -> bytes:  # fmt: skip
     """The file's text.
 
     States are declared as our extension of FMI, which has no discrete states in co-simulation: ``DiscreteStates`` names
@@ -41,25 +36,17 @@ def dll_description(
     ``guid``, ``identifier``: As in the standard; the identifier also names the binaries.
     ``tool``: Name and version for ``generationTool``."""
     attributes = {
-        "fmiVersion": "2.0",
-        "modelName": interface.texts["ModelName"] or identifier,
-        "guid": guid,
-        "description": interface.texts["ModelDescription"],
-        "author": interface.texts["ModelCreator"],
-        "version": interface.texts["ModelVersion"],
-        "generationTool": tool,
-        "numberOfEventIndicators": "0",
-    }
+        "fmiVersion": "2.0", "modelName": interface.texts["ModelName"] or identifier, "guid": guid,
+        "description": interface.texts["ModelDescription"], "author": interface.texts["ModelCreator"],
+        "version": interface.texts["ModelVersion"], "generationTool": tool, "numberOfEventIndicators": "0",
+    }  # fmt: skip
     root = Element("fmiModelDescription", {name: value for name, value in attributes.items() if value})
     SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=identifier,
-        canHandleVariableCommunicationStepSize="true",
+        root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
         canNotUseMemoryManagementFunctions="true",
         canGetAndSetFMUstate="true" if trial.state in ("arrays", "library") else "false",
         canSerializeFMUstate="true" if trial.state == "arrays" else "false",
-    )
+    )  # fmt: skip
     units = sorted({v.unit for v in variables if v.unit and v.kind == "Real"})
     if units:
         definitions = SubElement(root, "UnitDefinitions")

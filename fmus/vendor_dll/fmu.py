@@ -58,12 +58,9 @@ READER = "fmus.vendor_dll.reading"  # module whose process reads a DLL
 
 
 def read_dll(
-    path: Path | str,
-    reader: str = READER,
-    also: Sequence[str] = (),
-    texts: Mapping[str, str] | None = None,
+    path: Path | str, reader: str = READER, also: Sequence[str] = (), texts: Mapping[str, str] | None = None,
     folder: Path = Path(),
-) -> VendorDll:
+) -> VendorDll:  # fmt: skip
     """Read a DLL in a process of its own, and try how it keeps its state.
 
     ``path``, ``reader``, ``also``: The DLL, the module whose process reads it, and further platforms that this machine

@@ -50,15 +50,12 @@ class _Parameter(c.Structure):
 
 class _ModelInfo(c.Structure):
     _fields_ = (
-        ("interface_version", c.c_uint8 * 4),
-        *((name, c.c_void_p) for name in TEXTS),
-        ("sample_time", c.c_double),
-        ("mode", c.c_uint8),
-        *(("n_inputs", c.c_int32), ("inputs", c.c_void_p)),
+        ("interface_version", c.c_uint8 * 4), *((name, c.c_void_p) for name in TEXTS), ("sample_time", c.c_double),
+        ("mode", c.c_uint8), *(("n_inputs", c.c_int32), ("inputs", c.c_void_p)),
         *(("n_outputs", c.c_int32), ("outputs", c.c_void_p)),
         *(("n_parameters", c.c_int32), ("parameters", c.c_void_p)),
         *((name, c.c_int32) for name in ("int_states", "float_states", "double_states")),
-    )
+    )  # fmt: skip
 
 
 def read_interface(library: Library) -> DllInterface:
@@ -113,15 +110,9 @@ def _parameter(row: _Parameter, text: _Text) -> DllParameter:
     if bounds == (0, 0):  # the author wrote none
         bounds = (None, None)
     return DllParameter(
-        text(row.name),
-        text(row.group),
-        text(row.description),
-        text(row.unit),
-        row.data_type,
-        bool(row.fixed),
-        (text(row.default.c_string) if kind else "") if words else bound(row.default) or 0,
-        *bounds,
-    )
+        text(row.name), text(row.group), text(row.description), text(row.unit), row.data_type, bool(row.fixed),
+        (text(row.default.c_string) if kind else "") if words else bound(row.default) or 0, *bounds,
+    )  # fmt: skip
 
 
 def read(library: Library, texts: Mapping[str, str] | None) -> dict[str, Any]:

@@ -142,14 +142,9 @@ def _variable(
 
 
 def host_source(
-    interface: DllInterface,
-    trial: Trial,
-    texts: Mapping[str, str],
-    carried: Mapping[str, str],
-    vendor_file: str,
-    variables: Sequence[HostVariable],
-    around: tuple[Device, Model] | None = None,
-) -> str:
+    interface: DllInterface, trial: Trial, texts: Mapping[str, str], carried: Mapping[str, str], vendor_file: str,
+    variables: Sequence[HostVariable], around: tuple[Device, Model] | None = None,
+) -> str:  # fmt: skip
     """The source without its identity."""
     code = [(_C / name).read_text(encoding="utf-8") for name in ("library.c", "host.c")]
     functions = (_TOOLCHAIN / "fmi2.c").read_text(encoding="utf-8")
@@ -163,13 +158,9 @@ def host_source(
 
 
 def _tables(
-    interface: DllInterface,
-    trial: Trial,
-    texts: Mapping[str, str],
-    carried: Mapping[str, str],
-    vendor_file: str,
+    interface: DllInterface, trial: Trial, texts: Mapping[str, str], carried: Mapping[str, str], vendor_file: str,
     variables: Sequence[HostVariable],
-) -> list[str]:
+) -> list[str]:  # fmt: skip
     regions = trial.regions
     sizes = {
         name: layout(rows).size

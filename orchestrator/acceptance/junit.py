@@ -12,13 +12,10 @@ from orchestrator.safe_files import write_bytes
 def write_junit(report: AcceptanceReport, path: Path) -> None:
     results = report.results
     suite = Element(
-        "testsuite",
-        name=f"gfor fmu check {report.fmu.name}",
-        tests=str(len(results)),
-        failures=str(len(report.failures)),
-        skipped=str(sum(r.verdict is Verdict.NOT_APPLICABLE for r in results)),
+        "testsuite", name=f"gfor fmu check {report.fmu.name}", tests=str(len(results)),
+        failures=str(len(report.failures)), skipped=str(sum(r.verdict is Verdict.NOT_APPLICABLE for r in results)),
         errors=str(sum(r.verdict is Verdict.NOT_SUPPORTED for r in results)),
-    )
+    )  # fmt: skip
     for result in results:
         case = SubElement(suite, "testcase", classname=report.fmu.stem, name=result.check)
         text = _printable(result.evidence)

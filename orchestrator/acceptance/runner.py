@@ -91,19 +91,13 @@ class AcceptanceReport:
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "tool": f"gfor-cosim {version('gfor-cosim')}",
-            "fmu": str(self.fmu),
+            "tool": f"gfor-cosim {version('gfor-cosim')}", "fmu": str(self.fmu),
             "binding": None if self.binding is None else str(self.binding),
-            "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)},
-            "trusted": self.trusted,
-            "faults": self.faults,
-            "not_supported": self.not_supported,
-            "not_limited": missing(self.protections),
-            "protections": [asdict(protection) for protection in self.protections],
-            "used_as": self.used_as,
-            "seed": self.seed,
-            "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
-        }
+            "sha256": {"fmu": file_hash(self.fmu), "binding": file_hash(self.binding)}, "trusted": self.trusted,
+            "faults": self.faults, "not_supported": self.not_supported, "not_limited": missing(self.protections),
+            "protections": [asdict(protection) for protection in self.protections], "used_as": self.used_as,
+            "seed": self.seed, "checks": [{"question": question_of(r.check), **r.as_dict()} for r in self.results],
+        }  # fmt: skip
 
 
 FILE_CHECKS = {
@@ -118,14 +112,9 @@ def question_of(name: str) -> str:
 
 
 def check_fmu(
-    fmu: Path,
-    binding: Path | None = None,
-    limits: Limits | None = None,
-    only: tuple[str, ...] = (),
-    run_for: float = RUN_FOR,
-    use: Use | None = None,
-    seed: int | None = None,
-) -> AcceptanceReport:
+    fmu: Path, binding: Path | None = None, limits: Limits | None = None, only: tuple[str, ...] = (),
+    run_for: float = RUN_FOR, use: Use | None = None, seed: int | None = None,
+) -> AcceptanceReport:  # fmt: skip
     """Run the acceptance tests.
 
     ``limits``: what the FMU may take; the usual limits where None.

@@ -46,18 +46,10 @@ class Blocks:
     ``declared``: By component and output: the inputs that its FMU says it depends on directly."""
 
     def __init__(
-        self,
-        master: Master,
-        step_size: float | None = None,
-        inputs: Sequence[str] = (),
-        outputs: Sequence[str] = (),
-        *,
-        derivatives: bool = False,
-        without_step: bool = False,
-        directional: bool = False,
-        known: Mapping[str, ComponentLinearization] | None = None,
-        schedule: Schedule | None = None,
-    ) -> None:
+        self, master: Master, step_size: float | None = None, inputs: Sequence[str] = (), outputs: Sequence[str] = (),
+        *, derivatives: bool = False, without_step: bool = False, directional: bool = False,
+        known: Mapping[str, ComponentLinearization] | None = None, schedule: Schedule | None = None,
+    ) -> None:  # fmt: skip
         known = known or {}
         schedule = schedule or master.schedule
         self._step_aware = [name for name in master.components if knows_step(master, name)]
@@ -201,17 +193,9 @@ class Blocks:
 
 
 def linearize_within(
-    master: Master,
-    name: str,
-    step_size: float,
-    inputs: Sequence[str] = (),
-    observed: Sequence[str] = (),
-    *,
-    derivatives: bool = False,
-    without_step: bool = False,
-    directional: bool = False,
-    idle: Collection[str] = (),
-) -> ComponentLinearization:
+    master: Master, name: str, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (), *,
+    derivatives: bool = False, without_step: bool = False, directional: bool = False, idle: Collection[str] = (),
+) -> ComponentLinearization:  # fmt: skip
     """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step.
 
     ``master``: at the operating point; it is left as it was.

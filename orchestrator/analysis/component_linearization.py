@@ -65,15 +65,9 @@ class ComponentLinearization:
 
 
 def linearize_component(
-    exchange: Exchange,
-    time: float,
-    step_size: float,
-    inputs: Sequence[str] = (),
-    observed: Sequence[str] = (),
-    *,
-    derivatives: bool = False,
-    idle: Collection[str] = (),
-) -> ComponentLinearization:
+    exchange: Exchange, time: float, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (), *,
+    derivatives: bool = False, idle: Collection[str] = (),
+) -> ComponentLinearization:  # fmt: skip
     """Perturb one component around its present state, and restore that state.
 
     Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
@@ -160,13 +154,9 @@ def linearize_by_derivatives(
 
 
 def _from_inside(
-    exchange: Exchange,
-    model: EmbeddedModel,
-    time: float,
-    step_size: float,
-    inputs: Sequence[str],
+    exchange: Exchange, model: EmbeddedModel, time: float, step_size: float, inputs: Sequence[str],
     observed: Sequence[str],
-) -> ComponentLinearization:
+) -> ComponentLinearization:  # fmt: skip
     """The model inside an FMU, compared with the FMU and taken over one communication step with its inputs held."""
     component = exchange.component
     check_operating_point(component, model)
@@ -187,34 +177,13 @@ def _from_inside(
 
 
 def _over_step(
-    exchange: Exchange,
-    step_size: float,
-    source: str,
-    states: tuple[str, ...],
-    entries: tuple[str, ...],
-    observed: Sequence[str],
-    A_c: Matrix,
-    B_c: Matrix,
-    C: Matrix,
-    D: Matrix,
-) -> ComponentLinearization:
+    exchange: Exchange, step_size: float, source: str, states: tuple[str, ...], entries: tuple[str, ...],
+    observed: Sequence[str], A_c: Matrix, B_c: Matrix, C: Matrix, D: Matrix,
+) -> ComponentLinearization:  # fmt: skip
     """A continuous model, and its exact map over a communication step with the inputs held."""
     p = len(exchange.outputs.names)
     A, B = over_held_inputs(A_c, B_c, step_size)
     return ComponentLinearization(
-        exchange.component.name,
-        states,
-        entries,
-        exchange.outputs.names,
-        A=A,
-        B=B,
-        C=C[:p],
-        D=D[:p],
-        observed=tuple(observed),
-        C_o=C[p:],
-        D_o=D[p:],
-        A_c=A_c,
-        B_c=B_c,
-        disagreement=0.0,
-        source=source,
-    )
+        exchange.component.name, states, entries, exchange.outputs.names, A=A, B=B, C=C[:p], D=D[:p],
+        observed=tuple(observed), C_o=C[p:], D_o=D[p:], A_c=A_c, B_c=B_c, disagreement=0.0, source=source,
+    )  # fmt: skip

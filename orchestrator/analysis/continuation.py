@@ -84,13 +84,9 @@ is a system that has to be started.
 
 
 def follow_along(
-    start: Eigenpair,
-    model_at: Callable[[float], LinearModel],
-    begin: float,
-    end: float,
-    strides: Strides = USUAL,
+    start: Eigenpair, model_at: Callable[[float], LinearModel], begin: float, end: float, strides: Strides = USUAL,
     common: Sequence[str] = (),
-) -> Eigenpair:
+) -> Eigenpair:  # fmt: skip
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
     ``start``: the mode at ``begin``.

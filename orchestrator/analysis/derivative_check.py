@@ -52,13 +52,9 @@ def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[st
 
 
 def _right_nearby(
-    component: Component,
-    given: Matrix,
-    far: Matrix,
-    unknowns: Sequence[str],
-    knowns: Sequence[str],
+    component: Component, given: Matrix, far: Matrix, unknowns: Sequence[str], knowns: Sequence[str],
     doubted: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
+) -> NDArray[np.bool_]:  # fmt: skip
     """The doubted elements that are right for smaller changes; the larger change has run into a limit.
 
     Only an element whose difference quotient depends on the size is looked at again: a wrong derivative of something

@@ -26,17 +26,10 @@ class Examination:
 
 
 def examine(
-    master: Master,
-    blocks: Blocks,
-    model: LinearModel,
-    system: LinearModel | None,
-    *,
-    spectrum: Spectrum | None = None,
-    of_system: Spectrum | None = None,
-    modes: Sequence[Mode] | None = None,
-    shown: Sequence[Mode] | None = None,
+    master: Master, blocks: Blocks, model: LinearModel, system: LinearModel | None, *, spectrum: Spectrum | None = None,
+    of_system: Spectrum | None = None, modes: Sequence[Mode] | None = None, shown: Sequence[Mode] | None = None,
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-) -> Examination:
+) -> Examination:  # fmt: skip
     """Judge a step map, and look for what would make the verdict wrong; say what it leaves out of the connections.
 
     ``master``: at the operating point at which the blocks were linearised; it is left as it was.

@@ -40,13 +40,9 @@ class IdentifiedMode:
 
 
 def identify_modes(
-    times: NDArray[np.float64],
-    signal: NDArray[np.float64],
-    *,
-    tolerance: float = TOLERANCE,
-    max_order: int = 24,
+    times: NDArray[np.float64], signal: NDArray[np.float64], *, tolerance: float = TOLERANCE, max_order: int = 24,
     highest_hz: float = 10.0,
-) -> list[IdentifiedMode]:
+) -> list[IdentifiedMode]:  # fmt: skip
     """Write a signal as a sum of damped exponentials.
 
     ``times`` and ``signal``: shape (n,); equally spaced samples of a free response, [s] and any unit.

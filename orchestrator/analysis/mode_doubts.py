@@ -22,12 +22,9 @@ that are this factor larger, so that its order is lower where noise made modes."
 
 
 def with_doubts(
-    modes: Sequence[IdentifiedMode],
-    length: float,
-    others: Sequence[IdentifiedMode] | None,
-    halves: Sequence[WindowPart] = (),
-    noise_like: bool = False,
-) -> list[IdentifiedMode]:
+    modes: Sequence[IdentifiedMode], length: float, others: Sequence[IdentifiedMode] | None,
+    halves: Sequence[WindowPart] = (), noise_like: bool = False,
+) -> list[IdentifiedMode]:  # fmt: skip
     """The modes, each with its doubts; real poles have none, as they do not swing.
 
     ``length``: of the window [s].
@@ -67,13 +64,9 @@ def _swings(mode: IdentifiedMode, length: float) -> bool:
 
 
 def _doubts(
-    mode: IdentifiedMode,
-    length: float,
-    share: float,
-    others: Sequence[IdentifiedMode] | None,
-    halves: Sequence[WindowPart],
-    noise_like: bool,
-) -> list[str]:
+    mode: IdentifiedMode, length: float, share: float, others: Sequence[IdentifiedMode] | None,
+    halves: Sequence[WindowPart], noise_like: bool,
+) -> list[str]:  # fmt: skip
     found = []
     periods = mode.frequency_hz * length
     if periods < FEWEST_PERIODS:

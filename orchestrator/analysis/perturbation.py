@@ -71,12 +71,9 @@ def perturb(step: PerturbedStep, rates: Sequence[str]) -> PerturbationResult:
 
 
 def _take_over(
-    kept: Differences,
-    new: Differences,
-    columns: Sequence[int],
-    agreeing: NDArray[np.bool_],
+    kept: Differences, new: Differences, columns: Sequence[int], agreeing: NDArray[np.bool_],
     one_sided: NDArray[np.bool_],
-) -> None:
+) -> None:  # fmt: skip
     """Put those of the new columns that agree in the place of the old ones."""
     for part in Differences._fields:
         taken = [k for k in range(len(columns)) if agreeing[k]]

@@ -61,13 +61,9 @@ class Pair:
 
 
 def check_resolution(
-    master: Master,
-    model: LinearModel,
-    system: LinearModel | None,
-    modes: Sequence[Mode],
-    frequency_range: tuple[float, float],
-    stability: Stability,
-) -> tuple[str, ...]:
+    master: Master, model: LinearModel, system: LinearModel | None, modes: Sequence[Mode],
+    frequency_range: tuple[float, float], stability: Stability,
+) -> tuple[str, ...]:  # fmt: skip
     """Warn of an unstable coupling, and compare the modes of a step map with those of the continuous system.
 
     ``master``: At the operating point; it is left as it was.

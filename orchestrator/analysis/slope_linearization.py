@@ -31,13 +31,9 @@ def gives_slopes(exchange: Exchange) -> bool:
 
 
 def linearize_slopes(
-    exchange: Exchange,
-    time: float,
-    step_size: float,
-    inputs: Sequence[str] = (),
-    observed: Sequence[str] = (),
+    exchange: Exchange, time: float, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (),
     like: ComponentLinearization | None = None,
-) -> ComponentLinearization:
+) -> ComponentLinearization:  # fmt: skip
     """ẋ = A_c·x + B_c·u and y = C·x + D·u of one component; it has no step map.
 
     ``exchange``: the component, at its operating point, with its connected inputs and outputs.

@@ -162,18 +162,13 @@ class Stability:
         """Verdict and figures for a machine."""
         mode = self.mode
         return {
-            "stable": self.stable,
-            "largest_growth_rate": self.largest_growth_rate,
+            "stable": self.stable, "largest_growth_rate": self.largest_growth_rate,
             "frequency_hz": None if mode is None else mode.frequency_hz,
             "participation": [] if mode is None else [{"state": s, "factor": f} for s, f in mode.participation[:6]],
-            "growing_modes": self.growing,
-            "zero_eigenvalues": self.zeros,
-            "eigenvalues": self.eigenvalues,
+            "growing_modes": self.growing, "zero_eigenvalues": self.zeros, "eigenvalues": self.eigenvalues,
             "cause": None if self.cause is None else str(self.cause),
-            "continuous_growth_rate": self.continuous_growth_rate,
-            "reason": self.reason,
-            "sentence": self.sentence(),
-        }
+            "continuous_growth_rate": self.continuous_growth_rate, "reason": self.reason, "sentence": self.sentence(),
+        }  # fmt: skip
 
 
 def zeros_in_words(zeros: int) -> str:

@@ -89,19 +89,10 @@ class Acceptance:
 
 
 def check(
-    path: str | Path,
-    binding: str | Path | None = None,
-    *,
-    step: Time | None = None,
-    only: Names = (),
-    case: str | Path | None = None,
-    component: str | None = None,
-    scenario: str | None = None,
-    seed: int | None = None,
-    frequency: float | None = None,
-    time_limit: Time | None = None,
-    memory_limit: float | str | None = None,
-) -> Acceptance:
+    path: str | Path, binding: str | Path | None = None, *, step: Time | None = None, only: Names = (),
+    case: str | Path | None = None, component: str | None = None, scenario: str | None = None, seed: int | None = None,
+    frequency: float | None = None, time_limit: Time | None = None, memory_limit: float | str | None = None,
+) -> Acceptance:  # fmt: skip
     """Run the acceptance tests of an FMU: can it be trusted in a co-simulation?
 
     Parameters

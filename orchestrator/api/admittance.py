@@ -59,17 +59,10 @@ class Admittance:
 
 
 def admittance(
-    fmu: str | Path,
-    *,
-    binding: str | Path | None = None,
-    values: Mapping[str, Any] | None = None,
-    step: Time = 1e-4,
-    method: str = "multisine",
-    amplitude: float | None = None,
-    frequencies: tuple[float, float] = (0.05, 1000.0),
-    use_state: bool = True,
-    report: Callable[[str], None] = lambda text: None,
-) -> Admittance:
+    fmu: str | Path, *, binding: str | Path | None = None, values: Mapping[str, Any] | None = None, step: Time = 1e-4,
+    method: str = "multisine", amplitude: float | None = None, frequencies: tuple[float, float] = (0.05, 1000.0),
+    use_state: bool = True, report: Callable[[str], None] = lambda text: None,
+) -> Admittance:  # fmt: skip
     """Measure a device's admittance at an ideal bus, and fit a model to it.
 
     Parameters

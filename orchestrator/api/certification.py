@@ -50,21 +50,11 @@ class IssuedCertificate:
 
 
 def certify(
-    fmu: str | Path,
-    code: str = "nts631",
-    *,
-    binding: str | Path | None = None,
-    values: Mapping[str, Any] | None = None,
-    declared: Mapping[str, float] | None = None,
-    pod: str | None = None,
-    reactances: Sequence[float] | None = None,
-    black_box: bool = False,
-    check: bool = True,
-    folder: str | Path | None = None,
-    into: str | Path | None = None,
-    workers: int | None = 1,
-    progress: bool = False,
-) -> IssuedCertificate:
+    fmu: str | Path, code: str = "nts631", *, binding: str | Path | None = None,
+    values: Mapping[str, Any] | None = None, declared: Mapping[str, float] | None = None, pod: str | None = None,
+    reactances: Sequence[float] | None = None, black_box: bool = False, check: bool = True,
+    folder: str | Path | None = None, into: str | Path | None = None, workers: int | None = 1, progress: bool = False,
+) -> IssuedCertificate:  # fmt: skip
     """Test a converter's FMU under a grid code, and write its certificate.
 
     Parameters

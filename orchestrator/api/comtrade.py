@@ -14,12 +14,9 @@ from orchestrator.study.comparison import recorded
 
 
 def export_comtrade(
-    run: Run | xr.Dataset | str | Path,
-    signals: Names = (),
-    path: str | Path | None = None,
-    form: str = "BINARY32",
+    run: Run | xr.Dataset | str | Path, signals: Names = (), path: str | Path | None = None, form: str = "BINARY32",
     frequency: float | None = None,
-) -> tuple[Path, Path]:
+) -> tuple[Path, Path]:  # fmt: skip
     """Write signals of a run as a COMTRADE recording, which tools for relays and fault records read.
 
     Parameters

@@ -105,14 +105,9 @@ class ExportedDll(NamedTuple):
 
 
 def export_dll(
-    name: str,
-    folder: str | Path = ".",
-    *,
-    platforms: Sequence[str] | None = None,
-    sample_time: float = 2e-5,
-    values: Mapping[str, float] | None = None,
-    report: Callable[[str], None] = lambda text: None,
-) -> ExportedDll:
+    name: str, folder: str | Path = ".", *, platforms: Sequence[str] | None = None, sample_time: float = 2e-5,
+    values: Mapping[str, float] | None = None, report: Callable[[str], None] = lambda text: None,
+) -> ExportedDll:  # fmt: skip
     """Write the control part of a converter as IEEE/CIGRE DLL, for EMT programs.
 
     Parameters

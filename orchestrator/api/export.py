@@ -18,12 +18,9 @@ from orchestrator.ssp.writing import ssp_members
 KINDS = ("linear", "ssp", "comtrade", "dll")
 
 _TABLES: dict[str, Any] = {
-    "source": True,
-    "analysis": True,
-    "plots": True,
-    "reference": True,
+    "source": True, "analysis": True, "plots": True, "reference": True,
     "solver": {"record_interval", "record", "record_filter"},
-}
+}  # fmt: skip
 """Tables of a case file that go into our annotation as they are, as SSP has no place for them."""
 
 

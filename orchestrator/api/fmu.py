@@ -151,12 +151,9 @@ class Fmu:
 
 
 def open_fmu(
-    path: str | Path,
-    values: Mapping[str, Any] | None = None,
-    *,
-    binding: str | Path | None = None,
+    path: str | Path, values: Mapping[str, Any] | None = None, *, binding: str | Path | None = None,
     stop: Time | None = None,
-) -> Fmu:
+) -> Fmu:  # fmt: skip
     """Open and initialise an FMU; use it in a ``with`` block. Foreign ones run in a process of their own.
 
     Parameters
@@ -213,18 +210,12 @@ class FmuInfo:
         d = self.description
         keys = ("name", "type", "causality", "variability", "unit", "start", "minimum", "maximum", "description")
         return {
-            "model_name": d.model_name,
-            "title": d.title,
-            "guid": d.guid,
-            "generation_tool": d.generation_tool,
-            "fmi_version": d.fmi_version,
-            "platforms": list(d.platforms),
-            "continuous_states": list(d.states),
-            "states_are_settable": d.states_are_settable,
-            "can_save_state": d.can_save_state,
+            "model_name": d.model_name, "title": d.title, "guid": d.guid, "generation_tool": d.generation_tool,
+            "fmi_version": d.fmi_version, "platforms": list(d.platforms), "continuous_states": list(d.states),
+            "states_are_settable": d.states_are_settable, "can_save_state": d.can_save_state,
             "has_linear_model": self.linear_model is not None,
             "variables": [{key: getattr(v, key) for key in keys} for v in d.variables.values()],
-        }
+        }  # fmt: skip
 
     def __repr__(self) -> str:
         d = self.description

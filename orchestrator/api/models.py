@@ -47,17 +47,10 @@ def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
 
 
 def build(
-    model: str | Model,
-    folder: str | Path = ".",
-    *,
-    native: bool = False,
-    fmi: FmiVersion = "2.0",
-    platforms: Sequence[str] | None = None,
-    extra: Mapping[str, bytes] | None = None,
-    parts: Mapping[str, str] | None = None,
-    reference: bool = False,
-    sources: bool = False,
-) -> Path:
+    model: str | Model, folder: str | Path = ".", *, native: bool = False, fmi: FmiVersion = "2.0",
+    platforms: Sequence[str] | None = None, extra: Mapping[str, bytes] | None = None,
+    parts: Mapping[str, str] | None = None, reference: bool = False, sources: bool = False,
+) -> Path:  # fmt: skip
     """Build the FMU of a model; returns its path.
 
     Parameters

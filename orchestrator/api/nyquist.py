@@ -13,18 +13,10 @@ from orchestrator.units import to_unit
 
 
 def nyquist(
-    device: str | Path,
-    network: str | Path | None = None,
-    *,
-    frequency: float | str = 50.0,
-    compensation: float = 0.0,
-    angle: float | None = None,
-    voltage: float | str | None = None,
-    bus: str | None = None,
-    components: Sequence[str] = (),
-    scenario: str | None = None,
-    values: Mapping[str, Any] | None = None,
-) -> Nyquist:
+    device: str | Path, network: str | Path | None = None, *, frequency: float | str = 50.0, compensation: float = 0.0,
+    angle: float | None = None, voltage: float | str | None = None, bus: str | None = None,
+    components: Sequence[str] = (), scenario: str | None = None, values: Mapping[str, Any] | None = None,
+) -> Nyquist:  # fmt: skip
     """Judge a device at a network.
 
     Parameters

@@ -166,18 +166,11 @@ class Scenario:
     modes = method("Scenario.modes", ModesRequest, _modes)
 
     def run(
-        self,
-        stop: Time | None = None,
-        *,
-        linear: bool = False,
-        progress: bool = False,
-        observers: Sequence[Observer] = (),
-        recording: RecordingFolder | None = None,
-        checkpoints: str | Path | Checkpoints | None = None,
-        checkpoint_every: Time = EVERY,
-        federates: Federates | None = None,
-        threads: int | None = None,
-    ) -> Run:
+        self, stop: Time | None = None, *, linear: bool = False, progress: bool = False,
+        observers: Sequence[Observer] = (), recording: RecordingFolder | None = None,
+        checkpoints: str | Path | Checkpoints | None = None, checkpoint_every: Time = EVERY,
+        federates: Federates | None = None, threads: int | None = None,
+    ) -> Run:  # fmt: skip
         """Modes, and the response to the scenario's events.
 
         A component that fails in the middle ends the run, and so does Ctrl-C: a `RunEndedWarning` says it, and what
@@ -248,14 +241,9 @@ class Scenario:
             with shown_progress(self.title, shown=progress) as report:
                 bars = [Progress(report)] if progress else []
                 result = run_scenario(
-                    prepared,
-                    observers=[*bars, *observers],
-                    linear=linear,
-                    recording=recording,
-                    checkpoints=kept,
-                    federates=federates,
-                    threads=threads,
-                )
+                    prepared, observers=[*bars, *observers], linear=linear, recording=recording, checkpoints=kept,
+                    federates=federates, threads=threads,
+                )  # fmt: skip
             if kept is not None and kept is not checkpoints and result.failure is None:
                 kept.clear()
         if result.failure is not None:

@@ -133,12 +133,9 @@ def diagnosis(of: str, a: complex, b: complex, c: complex, rest: float) -> tuple
 def known_ratio(ratio: float) -> str:
     """What a factor between powers stands for; "" where it is none of the usual ones."""
     names = {
-        sqrt(3): "√3: phase for line-to-line",
-        sqrt(2): "√2: peak for rms",
-        1.5: "3/2: of peak phase quantities",
-        3.0: "3: three phases for one",
-        1000.0: "1000: kilo",
-    }
+        sqrt(3): "√3: phase for line-to-line", sqrt(2): "√2: peak for rms", 1.5: "3/2: of peak phase quantities",
+        3.0: "3: three phases for one", 1000.0: "1000: kilo",
+    }  # fmt: skip
     for value, text in names.items():
         for name, seen in ((text, value), (f"1/({text})", 1 / value)):
             if abs(ratio / seen - 1) < 0.01:

@@ -71,13 +71,9 @@ def component_participation(mode: Mode, component: str) -> float:
 
 
 def linearize_with_box(
-    master: Master,
-    component: str,
-    excitation: Excitation | None = None,
-    *,
-    restore: bool | None = None,
+    master: Master, component: str, excitation: Excitation | None = None, *, restore: bool | None = None,
     report: Callable[[str], None] | None = None,
-) -> BoxedSystem:
+) -> BoxedSystem:  # fmt: skip
     """Identify one component and linearise the coupled system around where the master is.
 
     ``master``: initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as
@@ -100,13 +96,9 @@ def linearize_with_box(
 
 
 def modes_with_boxes(
-    prepared: PreparedScenario,
-    master: Master,
-    frequency_range: tuple[float, float],
-    critical: float | None = None,
-    excitation: Excitation | None = None,
-    report: Callable[[str], None] | None = None,
-) -> ModesResult:
+    prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None = None,
+    excitation: Excitation | None = None, report: Callable[[str], None] | None = None,
+) -> ModesResult:  # fmt: skip
     """Modes as `modes_of` finds them; components that hide their states are identified first.
 
     ``prepared`` and ``master`` and ``frequency_range`` and ``critical``: as `modes_of`; to identify anything, the
@@ -132,26 +124,16 @@ def modes_with_boxes(
 
 
 def _respond(
-    master: Master,
-    name: str,
-    excitation: Excitation,
-    *,
-    restore: bool | None = None,
+    master: Master, name: str, excitation: Excitation, *, restore: bool | None = None,
     report: Callable[[str], None] | None = None,
-) -> tuple[FrequencyResponse, float]:
+) -> tuple[FrequencyResponse, float]:  # fmt: skip
     """Measure one component at an ideal bus. Also return the difference of its current from the power flow's."""
     exchange, plan = master.exchanges[name], master.system.components[name]
     bench = Bench(
-        plan.description,
-        plan.parameters,
-        rest=master.arriving(name),
-        inputs=exchange.inputs.names,
-        outputs=exchange.outputs.names,
-        held=plan.inputs,
-        step_size=master.clock.step_size,
-        restore=restore,
+        plan.description, plan.parameters, rest=master.arriving(name), inputs=exchange.inputs.names,
+        outputs=exchange.outputs.names, held=plan.inputs, step_size=master.clock.step_size, restore=restore,
         isolated=plan.isolated,
-    )
+    )  # fmt: skip
     response = measure(bench, excitation, report)
     moved = float(np.abs(response.operating_point - exchange.outputs.values).max())
     if not moved <= STEADY:

@@ -56,14 +56,10 @@ def built_in_cases() -> tuple[str, ...]:
 
 class Case(CaseDefinition):
     def prepare(
-        self,
-        scenarios: Sequence[str] = (),
-        overrides: Mapping[str, Value] | None = None,
-        step_size: float | None = None,
-        stop_time: float | None = None,
-        parameters: Sequence[ParameterFile] = (),
+        self, scenarios: Sequence[str] = (), overrides: Mapping[str, Value] | None = None,
+        step_size: float | None = None, stop_time: float | None = None, parameters: Sequence[ParameterFile] = (),
         dispatch: Dispatch | None = None,
-    ) -> list[PreparedScenario]:
+    ) -> list[PreparedScenario]:  # fmt: skip
         """Check everything and make the chosen scenarios ready to run.
 
         ``scenarios``: Names; all of them where empty.
@@ -110,14 +106,9 @@ class Case(CaseDefinition):
         return [replace(p, beside=beside, questions=(*p.questions, *idle)) for p in ready]
 
     def _beside(
-        self,
-        overrides: Mapping[str, Value] | None,
-        step_size: float | None,
-        parameters: Sequence[ParameterFile],
-        name: str,
-        plain: bool,
-        further: Mapping[str, Value] | None = None,
-    ) -> PreparedScenario | None:
+        self, overrides: Mapping[str, Value] | None, step_size: float | None, parameters: Sequence[ParameterFile],
+        name: str, plain: bool, further: Mapping[str, Value] | None = None,
+    ) -> PreparedScenario | None:  # fmt: skip
         if not plain:
             return self.prepare([name], {**(overrides or {}), **(further or {})}, step_size, None, parameters)[0]
         return self.prepare([name], None, step_size)[0] if overrides or parameters else None
@@ -261,15 +252,9 @@ def _from_ssp(path: Path, trust_fmus: bool) -> Case:
 
 
 def _case(
-    table: CaseTable,
-    text: str,
-    path: Path,
-    problems: Sequence[Problem],
-    directory: Path,
-    *,
-    numbered: bool = True,
+    table: CaseTable, text: str, path: Path, problems: Sequence[Problem], directory: Path, *, numbered: bool = True,
     trust_fmus: bool,
-) -> Case:
+) -> Case:  # fmt: skip
     """The case, with what its scenarios' parameter files say now and paths that outlast a change of the folder.
 
     ``table``, ``text``, ``path``, ``problems``, ``numbered``, ``trust_fmus``: As in `CaseDefinition`.

@@ -11,12 +11,9 @@ from orchestrator.errors import Problem
 
 def contradictions(case: CaseTable, place: Locate) -> list[Problem]:
     return [
-        *_modes(case, place),
-        *_references(case, place),
-        *_plots(case, place),
-        *_buses(case, place),
+        *_modes(case, place), *_references(case, place), *_plots(case, place), *_buses(case, place),
         *_units(case, place),
-    ]
+    ]  # fmt: skip
 
 
 def _modes(case: CaseTable, place: Locate) -> Iterator[Problem]:

@@ -34,17 +34,13 @@ LIMITS = (
 """Limits of a machine's controls, the upper one first."""
 
 RULES = (
-    Rule("machine.X_d", "machine.X_d1", _FIELD),
-    Rule("machine.X_d1", "machine.X_d2", _SCREENS, may_be_equal=True),
-    Rule("machine.X_d2", "machine.X_l", _LEAKAGE),
-    Rule("machine.X_q", "machine.X_q1", _SCREENS, may_be_equal=True),
-    Rule("machine.X_q1", "machine.X_q2", _SCREENS, may_be_equal=True),
-    Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
-    Rule("machine.T_d10", "machine.T_d20", _SLOWER),
-    Rule("machine.T_q10", "machine.T_q20", _SLOWER),
+    Rule("machine.X_d", "machine.X_d1", _FIELD), Rule("machine.X_d1", "machine.X_d2", _SCREENS, may_be_equal=True),
+    Rule("machine.X_d2", "machine.X_l", _LEAKAGE), Rule("machine.X_q", "machine.X_q1", _SCREENS, may_be_equal=True),
+    Rule("machine.X_q1", "machine.X_q2", _SCREENS, may_be_equal=True), Rule("machine.X_q2", "machine.X_l", _LEAKAGE),
+    Rule("machine.T_d10", "machine.T_d20", _SLOWER), Rule("machine.T_q10", "machine.T_q20", _SLOWER),
     Rule("machine.s_12", "machine.s_10", "saturation rises with the flux; are the two swapped?", may_be_equal=True),
     *(Rule(upper, lower, _LIMITS) for upper, lower in LIMITS),
-)
+)  # fmt: skip
 """Rules of the machines' data. The FMUs refuse the same data in any tool; here the error names the line, before any FMU
 is started."""
 

@@ -31,14 +31,11 @@ class Facts:
         units = [_counted(n, what) for n, what in ((self.machines, "machine"), (self.converters, "converter")) if n]
         slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
         parts = [
-            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []),
-            _counted(self.buses, "bus"),
-            *units,
+            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []), _counted(self.buses, "bus"), *units,
             *(["no governor"] if self.machines and not self.governed else []),
-            f"{self.load_mw:.5g} MW of load ({self.load_model})",
-            *([f"slack {slack}"] if slack else []),
+            f"{self.load_mw:.5g} MW of load ({self.load_model})", *([f"slack {slack}"] if slack else []),
             "voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu),
-        ]
+        ]  # fmt: skip
         return f"{', '.join(self.sources)}: {', '.join(parts)}"
 
 
@@ -61,17 +58,12 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     loads = [(load, _power(load, grid)) for load in network.loads]
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
     return Facts(
-        (*sources, *dyr),
-        rated_frequency(prepared),
-        len(network.buses),
-        len(machines),
-        len(feeding) - len(machines),
+        (*sources, *dyr), rated_frequency(prepared), len(network.buses), len(machines), len(feeding) - len(machines),
         any(v.startswith("governor.T_") for n in machines for v in plans[n].description.variables),
-        sum(p for _, p in loads if p > 0),
-        _model([load for load, p in loads if p > 0]),
+        sum(p for _, p in loads if p > 0), _model([load for load, p in loads if p > 0]),
         tuple((n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n")) for n in at_slack),
         (min(magnitudes), max(magnitudes)),
-    )
+    )  # fmt: skip
 
 
 def rated_frequency(prepared: PreparedScenario) -> float | None:

@@ -33,15 +33,9 @@ class FlowEquations:
 
     @classmethod
     def of(
-        cls,
-        buses: Sequence[str],
-        lines: Sequence[FlowLine],
-        loads: Sequence[FlowLoad],
-        shunts: Sequence[FlowShunt],
-        active: Mapping[str, float],
-        held: Mapping[str, float],
-        slack_bus: str,
-    ) -> "FlowEquations":
+        cls, buses: Sequence[str], lines: Sequence[FlowLine], loads: Sequence[FlowLoad], shunts: Sequence[FlowShunt],
+        active: Mapping[str, float], held: Mapping[str, float], slack_bus: str,
+    ) -> "FlowEquations":  # fmt: skip
         """The equations of a network.
 
         ``active``: active power that units feed, by bus [pu, 100 MVA].
@@ -66,16 +60,11 @@ class FlowEquations:
         for bus, power in active.items():
             fed[position[bus]] += power
         return cls(
-            tuple(buses),
-            np.array([t[0] for t in triplets], dtype=np.int64),
-            np.array([t[1] for t in triplets], dtype=np.int64),
-            np.array([t[2] for t in triplets], dtype=np.complex128),
-            fed,
-            position[slack_bus],
-            np.array([bus in held for bus in buses]),
-            np.array([held.get(bus, 1.0) for bus in buses]),
-            tuple(lines),
-        )
+            tuple(buses), np.array([t[0] for t in triplets], dtype=np.int64),
+            np.array([t[1] for t in triplets], dtype=np.int64), np.array([t[2] for t in triplets], dtype=np.complex128),
+            fed, position[slack_bus], np.array([bus in held for bus in buses]),
+            np.array([held.get(bus, 1.0) for bus in buses]), tuple(lines),
+        )  # fmt: skip
 
     @cached_property
     def angle_buses(self) -> NDArray[np.int64]:

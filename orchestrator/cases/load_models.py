@@ -48,24 +48,18 @@ def with_laws(
     return replace(
         load,
         active=_mixed(
-            load,
-            "P",
-            _law(next((m.active for m in models if m.active is not None), usual)),
-            load.p_mw,
+            load, "P", _law(next((m.active for m in models if m.active is not None), usual)), load.p_mw,
             (parts[0].real, parts[1].real),
         ),
         reactive=_mixed(
-            load,
-            "Q",
-            _law(next((m.reactive for m in models if m.reactive is not None), usual)),
-            load.q_mvar,
+            load, "Q", _law(next((m.reactive for m in models if m.reactive is not None), usual)), load.q_mvar,
             (parts[0].imag, parts[1].imag),
         ),
         k_pf=next((m.k_pf for m in models if m.k_pf is not None), 0.0),
         k_qf=next((m.k_qf for m in models if m.k_qf is not None), 0.0),
         v_min=next((m.v_min for m in models if m.v_min is not None), None),
         tau=next((m.tau for m in models if m.tau is not None), None),
-    )
+    )  # fmt: skip
 
 
 def _law(law: LoadLaw) -> Zip:

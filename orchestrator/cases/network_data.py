@@ -77,23 +77,13 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         ends = [bus for line in lines for bus in (line.from_bus, line.to_bus)]
         buses = dict.fromkeys([*ends, *(bus for x in transformers for bus in x.buses)])
     return NetworkData(
-        tuple(buses),
-        (*source.lines, *lines),
+        tuple(buses), (*source.lines, *lines),
         (*(with_laws(x, table, parts=source.load_parts.get(x.name, (0j, 0j))) for x in source.loads), *loads),
-        (*source.shunts, *shunts),
-        source.generation,
-        source.slack,
-        table.frequency if table.frequency is not None else source.frequency,
-        table.stray_B,
-        {line.name: place for line, place in in_file},
-        (*source.transformers, *transformers),
-        found.changes,
-        found.machines,
-        found.idle,
-        source.feeding,
-        source.capacitors,
-        found.solved,
-    )
+        (*source.shunts, *shunts), source.generation, source.slack,
+        table.frequency if table.frequency is not None else source.frequency, table.stray_B,
+        {line.name: place for line, place in in_file}, (*source.transformers, *transformers), found.changes,
+        found.machines, found.idle, source.feeding, source.capacitors, found.solved,
+    )  # fmt: skip
 
 
 def _star(one_two: float, one_three: float, two_three: float) -> tuple[float, float, float]:

@@ -85,18 +85,13 @@ def import_network(source: SourceTables) -> ImportedNetwork:
         raise InputError(f"{source.name}: {'; '.join(problems[:5])}{more}; the grid model has no such element")
     reference = [n for n, row in rows.items() if int(row[1]) == _REFERENCE]
     return ImportedNetwork(
-        tuple(bus for label in labels.values() if (bus := bus_of(label)) not in merged),
-        tuple(lines),
-        tuple(loads),
-        tuple(shunts),
-        {bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()},
-        bus_of(labels[reference[0]]) if reference else None,
-        source.frequency,
-        tuple(transformers),
+        tuple(bus for label in labels.values() if (bus := bus_of(label)) not in merged), tuple(lines), tuple(loads),
+        tuple(shunts), {bus_of(labels[n]): _generation(labels[n], members) for n, members in at_bus.items()},
+        bus_of(labels[reference[0]]) if reference else None, source.frequency, tuple(transformers),
         {f"load_{labels[n]}": parts for n, parts in source.load_parts.items() if n in labels},
         {bus_of(labels[n]): float(row[2]) for n, row in rows.items() if row[2] < -_NEGLIGIBLE},
         {bus_of(labels[n]): float(row[5]) for n, row in rows.items() if row[5] > _NEGLIGIBLE},
-    )
+    )  # fmt: skip
 
 
 def bus_of(label: str) -> str:
@@ -125,16 +120,11 @@ def _lines(source: SourceTables, labels: dict[int, str]) -> tuple[list[Line], di
             to_earth[bus] = to_earth.get(bus, 0j) + complex(rest)
         lines.append(
             Line(
-                name if seen[name] == 1 else f"{name}_{seen[name]}",
-                bus_of(labels[start]),
-                bus_of(labels[end]),
-                X=float(row[3]) * scale,
-                R=float(row[2]) * scale,
-                B=float(b) / scale,
-                tap=tap,
+                name if seen[name] == 1 else f"{name}_{seen[name]}", bus_of(labels[start]), bus_of(labels[end]),
+                X=float(row[3]) * scale, R=float(row[2]) * scale, B=float(b) / scale, tap=tap,
                 shift=math.radians(float(row[9])),
             )
-        )
+        )  # fmt: skip
     return lines, to_earth
 
 

@@ -39,14 +39,9 @@ def unit_of(plan: ComponentPlan, variable: str) -> str:
 
 
 def outside(
-    draft: Draft,
-    component: str,
-    variable: str,
-    value: float,
-    wanted: Usual,
-    where: str | None = None,
+    draft: Draft, component: str, variable: str, value: float, wanted: Usual, where: str | None = None,
     scale: float = 1.0,
-) -> Iterator[UnusualValue]:
+) -> Iterator[UnusualValue]:  # fmt: skip
     given, value = value, value * scale
     if wanted.fits(value):
         return

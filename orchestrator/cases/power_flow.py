@@ -48,16 +48,9 @@ class PowerFlow:
 
 
 def solve_power_flow(
-    buses: Sequence[str],
-    lines: Sequence[FlowLine],
-    loads: Sequence[FlowLoad],
-    units: Sequence[FlowUnit],
-    slack_bus: str,
-    shunts: Sequence[FlowShunt] = (),
-    limits: Limits | None = None,
-    *,
-    keep_limits: bool = False,
-) -> PowerFlow:
+    buses: Sequence[str], lines: Sequence[FlowLine], loads: Sequence[FlowLoad], units: Sequence[FlowUnit],
+    slack_bus: str, shunts: Sequence[FlowShunt] = (), limits: Limits | None = None, *, keep_limits: bool = False,
+) -> PowerFlow:  # fmt: skip
     """Solve the power flow.
 
     Units at one bus hold its voltage together. They share its reactive power in proportion to their ratings; at the

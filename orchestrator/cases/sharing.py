@@ -48,12 +48,9 @@ class Reserve:
 
 
 def in_words(
-    dispatch: Dispatch,
-    after: Mapping[str, complex],
-    plans: Mapping[str, ComponentPlan],
-    lost: Collection[str],
+    dispatch: Dispatch, after: Mapping[str, complex], plans: Mapping[str, ComponentPlan], lost: Collection[str],
     also: Sequence[str] = (),
-) -> str:
+) -> str:  # fmt: skip
     """What the lost units fed, what else was lost, and who feeds it now, by the units' powers afterwards [pu, S_n]."""
     rating = {name: plans[name].number("S_n") for name in dispatch.powers if name in plans}
     fed = [f"{name} is lost, which fed {dispatch.powers[name].real * rating[name]:.4g} MW" for name in sorted(lost)]
@@ -167,13 +164,9 @@ def _overload(reserves: Sequence[Reserve], change: float, rest: float) -> str:
 
 
 def shared_flow(
-    solve: Callable[[Sequence[FlowUnit]], PowerFlow],
-    units: Sequence[FlowUnit],
-    plans: Mapping[str, ComponentPlan],
-    slack_bus: str,
-    dispatch: Dispatch,
-    active: Mapping[str, tuple[float, float]],
-) -> PowerFlow:
+    solve: Callable[[Sequence[FlowUnit]], PowerFlow], units: Sequence[FlowUnit], plans: Mapping[str, ComponentPlan],
+    slack_bus: str, dispatch: Dispatch, active: Mapping[str, tuple[float, float]],
+) -> PowerFlow:  # fmt: skip
     """The power flow in which the units share what the dispatch before lacks now, with the change of the losses.
 
     ``solve``: Solves the power flow of units that feed their ``P_0``; those at the slack bus feed what is left.

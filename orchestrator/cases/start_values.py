@@ -20,18 +20,11 @@ _IDLE = -0.1  # such a limit of a unit that is out of service [pu]: not at its e
 
 
 def start_from_power_flow(
-    system: System,
-    network: Network,
-    grid: str,
-    units: Mapping[str, str],
-    slack: str,
-    limits: Mapping[str, tuple[float, float]] | None = None,
-    *,
-    keep_limits: bool = False,
-    returning: Collection[str] = (),
-    dispatch: Dispatch | None = None,
+    system: System, network: Network, grid: str, units: Mapping[str, str], slack: str,
+    limits: Mapping[str, tuple[float, float]] | None = None, *, keep_limits: bool = False,
+    returning: Collection[str] = (), dispatch: Dispatch | None = None,
     active: Mapping[str, tuple[float, float]] | None = None,
-) -> PowerFlow:
+) -> PowerFlow:  # fmt: skip
     """Solve the power flow and set the start values of the grid and of all units.
 
     Lines, loads and units have the values that are set in the system. Every override therefore moves the operating
@@ -52,13 +45,9 @@ def start_from_power_flow(
         return solve_power_flow(
             (*network.buses, *(bus for x in network.transformers for bus in inner_buses(x))),
             [*_lines(network, system.components[grid]), *_legs(network, system.components[grid])],
-            _loads(network, system.components[grid]),
-            fed,
-            slack,
-            _shunts(network, system.components[grid]),
-            _limits(limits or {}, fed),
-            keep_limits=keep_limits,
-        )
+            _loads(network, system.components[grid]), fed, slack, _shunts(network, system.components[grid]),
+            _limits(limits or {}, fed), keep_limits=keep_limits,
+        )  # fmt: skip
 
     if dispatch is None:
         flow = solve(feeding)
@@ -76,10 +65,7 @@ def start_from_power_flow(
 def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
     return [
         FlowLine(
-            line.name,
-            line.from_bus,
-            line.to_bus,
-            R=grid.number(line.variable("R")),
+            line.name, line.from_bus, line.to_bus, R=grid.number(line.variable("R")),
             X=grid.number(line.variable("X")) - (grid.number(line.variable("X_C")) if line.X_C else 0.0),
             B=grid.number(line.variable("B")) if line.B else 0.0,
             tap=grid.number(line.variable("tap")) if line.has_ratio else 1.0,
@@ -87,7 +73,7 @@ def _lines(network: Network, grid: ComponentPlan) -> list[FlowLine]:
             closed=is_connected(grid, line.variable("connected")),
         )
         for line in network.lines
-    ]
+    ]  # fmt: skip
 
 
 def _legs(network: Network, grid: ComponentPlan) -> list[FlowLine]:

@@ -22,13 +22,9 @@ place = ""          # where it is signed
 """
 
 _LABELS = {
-    "number": "Certificate number",
-    "applicant": "Applicant",
-    "operator": "Network operator",
-    "tester": "Tester",
-    "place": "Place",
-    "date": "Date",
-}
+    "number": "Certificate number", "applicant": "Applicant", "operator": "Network operator", "tester": "Tester",
+    "place": "Place", "date": "Date",
+}  # fmt: skip
 
 
 class Details(Table):

@@ -59,26 +59,19 @@ def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
     points = {name: c.points[name, v.X_L] for name in (WITHOUT, WITH)}
     having, without = points[WITH], points[WITHOUT].modes
     return {
-        "X_L": v.X_L,
-        "accepted": v.accepted,
-        "judged": v.judged,
-        "faults": list(v.faults),
-        "unknown": v.unknown,
-        "modes": [mode_json(m) for m in v.modes],
-        "modes_beside": [mode_json(m) for m in v.neighbours],
+        "X_L": v.X_L, "accepted": v.accepted, "judged": v.judged, "faults": list(v.faults), "unknown": v.unknown,
+        "modes": [mode_json(m) for m in v.modes], "modes_beside": [mode_json(m) for m in v.neighbours],
         "modes_without": [] if without is None else [_figures(x) for x in without.eigenvalues.tolist()],
         "lowered": [_lowered_json(m) for m in v.lowered],
         "growth": {name: number(p.growth) for name, p in points.items()},
         "stability": {name: p.stability for name, p in points.items()},
-        "residual": {name: number(p.residual) for name, p in points.items()},
-        "power": having.power,
-        "findings": {name: p.findings for name, p in points.items()},
-        "converter_model": _model_json(having),
+        "residual": {name: number(p.residual) for name, p in points.items()}, "power": having.power,
+        "findings": {name: p.findings for name, p in points.items()}, "converter_model": _model_json(having),
         "warnings": {name: list(p.warnings) for name, p in points.items()},
         "time": None if v.time is None else time_json(v.time),
         "time_without": None if v.base_time is None else time_json(v.base_time),
         "again": {n: commands(v.X_L, n, identified=having.identified is not None) for n in points},
-    }
+    }  # fmt: skip
 
 
 def commands(X_L: float, scenario: str, *, identified: bool) -> dict[str, str]:
@@ -105,13 +98,9 @@ def mode_json(m: ModeVerdict) -> dict[str, Any]:
     """A mode with the converter, and what it was without."""
     without = None if m.before is None else _figures(m.before)
     return _figures(m.eigenvalue) | {
-        "without": without,
-        "likeness": m.similarity,
-        "components": m.components,
-        "accepted": m.accepted,
-        "reason": m.reason,
-        **({"doubt": m.doubt} if m.doubt else {}),
-    }
+        "without": without, "likeness": m.similarity, "components": m.components, "accepted": m.accepted,
+        "reason": m.reason, **({"doubt": m.doubt} if m.doubt else {}),
+    }  # fmt: skip
 
 
 def _lowered_json(m: ModeVerdict) -> dict[str, Any]:
@@ -136,12 +125,9 @@ def time_json(time: TimeVerdict) -> dict[str, Any]:
 
 def _swings_json(test: SwingTest) -> dict[str, Any]:
     return {
-        "accepted": test.accepted,
-        "reason": test.reason,
-        "ratio": test.ratio,
-        "dropped": asdict(test.dropped) if test.dropped else None,
-        "swings": [_swing_json(s) for s in test.swings],
-    }
+        "accepted": test.accepted, "reason": test.reason, "ratio": test.ratio,
+        "dropped": asdict(test.dropped) if test.dropped else None, "swings": [_swing_json(s) for s in test.swings],
+    }  # fmt: skip
 
 
 def _swing_json(s: RecordedSwing) -> dict[str, Any]:

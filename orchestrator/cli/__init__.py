@@ -67,12 +67,9 @@ GROUPS = {
 
 OLD = {
     **{name.partition(" ")[2]: name for name in COMMANDS if name.startswith(("fmu ", "signal "))},
-    **{f"export-{kind}": f"export {kind}" for kind in ("ssp", "comtrade", "dll")},
-    "linearize": "export linear",
-    "which-master": "master which",
-    "federate": "master federate",
-    "black-box": "modes --black-box",
-}
+    **{f"export-{kind}": f"export {kind}" for kind in ("ssp", "comtrade", "dll")}, "linearize": "export linear",
+    "which-master": "master which", "federate": "master federate", "black-box": "modes --black-box",
+}  # fmt: skip
 """Spellings before 0.3, which work until 1.0, with today's."""
 
 _MODULES = {new: old for old, new in OLD.items()}  # a command in a group has the module of its old name

@@ -18,14 +18,9 @@ def switch(parser: argparse._ActionsContainer, name: str, text: str) -> None:
 
 
 def option(
-    parser: argparse._ActionsContainer,
-    name: str,
-    metavar: str,
-    text: str,
-    *,
-    read: Callable[[str], Any] = str,
+    parser: argparse._ActionsContainer, name: str, metavar: str, text: str, *, read: Callable[[str], Any] = str,
     default: Any = None,
-) -> None:
+) -> None:  # fmt: skip
     """An option with one value, which ``read`` makes of the text."""
     parser.add_argument(name, metavar=metavar, help=text, type=read, default=default)
 

@@ -66,15 +66,9 @@ def run(options: argparse.Namespace) -> int:
         for number, model in enumerate(models, start=1):
             report(f"{model.name}: compiling, {kind} ({number} of {len(models)}); minutes where it was never compiled")
             built = build(
-                model,
-                options.dest,
-                native=options.native,
-                fmi=options.fmi,
-                platforms=options.platform,
-                extra=extra,
-                reference=options.reference,
-                sources=options.sources,
-            )
+                model, options.dest, native=options.native, fmi=options.fmi, platforms=options.platform, extra=extra,
+                reference=options.reference, sources=options.sources,
+            )  # fmt: skip
             print(built)
     if not options.native and options.host is None:
         make_errors().print(_NEEDS, soft_wrap=True)

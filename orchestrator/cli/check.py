@@ -18,12 +18,9 @@ from orchestrator.fmi.protection import missing
 from orchestrator.units import read_value
 
 _COLOURS = {
-    Verdict.PASS: "green",
-    Verdict.REMARK: "yellow",
-    Verdict.FAIL: "bold red",
-    Verdict.NOT_APPLICABLE: "dim",
+    Verdict.PASS: "green", Verdict.REMARK: "yellow", Verdict.FAIL: "bold red", Verdict.NOT_APPLICABLE: "dim",
     Verdict.NOT_SUPPORTED: "bold yellow",
-}
+}  # fmt: skip
 NOT_SUPPORTED = 2  # exit code where nothing failed, but the FMU could not be run here
 
 
@@ -51,18 +48,10 @@ def run(options: argparse.Namespace) -> int:
     if options.scenario and not options.case:
         raise InputError("--scenario names a scenario of a case; give --case as well")
     found = check(
-        options.file,
-        options.binding,
-        step=options.step,
-        only=options.only,
-        case=options.case or None,
-        component=options.component,
-        scenario=options.scenario,
-        seed=options.seed,
-        frequency=options.frequency,
-        time_limit=options.time_limit,
-        memory_limit=options.memory_limit,
-    )
+        options.file, options.binding, step=options.step, only=options.only, case=options.case or None,
+        component=options.component, scenario=options.scenario, seed=options.seed, frequency=options.frequency,
+        time_limit=options.time_limit, memory_limit=options.memory_limit,
+    )  # fmt: skip
     if options.junit:
         found.save_junit(options.junit)
     if options.json:

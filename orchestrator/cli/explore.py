@@ -28,13 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--range", "LO:HI", "frequencies shown first [Hz] (default: 0.1:2)", read=read_range,
            default=ELECTROMECHANICAL_HZ)  # fmt: skip
     option(
-        parser,
-        "--port",
-        "N",
-        "of the server, on this machine alone (default: any that is free)",
-        read=read_whole(1, 65535, "a port"),
-        default=0,
-    )
+        parser, "--port", "N", "of the server, on this machine alone (default: any that is free)",
+        read=read_whole(1, 65535, "a port"), default=0,
+    )  # fmt: skip
     switch(parser, "--no-browser", "print the address, and open no browser")
     option(parser, "--save", "FILE.html", "write a page that needs neither server nor Python, and open none", read=Path)
     repeatable(parser, "--vary", "COMPONENT.PARAMETER=START:STOP:COUNT",

@@ -25,13 +25,9 @@ def run(options: argparse.Namespace) -> int:
     """Write the libraries and the data sheet, and print their paths."""
     with said_stages() as report:
         written = export_dll(
-            options.name,
-            options.dest,
-            platforms=options.platform,
-            sample_time=options.sample_time,
-            values=dict(map(_value, options.set)),
-            report=report,
-        )
+            options.name, options.dest, platforms=options.platform, sample_time=options.sample_time,
+            values=dict(map(_value, options.set)), report=report,
+        )  # fmt: skip
     for path in (*written.libraries.values(), written.sheet):
         print(path)
     return 0

@@ -37,12 +37,9 @@ class Progressing:
         self._folder, self._done, self._total = folder, 0, 0
 
     def compute(
-        self,
-        study: Callable[[CountReport], Result],
-        executor: Executor,
-        console: Console,
+        self, study: Callable[[CountReport], Result], executor: Executor, console: Console,
         told: tuple[str, str] | None = None,
-    ) -> Result:
+    ) -> Result:  # fmt: skip
         """Run the study, and close its executor; ``told`` is for lines on standard error where there is no terminal."""
         lines = _Lines(None if console.is_terminal or console.is_jupyter else told)
         with progress_bar(console) as bar:

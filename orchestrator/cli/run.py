@@ -198,25 +198,17 @@ def _say_unfinished(folder: Path) -> None:
 
 
 def _run_into(
-    place: ScenarioFolder,
-    scenario: Scenario,
-    bar: Progress,
-    kept: checkpoints.StudyCheckpoints,
-    options: argparse.Namespace,
-    engine: Federates | None,
-) -> RunResult:
+    place: ScenarioFolder, scenario: Scenario, bar: Progress, kept: checkpoints.StudyCheckpoints,
+    options: argparse.Namespace, engine: Federates | None,
+) -> RunResult:  # fmt: skip
     """Run a scenario; its recording grows in its folder."""
     recording = RecordingFolder(place.path / FOLDER, scenario.prepared, {"run": place.run})
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RunEndedWarning)  # it is said at the end
         return scenario.run(
-            linear=options.linear,
-            observers=[bar],
-            recording=recording,
-            checkpoints=kept.of(scenario.name, recording, place),
-            federates=engine,
-            threads=options.threads,
-        ).result
+            linear=options.linear, observers=[bar], recording=recording,
+            checkpoints=kept.of(scenario.name, recording, place), federates=engine, threads=options.threads,
+        ).result  # fmt: skip
 
 
 def _early_end(
@@ -234,12 +226,9 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _save_together(
-    results: Sequence[RunResult],
-    folder: Path,
-    run_id: str,
-    stopped: Mapping[str, BaseException],
+    results: Sequence[RunResult], folder: Path, run_id: str, stopped: Mapping[str, BaseException],
     early_end: EarlyEnd | None,
-) -> list[Path]:
+) -> list[Path]:  # fmt: skip
     """Write what concerns all scenarios; return the plots."""
     whole = [r for r in results if not isinstance(r.failure, ResultsError)]
     names = [r.modes.prepared.name for r in whole]

@@ -102,12 +102,9 @@ def shown(
 
 
 def present(
-    options: argparse.Namespace,
-    as_json: Callable[[], object],
-    parts: Iterable[RenderableType],
-    remarks: Iterable[str] = (),
-    end: str = "",
-) -> None:
+    options: argparse.Namespace, as_json: Callable[[], object], parts: Iterable[RenderableType],
+    remarks: Iterable[str] = (), end: str = "",
+) -> None:  # fmt: skip
     """Print a study: JSON, or its parts and then its last line; remarks on standard error in either case."""
     console = make_console(stderr=options.json)
     if options.json:

@@ -114,10 +114,6 @@ def _json(verdict: Identified) -> dict[str, Any]:
     return {
         "fits": [asdict(fit) for fit in verdict.fits],
         "told": {name: a[0] if len(a) == 1 else None for name in PROPERTIES for a in [verdict.answers(name)]},
-        "nearest": asdict(verdict.nearest),
-        "difference": verdict.difference,
-        "rows": verdict.rows,
-        "steps": verdict.steps,
-        "intervals": verdict.intervals,
-        "masters": list(verdict.masters),
-    }
+        "nearest": asdict(verdict.nearest), "difference": verdict.difference, "rows": verdict.rows,
+        "steps": verdict.steps, "intervals": verdict.intervals, "masters": list(verdict.masters),
+    }  # fmt: skip

@@ -138,17 +138,12 @@ def _modes(
     place = {complex(value): k for k, value in enumerate(spectrum.eigenvalues.tolist())}
     named = named_modes(case, model, modes).named
     return PointModes(
-        Status.COMPUTED,
-        warnings=warnings,
-        doubtful=doubtful,
-        values=spectrum.eigenvalues,
+        Status.COMPUTED, warnings=warnings, doubtful=doubtful, values=spectrum.eigenvalues,
         swinging=tuple(place[mode.eigenvalue] for mode in modes),
-        named={name: place[mode.eigenvalue] for name, mode in named.items()},
-        who=tuple(_who(mode) for mode in modes),
-        rightmost="" if index_of_rightmost(spectrum.eigenvalues) is None else _who(spectrum.rightmost),
-        loops=loops,
+        named={name: place[mode.eigenvalue] for name, mode in named.items()}, who=tuple(_who(mode) for mode in modes),
+        rightmost="" if index_of_rightmost(spectrum.eigenvalues) is None else _who(spectrum.rightmost), loops=loops,
         clocks=model.clocks,
-    )
+    )  # fmt: skip
 
 
 def _who(mode: Mode | None) -> str:

@@ -25,14 +25,9 @@ class RankedConverter:
 
 
 def ranked(
-    places: Sequence[PodPlace],
-    stages: Mapping[PodPlace, int],
-    points: Sequence[RatedPoint],
-    largest: float,
-    frequency: float,
-    most: int,
-    known: tuple[PodPlace, PodSetting] | None = None,
-) -> tuple[RankedConverter, ...]:
+    places: Sequence[PodPlace], stages: Mapping[PodPlace, int], points: Sequence[RatedPoint], largest: float,
+    frequency: float, most: int, known: tuple[PodPlace, PodSetting] | None = None,
+) -> tuple[RankedConverter, ...]:  # fmt: skip
     """The controllers by the size of their residues; for the first a controller alone is designed.
 
     ``stages``: N_S of each.

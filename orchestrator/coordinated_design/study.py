@@ -246,12 +246,9 @@ def design_over_points(
 
 
 def _confirmed(
-    plan: PointsDesignPlan,
-    one: RankedConverter,
-    before: Sequence[PointModes],
-    known: Sequence[PointModes] | None,
+    plan: PointsDesignPlan, one: RankedConverter, before: Sequence[PointModes], known: Sequence[PointModes] | None,
     work: Work,
-) -> RankedConverter:
+) -> RankedConverter:  # fmt: skip
     """A ranked converter with the least damping that its setting gives where all modes are computed anew."""
     if one.setting is None:
         return one

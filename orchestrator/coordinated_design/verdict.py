@@ -103,12 +103,9 @@ class JudgedPoint:
 
 
 def judged(
-    where: Sequence[tuple[OperatingCase, Outage]],
-    before: Sequence[PointModes],
-    after: Sequence[PointModes],
-    aim: Aim,
+    where: Sequence[tuple[OperatingCase, Outage]], before: Sequence[PointModes], after: Sequence[PointModes], aim: Aim,
     predicted: Mapping[int, Worth],
-) -> Iterator[JudgedPoint]:
+) -> Iterator[JudgedPoint]:  # fmt: skip
     for k, here in enumerate(where):
         yield _judged(here, before[k], after[k], aim, predicted.get(k))
 

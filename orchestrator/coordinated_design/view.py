@@ -117,23 +117,18 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "unforeseen": [_where(point) for point in verdict.unforeseen],
         "settings": [
             {
-                "controller": group.controller,
-                "components": list(group.components),
-                "K": setting.gain,
-                "T_S1": setting.filters.T_S1,
-                "T_S2": setting.filters.T_S2,
-                "N_S": group.stages,
+                "controller": group.controller, "components": list(group.components), "K": setting.gain,
+                "T_S1": setting.filters.T_S1, "T_S2": setting.filters.T_S2, "N_S": group.stages,
             }
             for group, setting in zip(plan.groups, design.settings, strict=True)
         ],
         "all": [_point(point) for point in verdict.points],
         "ranking": [_ranked(one) for one in design.ranking],
         "search": {
-            "worst_damping_ratio": design.found.worth.worst,
-            "evaluations": design.evaluations,
+            "worst_damping_ratio": design.found.worth.worst, "evaluations": design.evaluations,
             "linear_programs": design.found.steps,
         },
-    }
+    }  # fmt: skip
 
 
 def _where(point: JudgedPoint) -> dict[str, Any]:
@@ -148,25 +143,18 @@ def _mode(mode: PlacedMode | None) -> dict[str, Any] | None:
 
 def _point(point: JudgedPoint) -> dict[str, Any]:
     return _where(point) | {
-        "stable": point.stable,
-        "before": _mode(point.target_before),
-        "after": _mode(point.target),
-        "allowed": None if point.worth is None else point.worth.allowed,
-        "why": point.why_not,
-    }
+        "stable": point.stable, "before": _mode(point.target_before), "after": _mode(point.target),
+        "allowed": None if point.worth is None else point.worth.allowed, "why": point.why_not,
+    }  # fmt: skip
 
 
 def _ranked(one: RankedConverter) -> dict[str, Any]:
     setting = one.setting
     return {
-        "component": one.place.component,
-        "controller": one.place.controller,
-        "worst_damping_ratio": one.worst,
-        "K": None if setting is None else setting.gain,
-        "T_S1": None if setting is None else setting.filters.T_S1,
-        "T_S2": None if setting is None else setting.filters.T_S2,
-        "shift_rad_s_per_pu": one.shift,
-    }
+        "component": one.place.component, "controller": one.place.controller, "worst_damping_ratio": one.worst,
+        "K": None if setting is None else setting.gain, "T_S1": None if setting is None else setting.filters.T_S1,
+        "T_S2": None if setting is None else setting.filters.T_S2, "shift_rad_s_per_pu": one.shift,
+    }  # fmt: skip
 
 
 def settings_table(design: PointsDesign) -> PlainTable:

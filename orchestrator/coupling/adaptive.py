@@ -44,14 +44,9 @@ class AdaptiveLoop:
     ``step_size``: the communication step [s]."""
 
     def __init__(
-        self,
-        inner: Loop,
-        groups: Sequence[Sequence[Exchange]],
-        y: Values,
-        tracks: Tracks,
-        schedule: Schedule,
+        self, inner: Loop, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule,
         step_size: float,
-    ) -> None:
+    ) -> None:  # fmt: skip
         if schedule.tolerance is None:
             raise ValueError(f"schedule {schedule.name!r} has no tolerance")
         self._inner, self._y, self._tracks, self._tolerance = inner, y, tracks, schedule.tolerance

@@ -33,35 +33,20 @@ _BALANCED_AT = (100, 1000, 10_000, 100_000)  # communication steps after which t
 
 class _Call(ctypes.Structure):
     _fields_ = (
-        ("component", ctypes.c_void_p),
-        ("set_real", ctypes.c_void_p),
-        ("get_real", ctypes.c_void_p),
-        ("step", ctypes.c_void_p),
-        ("input_references", ctypes.c_void_p),
-        ("output_references", ctypes.c_void_p),
-        ("inputs", ctypes.c_void_p),
-        ("outputs", ctypes.c_void_p),
-        ("sources", ctypes.c_void_p),
-        ("n_inputs", ctypes.c_int64),
-        ("n_outputs", ctypes.c_int64),
-        ("fresh", ctypes.c_void_p),
-        ("spent", ctypes.c_double),
-        ("tracks", ctypes.c_void_p),
-        ("status", ctypes.c_int32),
-        ("stage", ctypes.c_int32),
+        ("component", ctypes.c_void_p), ("set_real", ctypes.c_void_p), ("get_real", ctypes.c_void_p),
+        ("step", ctypes.c_void_p), ("input_references", ctypes.c_void_p), ("output_references", ctypes.c_void_p),
+        ("inputs", ctypes.c_void_p), ("outputs", ctypes.c_void_p), ("sources", ctypes.c_void_p),
+        ("n_inputs", ctypes.c_int64), ("n_outputs", ctypes.c_int64), ("fresh", ctypes.c_void_p),
+        ("spent", ctypes.c_double), ("tracks", ctypes.c_void_p), ("status", ctypes.c_int32), ("stage", ctypes.c_int32),
         ("unused", ctypes.c_int64),
-    )
+    )  # fmt: skip
 
 
 class _Group(ctypes.Structure):
     _fields_ = (
-        ("first", ctypes.c_int64),
-        ("last", ctypes.c_int64),
-        ("own", ctypes.c_void_p),
-        ("shared", ctypes.c_void_p),
-        ("begin", ctypes.c_void_p),
-        ("n_own", ctypes.c_int64),
-    )
+        ("first", ctypes.c_int64), ("last", ctypes.c_int64), ("own", ctypes.c_void_p), ("shared", ctypes.c_void_p),
+        ("begin", ctypes.c_void_p), ("n_own", ctypes.c_int64),
+    )  # fmt: skip
 
 
 @cache
@@ -99,13 +84,9 @@ class CompiledLoop:
     are seen to be faster than one."""
 
     def __init__(
-        self,
-        library: Any,
-        groups: Sequence[Sequence[Turn]],
-        y: NDArray[np.float64],
-        tracks: Tracks,
+        self, library: Any, groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks,
         threads: int | None = 1,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._library, self._y, self._tracks = library, y, tracks
         self._exchanges = [exchange for group in groups for exchange in group]
         n = len(self._exchanges)
@@ -154,16 +135,10 @@ class CompiledLoop:
                 part, team = self._next(count - self.completed)
                 begun = perf_counter()
                 status = self._library.advance(
-                    ctypes.addressof(self._calls),
-                    ctypes.addressof(self._groups),
-                    len(self._groups),
-                    None if team is None else team.address,
-                    self._y.ctypes.data,
-                    index + self.completed,
-                    part,
-                    step_size,
-                    ctypes.addressof(self._failure),
-                )
+                    ctypes.addressof(self._calls), ctypes.addressof(self._groups), len(self._groups),
+                    None if team is None else team.address, self._y.ctypes.data, index + self.completed, part,
+                    step_size, ctypes.addressof(self._failure),
+                )  # fmt: skip
                 self.completed = self._failure[0] - index if status else self.completed + part
                 if not status:
                     self._note(part, perf_counter() - begun, team)

@@ -39,13 +39,9 @@ class CoupledComponents:
     ``wires``: The connections that do more than carry a value."""
 
     def __init__(
-        self,
-        system: System,
-        schedule: Schedule,
-        step_size: float,
-        stop_time: float | None,
+        self, system: System, schedule: Schedule, step_size: float, stop_time: float | None,
         opener: Callable[[str, ComponentPlan, Path], Component],
-    ) -> None:
+    ) -> None:  # fmt: skip
         open_inputs = [str(endpoint) for endpoint in system.unconnected_inputs()]
         if open_inputs:
             raise InputError(

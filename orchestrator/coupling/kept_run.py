@@ -12,13 +12,9 @@ from orchestrator.errors import ComponentError, NotTakenUpError
 
 
 def state_of(
-    stepper: Stepper,
-    observers: Iterable[Observer],
-    components: Mapping[str, bytes] | None,
-    applied: bool,
-    seconds: float,
-    spent: NDArray[np.float64],
-) -> RunState:
+    stepper: Stepper, observers: Iterable[Observer], components: Mapping[str, bytes] | None, applied: bool,
+    seconds: float, spent: NDArray[np.float64],
+) -> RunState:  # fmt: skip
     """All that another process needs to go on from here.
 
     ``components``: serialised state of each FMU; by default they are asked for it.
@@ -26,18 +22,12 @@ def state_of(
     if components is None:
         components = {name: state_as_bytes(component) for name, component in stepper.components.items()}
     return RunState(
-        index=stepper.index,
-        applied=applied,
-        handed_over=stepper.handed_over,
-        seconds=seconds,
-        spent=spent,
-        y=stepper.y.copy(),
-        tracks=stepper.tracks.saved(),
-        before=np.empty(0) if stepper.before is None else stepper.before.copy(),
-        components=components,
+        index=stepper.index, applied=applied, handed_over=stepper.handed_over, seconds=seconds, spent=spent,
+        y=stepper.y.copy(), tracks=stepper.tracks.saved(),
+        before=np.empty(0) if stepper.before is None else stepper.before.copy(), components=components,
         observers=[observer.position() for observer in observers if isinstance(observer, Resumable)],
         wires=stepper.wires.state(),
-    )
+    )  # fmt: skip
 
 
 def take_up(stepper: Stepper, kept: RunState) -> None:

@@ -22,13 +22,9 @@ class PythonLoop:
     ``hand_over``: sets all inputs before each step; by default each component takes its own as it steps."""
 
     def __init__(
-        self,
-        groups: Sequence[Sequence[Turn]],
-        y: NDArray[np.float64],
-        tracks: Tracks,
-        schedule: Schedule,
+        self, groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks, schedule: Schedule,
         hand_over: Callable[[], None] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._groups, self._y, self._tracks, self._hand_over = groups, y, tracks, hand_over
         self._extrapolation, self._ticks_per_second = schedule.extrapolation, schedule.ticks_per_second
         self.before: NDArray[np.float64] | None = None
@@ -92,13 +88,9 @@ class PythonLoop:
 
 
 def make_loop(
-    groups: Sequence[Sequence[Turn]],
-    y: NDArray[np.float64],
-    tracks: Tracks,
-    schedule: Schedule,
-    hand_over: Callable[[], None] | None = None,
-    threads: int | None = 1,
-) -> Loop:
+    groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks, schedule: Schedule,
+    hand_over: Callable[[], None] | None = None, threads: int | None = 1,
+) -> Loop:  # fmt: skip
     """The compiled loop where there is one and it can do what is asked, else the loop in Python.
 
     ``groups``: components that step together, in the order of the schedule.

@@ -30,12 +30,9 @@ class Master(Stepper):
     ``wires``: The connections that do more than carry a value."""
 
     def run(
-        self,
-        stop_time: float,
-        events: Sequence[Event] = (),
-        observers: Sequence[Observer] = (),
+        self, stop_time: float, events: Sequence[Event] = (), observers: Sequence[Observer] = (),
         keeper: Keeper = NOT_KEPT,
-    ) -> StepStatistics:
+    ) -> StepStatistics:  # fmt: skip
         """Step until a time [s].
 
         An event happens at its communication point before the step that starts there, and the

@@ -34,14 +34,9 @@ class Recorder:
     ``values``: Shape (n, number of names), in the order of ``names``; only what was reached before a failure."""
 
     def __init__(
-        self,
-        names: Sequence[str],
-        every: int,
-        *,
-        after_exchange: bool = False,
-        sink: RowSink | None = None,
+        self, names: Sequence[str], every: int, *, after_exchange: bool = False, sink: RowSink | None = None,
         keep: int = 1,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.names = tuple(names)
         self.every = every
         self.after_exchange = after_exchange

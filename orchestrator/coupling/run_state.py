@@ -48,13 +48,9 @@ class RunState:
     def arrays(self) -> dict[str, NDArray[Any]]:
         found: dict[str, NDArray[Any]] = {
             "place": np.array([self.index, self.applied, self.handed_over], dtype=np.int64),
-            "seconds": np.array([self.seconds, *self.spent]),
-            "y": self.y,
-            "tracks": self.tracks,
-            "before": self.before,
-            "observers": np.array(len(self.observers)),
-            "wires": np.array(len(self.wires)),
-        }
+            "seconds": np.array([self.seconds, *self.spent]), "y": self.y, "tracks": self.tracks, "before": self.before,
+            "observers": np.array(len(self.observers)), "wires": np.array(len(self.wires)),
+        }  # fmt: skip
         found |= {f"component {n}": np.frombuffer(state, dtype=np.uint8) for n, state in self.components.items()}
         for k, position in enumerate(self.observers):
             found |= {f"observer {k} {name}": np.asarray(values) for name, values in position.items()}

@@ -158,20 +158,10 @@ class CompiledMidpointLoop(CompiledLoop):
         self.before = np.array(self._y if self.before is None else self.before, dtype=float)
         with calls:
             status: int = self._library.advance_lines(
-                ctypes.addressof(self._calls),
-                ctypes.addressof(self._groups),
-                len(self._groups),
-                self._y.ctypes.data,
-                self._direct.ctypes.data,
-                self.before.ctypes.data,
-                self._end.ctypes.data,
-                len(self._y),
-                self._schedule.parts(step_size),
-                index,
-                count,
-                step_size,
-                ctypes.addressof(self._failure),
-            )
+                ctypes.addressof(self._calls), ctypes.addressof(self._groups), len(self._groups), self._y.ctypes.data,
+                self._direct.ctypes.data, self.before.ctypes.data, self._end.ctypes.data, len(self._y),
+                self._schedule.parts(step_size), index, count, step_size, ctypes.addressof(self._failure),
+            )  # fmt: skip
             self.completed = self._failure[0] - index if status else count
         self._judge(status, step_size)
 

@@ -22,14 +22,9 @@ from orchestrator.fmi.component import Component, RealBatch
 
 class Stepper(CoupledComponents):
     def __init__(
-        self,
-        system: System,
-        schedule: Schedule,
-        step_size: float,
-        stop_time: float | None = None,
-        opener: Callable[[str, ComponentPlan, Path], Component] = open_plan,
-        threads: int | None = 1,
-    ) -> None:
+        self, system: System, schedule: Schedule, step_size: float, stop_time: float | None = None,
+        opener: Callable[[str, ComponentPlan, Path], Component] = open_plan, threads: int | None = 1,
+    ) -> None:  # fmt: skip
         self.index = 0
         super().__init__(system, schedule, step_size, stop_time, opener)
         self._single = self._single_wires() if schedule.wire_by_wire else []
@@ -140,11 +135,8 @@ class Stepper(CoupledComponents):
         threads = self._loop.threads
         adaptive = None if self._adaptive is None else replace(self._adaptive.counts)
         return StepStatistics(
-            steps if adaptive is None else adaptive.accepted,
-            seconds,
+            steps if adaptive is None else adaptive.accepted, seconds,
             tuple(ComponentStatistics(n, steps, s, s / (threads * seconds)) for n, s in zip(names, spent, strict=True)),
-            self.clock.time(steps),
-            threads,
-            {name: reason for name, c in self.components.items() if (reason := c.one_thread)},
-            adaptive,
-        )
+            self.clock.time(steps), threads,
+            {name: reason for name, c in self.components.items() if (reason := c.one_thread)}, adaptive,
+        )  # fmt: skip

@@ -70,14 +70,9 @@ class System:
         self._feeding: dict[Endpoint, Endpoint] = {}
 
     def add(
-        self,
-        name: str,
-        description: FmuDescription,
-        parameters: Mapping[str, float | bool] | None = None,
-        inputs: Mapping[str, float] | None = None,
-        *,
-        isolated: bool | None = None,
-    ) -> None:
+        self, name: str, description: FmuDescription, parameters: Mapping[str, float | bool] | None = None,
+        inputs: Mapping[str, float] | None = None, *, isolated: bool | None = None,
+    ) -> None:  # fmt: skip
         """Add a component.
 
         ``name``: by which connections and signals mean it.

@@ -37,13 +37,9 @@ _nothing = _GET_SET(lambda *_: 0)
 
 class _Bank(ctypes.Structure):
     _fields_ = (
-        ("wires", ctypes.c_void_p),
-        ("inputs", ctypes.c_void_p),
-        ("outputs", ctypes.c_void_p),
-        ("n", ctypes.c_int64),
-        ("position", ctypes.c_int64),
-        ("quiet", ctypes.c_int64),
-    )
+        ("wires", ctypes.c_void_p), ("inputs", ctypes.c_void_p), ("outputs", ctypes.c_void_p), ("n", ctypes.c_int64),
+        ("position", ctypes.c_int64), ("quiet", ctypes.c_int64),
+    )  # fmt: skip
 
 
 @cache
@@ -79,13 +75,9 @@ class WireBank:
     name, one_thread = "connections", "no FMU"
 
     def __init__(
-        self,
-        plans: Sequence[WirePlan],
-        step_size: float,
-        sources: NDArray[np.int64],
-        outputs: NDArray[np.float64],
+        self, plans: Sequence[WirePlan], step_size: float, sources: NDArray[np.int64], outputs: NDArray[np.float64],
         window: slice,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.plans, self._step_size, self.sources, self.window = tuple(plans), step_size, sources, window
         n = len(plans)
         self._wires = np.zeros(n, dtype=_WIRE)
@@ -224,11 +216,8 @@ class WireBank:
         table = np.array([[float(wire[name]) for name in (*_SETTING, *_STATE)] for wire in self._wires])
         keys = np.array([[float((key >> (32 * part)) & 0xFFFFFFFF) for part in range(4)] for key in self._keys])
         return {
-            "wires": table,
-            "keys": keys,
-            "rings": np.concatenate(self._rings),
-            "delivered": self.outputs.values.copy(),
-        }
+            "wires": table, "keys": keys, "rings": np.concatenate(self._rings), "delivered": self.outputs.values.copy(),
+        }  # fmt: skip
 
     def restore(self, state: dict[str, NDArray[np.float64]]) -> None:
         """Go back to a state of the same connections."""

@@ -27,13 +27,9 @@ def copied(
     ]
     words = ["gfor", "modes", word, "--scenario", scenario, *sets, "--range", f"{low!r}:{high!r}"]
     lines = [
-        "import orchestrator as gfor",
-        "",
-        f"scenario = gfor.load({word!r}).scenario({scenario!r}, {dict(values)!r})",
-        f"modes = scenario.modes(({low!r}, {high!r}))",
-        "print(modes.stability.sentence())",
-        "print(modes.table())",
-    ]
+        "import orchestrator as gfor", "", f"scenario = gfor.load({word!r}).scenario({scenario!r}, {dict(values)!r})",
+        f"modes = scenario.modes(({low!r}, {high!r}))", "print(modes.stability.sentence())", "print(modes.table())",
+    ]  # fmt: skip
     return {"command": shlex.join(words), "toml": as_scenario(file, scenario, values), "python": "\n".join(lines)}
 
 

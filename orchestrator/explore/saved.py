@@ -43,10 +43,7 @@ def save_page(
     opened = desk.answer({"ask": "open"}, lambda part: None)
     parameters = desk.answer({**asked, "ask": "parameters"}, lambda part: None)
     content = {
-        "beginning": beginning,
-        "open": {**opened, "scenarios": {name: opened["scenarios"][name]}},
-        "parameters": {name: parameters},
-        "grid": grid,
-        "answers": answers,
-    }
+        "beginning": beginning, "open": {**opened, "scenarios": {name: opened["scenarios"][name]}},
+        "parameters": {name: parameters}, "grid": grid, "answers": answers,
+    }  # fmt: skip
     write_text(path, whole_page(content))

@@ -22,12 +22,9 @@ _WIDER = 1.5  # the range in which changed modes are looked for, beyond that whi
 
 
 def slopes(
-    scenario_with: Callable[[Mapping[str, Value]], Scenario],
-    values: Mapping[str, Value],
-    parameter: str,
-    frequencies: tuple[float, float],
-    say: Callable[[str], None],
-) -> dict[str, Any]:
+    scenario_with: Callable[[Mapping[str, Value]], Scenario], values: Mapping[str, Value], parameter: str,
+    frequencies: tuple[float, float], say: Callable[[str], None],
+) -> dict[str, Any]:  # fmt: skip
     """``value``, ``eigenvalues`` there, and ``slopes``, each a list of [real, imag]; None where no slope is known.
 
     The operating point moves with the parameter, and the FMUs are started and linearised at both sides of its value."""

@@ -39,13 +39,9 @@ class FederatedComponent(Derived):
     ``published``: outputs that the federate publishes, in this order."""
 
     def __init__(
-        self,
-        part: Part,
-        description: FmuDescription,
-        inner: Component | None,
-        exchanges: Exchanges,
+        self, part: Part, description: FmuDescription, inner: Component | None, exchanges: Exchanges,
         published: Sequence[str],
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.name, self.description, self.inner, self._part = part.name, description, inner, part
         self._exchanges, variables = exchanges, description.variables
         self._published = [variables[v].reference for v in published]

@@ -40,20 +40,11 @@ class _Port(ctypes.Structure):
 
 class _Adapter(ctypes.Structure):
     _fields_ = (
-        ("component", ctypes.c_void_p),
-        ("set_real", ctypes.c_void_p),
-        ("get_real", ctypes.c_void_p),
-        ("step", ctypes.c_void_p),
-        ("others", ctypes.c_void_p),
-        ("n_others", ctypes.c_int64),
-        ("voltage", _Port),
-        ("current", _Port),
-        ("omega", ctypes.c_double),
-        ("power_scale", ctypes.c_double),
-        ("v", ctypes.c_double * 2),
-        ("time", ctypes.c_double),
-        ("angle", ctypes.c_double),
-    )
+        ("component", ctypes.c_void_p), ("set_real", ctypes.c_void_p), ("get_real", ctypes.c_void_p),
+        ("step", ctypes.c_void_p), ("others", ctypes.c_void_p), ("n_others", ctypes.c_int64), ("voltage", _Port),
+        ("current", _Port), ("omega", ctypes.c_double), ("power_scale", ctypes.c_double), ("v", ctypes.c_double * 2),
+        ("time", ctypes.c_double), ("angle", ctypes.c_double),
+    )  # fmt: skip
 
 
 @cache

@@ -159,12 +159,9 @@ def _equal(one: Path, other: Path) -> bool:
 
 
 def _imported(
-    name: str,
-    globals: Mapping[str, Any] | None = None,
-    locals: Mapping[str, Any] | None = None,
-    fromlist: Sequence[str] | None = (),
-    level: int = 0,
-) -> ModuleType:
+    name: str, globals: Mapping[str, Any] | None = None, locals: Mapping[str, Any] | None = None,
+    fromlist: Sequence[str] | None = (), level: int = 0,
+) -> ModuleType:  # fmt: skip
     """In the place of Python's ``__import__``, as long as an FMU with modules is loaded."""
     top = (str((globals or {}).get("__package__") or "") if level else name).partition(".")[0]
     with ExitStack() as views:

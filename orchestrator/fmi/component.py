@@ -142,11 +142,8 @@ class RealBatch:
         self.values = np.zeros(len(self.names)) if values is None else values
         self._references = (ctypes.c_uint * len(self.names))(*[variables[n].reference for n in self.names])
         self.arguments = (
-            component.pointer,
-            ctypes.addressof(self._references),
-            len(self.names),
-            self.values.ctypes.data,
-        )
+            component.pointer, ctypes.addressof(self._references), len(self.names), self.values.ctypes.data,
+        )  # fmt: skip
         self.component = component
 
     def read(self) -> NDArray[np.float64]:

@@ -34,14 +34,9 @@ class ConfinedProcess:
     ``protections``: What keeps it from the rest of the machine; empty until the worker has told."""
 
     def __init__(
-        self,
-        worker: str,
-        request: Mapping[str, Any],
-        readable: Sequence[Path],
-        limits: Limits,
-        *,
+        self, worker: str, request: Mapping[str, Any], readable: Sequence[Path], limits: Limits, *,
         windows: bool = False,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._limits, self.protections = limits, tuple[Protection, ...]()
         if windows:
             wine.socket_bases()  # the closed process cannot make them
@@ -53,16 +48,10 @@ class ConfinedProcess:
             (self.folder / "work").mkdir()
             libraries = Path(mailbox_library()._name).parent
             told = {
-                **request,
-                "worker": worker,
-                "mailbox": memory,
-                "folder": str(self.folder),
-                "readable": [str(path.resolve()) for path in (*readable, libraries)],
-                "limits": asdict(limits),
-                "layers": list(LAYERS),
-                "parent": os.getpid(),
-                "windows": windows,
-            }
+                **request, "worker": worker, "mailbox": memory, "folder": str(self.folder),
+                "readable": [str(path.resolve()) for path in (*readable, libraries)], "limits": asdict(limits),
+                "layers": list(LAYERS), "parent": os.getpid(), "windows": windows,
+            }  # fmt: skip
             with (self.folder / "output").open("ab") as output:
                 self._process = subprocess.Popen(
                     [sys.executable, "-P", "-m", "orchestrator.fmi.supervisor", json.dumps(told)],

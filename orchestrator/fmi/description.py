@@ -275,31 +275,19 @@ def _describe(
     }
     discrete = _discrete_states(path, root, md)
     return FmuDescription(
-        path=path,
-        guid=md.guid,
-        model_name=md.modelName or "",
-        title=md.description or "",
-        model_identifier=md.coSimulation.modelIdentifier,
-        generation_tool=md.generationTool or "",
-        variables=variables,
-        states=(*_states(path, md), *discrete),
-        states_are_settable=_settable(root, version) or bool(discrete),
+        path=path, guid=md.guid, model_name=md.modelName or "", title=md.description or "",
+        model_identifier=md.coSimulation.modelIdentifier, generation_tool=md.generationTool or "", variables=variables,
+        states=(*_states(path, md), *discrete), states_are_settable=_settable(root, version) or bool(discrete),
         can_save_state=bool(md.coSimulation.canGetAndSetFMUstate),
-        gives_directional_derivatives=_gives_directional_derivatives(root),
-        output_dependencies=dependencies,
-        platforms=platforms,
-        can_serialize_state=bool(md.coSimulation.canSerializeFMUstate),
+        gives_directional_derivatives=_gives_directional_derivatives(root), output_dependencies=dependencies,
+        platforms=platforms, can_serialize_state=bool(md.coSimulation.canSerializeFMUstate),
         needs_tool=bool(md.coSimulation.needsExecutionTool),
         one_instance=bool(md.coSimulation.canBeInstantiatedOnlyOncePerProcess),
         default_step_size=_positive(md.defaultExperiment.stepSize) if md.defaultExperiment else None,
-        units=_units(root),
-        stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
-        fmi_version=version,
-        rates=tuple(unknown.variable.name for unknown in md.derivatives),
-        kind=kind,
-        **_sampling(path, root, variables),
-        **_events(root, version),
-    )
+        units=_units(root), stop_time=_positive(md.defaultExperiment.stopTime) if md.defaultExperiment else None,
+        fmi_version=version, rates=tuple(unknown.variable.name for unknown in md.derivatives), kind=kind,
+        **_sampling(path, root, variables), **_events(root, version),
+    )  # fmt: skip
 
 
 def _sampling(path: Path, root: ElementTree.Element, variables: Mapping[str, VariableInfo]) -> dict[str, Any]:
@@ -423,19 +411,12 @@ def _variable(path: Path, v: Any, usual: Mapping[str, Usual]) -> VariableInfo:
     unit = v.unit or (v.declaredType.unit if v.declaredType is not None else None) or ""
     fmi_type = "Array" if v.dimensions else _TYPES_OF_3.get(v.type, v.type)
     return VariableInfo(
-        name=v.name,
-        reference=v.valueReference,
-        type=fmi_type,
-        causality=v.causality or "local",
-        variability=v.variability or "continuous",
-        unit=unit,
-        start=None if v.start is None else _start(path, v, fmi_type),
-        minimum=None if v.min is None else float(v.min),
-        maximum=None if v.max is None else float(v.max),
-        description=v.description or "",
-        declared_type=v.type,
+        name=v.name, reference=v.valueReference, type=fmi_type, causality=v.causality or "local",
+        variability=v.variability or "continuous", unit=unit,
+        start=None if v.start is None else _start(path, v, fmi_type), minimum=None if v.min is None else float(v.min),
+        maximum=None if v.max is None else float(v.max), description=v.description or "", declared_type=v.type,
         usual=usual.get(v.name) or (rated.usual if (rated := _RATED.get(v.name)) and rated.unit == unit else None),
-    )
+    )  # fmt: skip
 
 
 def _start(path: Path, v: Any, fmi_type: str) -> Scalar:

@@ -25,13 +25,9 @@ FUNCTIONS = ("InstantiateCoSimulation", "FreeInstance", "SetDebugLogging", "Ente
 """In the order of the adapter's table."""
 
 _NAMES = {
-    "fmi2Instantiate": "fmi3InstantiateCoSimulation",
-    "fmi2": "fmi3",
-    "GetReal": "GetFloat64",
-    "SetReal": "SetFloat64",
-    "FMUstate": "FMUState",
-    "DeSerialize": "Deserialize",
-}
+    "fmi2Instantiate": "fmi3InstantiateCoSimulation", "fmi2": "fmi3", "GetReal": "GetFloat64", "SetReal": "SetFloat64",
+    "FMUstate": "FMUState", "DeSerialize": "Deserialize",
+}  # fmt: skip
 """Parts of names in FMI 2.0, and what they are in FMI 3.0; replaced in this order."""
 
 _CLOCK_KINDS = ("periodic", "changing", "countdown", "output")
@@ -47,40 +43,25 @@ def in_words_of_3(call: str) -> str:
 
 class _Clock(ctypes.Structure):
     _fields_ = (
-        ("interval", ctypes.c_double),
-        ("shift", ctypes.c_double),
-        ("reference", ctypes.c_uint),
-        ("kind", ctypes.c_int32),
-        ("asked", ctypes.c_int32),
-        ("tunable", ctypes.c_int32),
-    )
+        ("interval", ctypes.c_double), ("shift", ctypes.c_double), ("reference", ctypes.c_uint),
+        ("kind", ctypes.c_int32), ("asked", ctypes.c_int32), ("tunable", ctypes.c_int32),
+    )  # fmt: skip
 
 
 class _Special(ctypes.Structure):
     _fields_ = (
-        ("clocks", ctypes.c_uint64),
-        ("start", ctypes.c_double),
-        ("reference", ctypes.c_uint),
-        ("kind", ctypes.c_int32),
+        ("clocks", ctypes.c_uint64), ("start", ctypes.c_double), ("reference", ctypes.c_uint), ("kind", ctypes.c_int32),
         ("role", ctypes.c_int32),
-    )
+    )  # fmt: skip
 
 
 class _Table(ctypes.Structure):
     _fields_ = (
-        ("functions", ctypes.c_void_p * len(FUNCTIONS)),
-        ("resources", ctypes.c_char_p),
-        ("references", ctypes.c_void_p),
-        ("kinds", ctypes.c_void_p),
-        ("n", ctypes.c_size_t),
-        ("narrow", ctypes.c_int64),
-        ("events", ctypes.c_int64),
-        ("early", ctypes.c_int64),
-        ("clocks", ctypes.c_void_p),
-        ("n_clocks", ctypes.c_size_t),
-        ("specials", ctypes.c_void_p),
-        ("n_specials", ctypes.c_size_t),
-    )
+        ("functions", ctypes.c_void_p * len(FUNCTIONS)), ("resources", ctypes.c_char_p),
+        ("references", ctypes.c_void_p), ("kinds", ctypes.c_void_p), ("n", ctypes.c_size_t), ("narrow", ctypes.c_int64),
+        ("events", ctypes.c_int64), ("early", ctypes.c_int64), ("clocks", ctypes.c_void_p),
+        ("n_clocks", ctypes.c_size_t), ("specials", ctypes.c_void_p), ("n_specials", ctypes.c_size_t),
+    )  # fmt: skip
 
 
 @cache

@@ -103,12 +103,9 @@ def _json(model: EmbeddedModel) -> bytes:
     content = {
         "version": VERSION,
         "equations": "der(x) = A*x + B*u, y = C*x + D*u; x, u, y are deviations from the values given here",
-        "origin": model.origin,
-        "parameters": entries(model.parameters),
-        "states": entries(model.states),
-        "inputs": entries(model.inputs),
-        "outputs": entries(model.outputs),
-    }
+        "origin": model.origin, "parameters": entries(model.parameters), "states": entries(model.states),
+        "inputs": entries(model.inputs), "outputs": entries(model.outputs),
+    }  # fmt: skip
     lines = [f" {json.dumps(key)}: {_lines(value)}" for key, value in content.items()]
     lines += [f' "{key}": {_lines(getattr(model, key).tolist())}' for key in "ABCD"]
     return ("{\n" + ",\n".join(lines) + "\n}\n").encode()

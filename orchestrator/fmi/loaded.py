@@ -83,14 +83,10 @@ class LoadedComponent(Derived):
         if newer:
             self._behind = Fmi3Library(self.description, directory, library)
         fmu = FMU2Tolerant(
-            in_words_of_2(set(spare)) if newer else set(spare),
-            self._refuse_absent,
-            guid=self.description.guid,
-            unzipDirectory=str(directory),
-            modelIdentifier=self.description.model_identifier,
-            instanceName=self.name,
+            in_words_of_2(set(spare)) if newer else set(spare), self._refuse_absent, guid=self.description.guid,
+            unzipDirectory=str(directory), modelIdentifier=self.description.model_identifier, instanceName=self.name,
             libraryPath=str(adapter_path()) if newer else None,
-        )
+        )  # fmt: skip
         if newer:
             self._behind.prepare(fmu.dll)
         else:

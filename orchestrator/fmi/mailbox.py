@@ -28,49 +28,30 @@ class Head(ctypes.Structure):
     """The first fields of ``struct mailbox``."""
 
     _fields_ = (
-        ("request", ctypes.c_int32),
-        ("reply", ctypes.c_int32),
-        ("sleeping", ctypes.c_int32 * 2),
-        ("kind", ctypes.c_int32),
-        ("what", ctypes.c_int32),
-        ("status", ctypes.c_int32),
-        ("steps", ctypes.c_int32),
-        ("time", ctypes.c_double),
-        ("step", ctypes.c_double),
-        ("n_set", ctypes.c_int64),
-        ("n_get", ctypes.c_int64),
+        ("request", ctypes.c_int32), ("reply", ctypes.c_int32), ("sleeping", ctypes.c_int32 * 2),
+        ("kind", ctypes.c_int32), ("what", ctypes.c_int32), ("status", ctypes.c_int32), ("steps", ctypes.c_int32),
+        ("time", ctypes.c_double), ("step", ctypes.c_double), ("n_set", ctypes.c_int64), ("n_get", ctypes.c_int64),
         ("text_length", ctypes.c_int64),
-    )
+    )  # fmt: skip
 
 
 class Client(ctypes.Structure):
     """``struct client``: what the asking side knows for itself, out of the other one's reach."""
 
     _fields_ = (
-        ("box", ctypes.c_void_p),
-        ("peer", ctypes.c_int64),
-        ("patience", ctypes.c_double),
-        ("n_set", ctypes.c_int64),
-        ("n_get", ctypes.c_int64),
-        ("number", ctypes.c_int32),
-        ("bad_reference", ctypes.c_uint32),
-        ("fresh", ctypes.c_uint32),
-        ("get_references", ctypes.c_uint32 * MOST),
-    )
+        ("box", ctypes.c_void_p), ("peer", ctypes.c_int64), ("patience", ctypes.c_double), ("n_set", ctypes.c_int64),
+        ("n_get", ctypes.c_int64), ("number", ctypes.c_int32), ("bad_reference", ctypes.c_uint32),
+        ("fresh", ctypes.c_uint32), ("get_references", ctypes.c_uint32 * MOST),
+    )  # fmt: skip
 
 
 class MailboxRun(ctypes.Structure):
     """What one question for many steps says, behind the log in ``struct mailbox``."""
 
     _fields_ = (
-        ("instance", ctypes.c_int64),
-        ("n_steps", ctypes.c_int64),
-        ("n_rows", ctypes.c_int64),
-        ("n_in", ctypes.c_int64),
-        ("n_out", ctypes.c_int64),
-        ("done", ctypes.c_int64),
-        ("stage", ctypes.c_int64),
-    )
+        ("instance", ctypes.c_int64), ("n_steps", ctypes.c_int64), ("n_rows", ctypes.c_int64), ("n_in", ctypes.c_int64),
+        ("n_out", ctypes.c_int64), ("done", ctypes.c_int64), ("stage", ctypes.c_int64),
+    )  # fmt: skip
 
 
 class Served(ctypes.Structure):

@@ -209,12 +209,9 @@ def _port_variables(port: PortMap) -> dict[str, VariableInfo]:
 
 
 def _info(
-    variable: Variable,
-    causality: str,
-    start: float | None = None,
-    minimum: float | None = None,
+    variable: Variable, causality: str, start: float | None = None, minimum: float | None = None,
     maximum: float | None = None,
-) -> VariableInfo:
+) -> VariableInfo:  # fmt: skip
     return VariableInfo(
         name=variable.name,
         reference=PORT.index(variable.name) if variable.name in PORT else 2**32 - 1,  # start values are not read

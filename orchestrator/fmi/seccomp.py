@@ -88,12 +88,8 @@ def _program(own_process: int | None, *, signals: bool, attributes: bool, ipc: b
         steps.extend([_step(_EQUAL, call_numbers[which], 0, len(body)), *body])
 
     tables: list[Mapping[str, tuple[int | None, int | None]]] = [
-        _ALWAYS,
-        _MEMORY,
-        _ATTRIBUTES if attributes else {},
-        _IPC if ipc else {},
-        _SIGNALS if own_process else {},
-    ]
+        _ALWAYS, _MEMORY, _ATTRIBUTES if attributes else {}, _IPC if ipc else {}, _SIGNALS if own_process else {},
+    ]  # fmt: skip
     for numbers in (numbers for table in tables for numbers in table.values()):
         if (number := numbers[which]) is not None:
             steps += [_step(_EQUAL, number, 0, 1), _refuse()]

@@ -25,11 +25,8 @@ LOAD, SYMBOL, CALL, READ, WRITE, ALLOCATE = range(6)
 
 class _Talk(ctypes.Structure):
     _fields_ = (
-        ("command", ctypes.c_int64),
-        ("result", ctypes.c_int64),
-        ("a", ctypes.c_int64 * 4),
-        ("d", ctypes.c_double * 4),
-    )
+        ("command", ctypes.c_int64), ("result", ctypes.c_int64), ("a", ctypes.c_int64 * 4), ("d", ctypes.c_double * 4),
+    )  # fmt: skip
 
 
 _ENDED = os.WEXITED | os.WNOHANG | os.WNOWAIT if hasattr(os, "waitid") else 0

@@ -95,14 +95,10 @@ def exchanged_case(case: Case, exchanged: Mapping[str, ComponentTable]) -> Case:
     }
     changed = table.model_copy(
         update={
-            "analysis": AnalysisTable(),
-            "plots": [],
-            "reference": None,
-            "events": _kept(table.events),
-            "scenarios": scenarios,
-            "solver": table.solver.model_copy(update={"record": ["*"]}),
+            "analysis": AnalysisTable(), "plots": [], "reference": None, "events": _kept(table.events),
+            "scenarios": scenarios, "solver": table.solver.model_copy(update={"record": ["*"]}),
         }
-    )
+    )  # fmt: skip
     return replace(case, table=changed, exchanged=dict(exchanged))
 
 

@@ -133,12 +133,9 @@ def _swapped(places: Mapping[str, Place], wanted: Sequence[str]) -> tuple[str, .
 
 
 def _tried(
-    case: Case,
-    prepared: PreparedScenario,
-    layers: Sequence[ParameterFile],
-    step_size: float | None,
+    case: Case, prepared: PreparedScenario, layers: Sequence[ParameterFile], step_size: float | None,
     systems: Mapping[SystemName, Exchanged],
-) -> dict[str, list[str]]:
+) -> dict[str, list[str]]:  # fmt: skip
     """Prepare one system for each device that is other than the case's: this finds what cannot stand there, and builds
     its FMU. What stands for its file in keys, by `_content_name`."""
     voltages, files = voltages_of(prepared.power_flow), dict[str, list[str]]()

@@ -98,11 +98,7 @@ def stand_in_sentence(judgement: JudgedInteractions) -> str:
 def sentences(judgement: JudgedInteractions) -> list[str]:
     """All of them, the verdict on the system as it is first."""
     every = [
-        str(verdict_of(judgement)),
-        modes_sentence(judgement),
-        alone_sentence(judgement),
-        pairs_sentence(judgement),
-        swap_sentence(judgement),
-        stand_in_sentence(judgement),
-    ]
+        str(verdict_of(judgement)), modes_sentence(judgement), alone_sentence(judgement), pairs_sentence(judgement),
+        swap_sentence(judgement), stand_in_sentence(judgement),
+    ]  # fmt: skip
     return [text for text in every if text]

@@ -24,16 +24,9 @@ class Emulation:
 
 
 def emulate(
-    system: System,
-    rules: MasterRules,
-    step_size: float,
-    stop_time: float,
-    record: Sequence[str],
-    every: int = 1,
-    events: Sequence[Event] = (),
-    order: Sequence[str] | None = None,
-    observers: Sequence[Observer] = (),
-) -> Emulation:
+    system: System, rules: MasterRules, step_size: float, stop_time: float, record: Sequence[str], every: int = 1,
+    events: Sequence[Event] = (), order: Sequence[str] | None = None, observers: Sequence[Observer] = (),
+) -> Emulation:  # fmt: skip
     """Run a system along another master's rules.
 
     ``step_size`` and ``stop_time``: [s]

@@ -13,12 +13,9 @@ LIBCOSIM = MasterRules(
 )
 
 ECOS = MasterRules(
-    name="ecos",
-    title="Ecos (ecospy 0.7.2)",
-    steps="side by side",
-    after_exchange=True,
+    name="ecos", title="Ecos (ecospy 0.7.2)", steps="side by side", after_exchange=True,
     source="as libcosim, but every property is read again after the transfer, before listeners see it",
-)
+)  # fmt: skip
 
 ECOS_EXECUTABLE = MasterRules(
     name="ecos_executable",
@@ -113,19 +110,10 @@ COFMUPY_GAUSS_SEIDEL = MasterRules(
 MASTERS = {
     rules.name: rules
     for rules in (
-        LIBCOSIM,
-        ECOS,
-        ECOS_EXECUTABLE,
-        FMPY_CONTAINER,
-        FMPY_SSP,
-        FMUCONTAINER,
-        FMUCONTAINER_SEQUENTIAL,
-        MOSAIK,
-        PATHSIM,
-        COFMUPY,
-        COFMUPY_GAUSS_SEIDEL,
+        LIBCOSIM, ECOS, ECOS_EXECUTABLE, FMPY_CONTAINER, FMPY_SSP, FMUCONTAINER, FMUCONTAINER_SEQUENTIAL, MOSAIK,
+        PATHSIM, COFMUPY, COFMUPY_GAUSS_SEIDEL,
     )
-}
+}  # fmt: skip
 
 
 def master_rules(name: str) -> MasterRules:

@@ -40,13 +40,10 @@ class Elements:
         branches = [*(line.name for line in network.lines), *(x.name for x in network.transformers)]
         wanted = table.slack or prepared.source_slack or ""
         return cls(
-            table.grid,
-            units,
-            tuple(name for name in branches if f"{name}.connected" in switches),
+            table.grid, units, tuple(name for name in branches if f"{name}.connected" in switches),
             tuple(load.name for load in network.loads),
-            tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches),
-            units.get(wanted, wanted),
-        )
+            tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches), units.get(wanted, wanted),
+        )  # fmt: skip
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -37,13 +37,9 @@ class OperatingPoints:
 
 
 def read_operating_points(
-    case: Case,
-    request: OfCase,
-    points: str | Path | None,
-    outages: Names | None,
-    scenario: str | None,
+    case: Case, request: OfCase, points: str | Path | None, outages: Names | None, scenario: str | None,
     off: Mapping[str, Value] | None = None,
-) -> OperatingPoints:
+) -> OperatingPoints:  # fmt: skip
     """Prepare the scenario, which builds the FMUs that it needs, and read its points and outages.
 
     ``points``: CSV file with the operating points; None for the case's own.

@@ -111,14 +111,9 @@ class _Values:
 
 
 def _fed(
-    column: str,
-    members: tuple[str, ...],
-    power: float,
-    out: tuple[str, ...],
-    prepared: PreparedScenario,
-    values: Mapping[str, Value],
-    place: str,
-) -> dict[str, Value]:
+    column: str, members: tuple[str, ...], power: float, out: tuple[str, ...], prepared: PreparedScenario,
+    values: Mapping[str, Value], place: str,
+) -> dict[str, Value]:  # fmt: skip
     """P_0 of the units in service that together feed a power [MW]."""
     feeding = [unit for unit in members if unit not in out]
     if not feeding:
@@ -131,13 +126,9 @@ def _fed(
 
 
 def _scale_of(
-    load: str,
-    scale: float | None,
-    elements: Elements,
-    prepared: PreparedScenario,
-    values: Mapping[str, Value],
+    load: str, scale: float | None, elements: Elements, prepared: PreparedScenario, values: Mapping[str, Value],
     place: str,
-) -> float:
+) -> float:  # fmt: skip
     key = f"{elements.grid}.{load}.scale"
     if scale is not None and key in values:
         raise InputError(f"{place}: the columns load and {key} both scale {load}; leave one of them empty")

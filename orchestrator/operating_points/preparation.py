@@ -51,13 +51,9 @@ class ItemPreparation:
     ``sharing``: How units share an outage; as the case says where None."""
 
     def __init__(
-        self,
-        case: Case,
-        scenario: str,
-        layers: Sequence[ParameterFile],
-        step_size: float | None = None,
+        self, case: Case, scenario: str, layers: Sequence[ParameterFile], step_size: float | None = None,
         sharing: SharingRule | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._case, self._scenario, self._layers, self._step_size = case, scenario, tuple(layers), step_size
         self.base = self._prepare({})
         self.elements = Elements.of(self.base)
@@ -127,13 +123,9 @@ def _power_of(units: Collection[str], before: PreparedScenario) -> float:
 
 
 def lost_and_shared(
-    units: Collection[str],
-    loads: Collection[str],
-    before: PreparedScenario,
-    grid: str,
-    dispatch: Dispatch,
+    units: Collection[str], loads: Collection[str], before: PreparedScenario, grid: str, dispatch: Dispatch,
     after: PreparedScenario,
-) -> str:
+) -> str:  # fmt: skip
     assert after.power_flow is not None
     plans = before.system.components
     return in_words(dispatch, after.power_flow.powers, plans, units, lost_load(load_of(loads, plans[grid])))

@@ -25,17 +25,13 @@ class Located:
 
     def as_json(self) -> dict[str, Any]:
         return {
-            "frequency_hz": self.found.frequency,
-            "kind": self.evidence.kind,
-            "source": self.source,
-            "reason": self.reason,
-            "advice": self.advice,
-            "begin": self.found.begin,
+            "frequency_hz": self.found.frequency, "kind": self.evidence.kind, "source": self.source,
+            "reason": self.reason, "advice": self.advice, "begin": self.found.begin,
             "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
             "evidence": asdict(self.evidence),
             "methods": [asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions],
             "amplitudes": dict(list(self.found.amplitudes.items())[:_SHOWN]),
-        }
+        }  # fmt: skip
 
 
 def locate(measured: Measurements) -> list[Located]:

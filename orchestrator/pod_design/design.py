@@ -197,12 +197,9 @@ class PodDesign:
 
 
 def design_pod(
-    case: Case,
-    request: DesignRequest,
-    report: StageReport = lambda text: None,
-    store: PointStore | None = None,
+    case: Case, request: DesignRequest, report: StageReport = lambda text: None, store: PointStore | None = None,
     search: SearchOnLinearModels | None = None,
-) -> PodDesign:
+) -> PodDesign:  # fmt: skip
     """Design a controller and check it on the closed loop.
 
     ``store``: keeps figures on the way as soon as they are there; those that are there already are not computed again.
@@ -212,14 +209,9 @@ def design_pod(
         raise InputError("--damping and --damping-increment both say what is required; give one of them")
     report("preparing the case")
     target = find_target(
-        case,
-        request.controller,
-        scenario=request.scenario,
-        pattern=request.component,
-        stages=request.stages,
-        overrides=request.overrides,
-        parameters=request.files,
-    )
+        case, request.controller, scenario=request.scenario, pattern=request.component, stages=request.stages,
+        overrides=request.overrides, parameters=request.files,
+    )  # fmt: skip
     own: dict[str, Value] = {}
     for name in target.components:
         own |= {f"{name}.{request.controller}.enabled": False, f"{name}.{request.controller}.N_S": float(target.stages)}
@@ -335,29 +327,14 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         report("margins")
         margins = compute_margins(loop, off, final, request.least_damping)
     return PodDesign(
-        request=request,
-        case=start.case,
-        target=start.target,
-        prepared=start.prepared,
-        mode_name=start.mode_name,
-        initial=initial,
-        required_damping=required,
-        predicted=predicted,
-        sensitivities=GainSensitivities(bare.eigenvalue, S, turned.eigenvalue, S_turned),
-        filters=filters,
-        gain_non_compensated=gains[0],
-        gain_compensated=gains[1],
-        gain=gain,
-        designed=designed,
-        refinement=refinement,
-        final=final,
-        before=before,
-        after=after,
-        broken=breach(before, after, request.least_damping) or _unstable(examined.stability),
-        margins=margins,
-        examined_before=start.examined,
-        examined=examined,
-    )
+        request=request, case=start.case, target=start.target, prepared=start.prepared, mode_name=start.mode_name,
+        initial=initial, required_damping=required, predicted=predicted,
+        sensitivities=GainSensitivities(bare.eigenvalue, S, turned.eigenvalue, S_turned), filters=filters,
+        gain_non_compensated=gains[0], gain_compensated=gains[1], gain=gain, designed=designed, refinement=refinement,
+        final=final, before=before, after=after,
+        broken=breach(before, after, request.least_damping) or _unstable(examined.stability), margins=margins,
+        examined_before=start.examined, examined=examined,
+    )  # fmt: skip
 
 
 def _unstable(stability: Stability) -> str | None:

@@ -53,13 +53,10 @@ def loop_margins(half: LinearModel, full: LinearModel) -> LoopMargins:
     delayed = min((((np.angle(value) + math.pi) % (2 * math.pi) / w, w) for w, value in crossings), default=None)
     hertz = 2 * math.pi
     return LoopMargins(
-        phase_deg=math.degrees(turned[0]) if turned else None,
-        phase_hz=turned[1] / hertz if turned else None,
-        delay=float(delayed[0]) if delayed else None,
-        delay_hz=delayed[1] / hertz if delayed else None,
-        peak=float(1 / distance.min()),
-        peak_hz=float(grid[distance.argmin()] / hertz),
-    )
+        phase_deg=math.degrees(turned[0]) if turned else None, phase_hz=turned[1] / hertz if turned else None,
+        delay=float(delayed[0]) if delayed else None, delay_hz=delayed[1] / hertz if delayed else None,
+        peak=float(1 / distance.min()), peak_hz=float(grid[distance.argmin()] / hertz),
+    )  # fmt: skip
 
 
 def _places(change: Matrix) -> tuple[Matrix, Matrix]:

@@ -84,17 +84,9 @@ class Refinement:
 
 
 def refine(
-    loop: PodLoop,
-    off: Placed,
-    filters: LeadLag,
-    required: float,
-    bounds: tuple[float, float],
-    judge: Judge,
-    others: Sequence[complex],
-    search: SearchSettings | None = None,
-    *,
-    evenly: bool = False,
-) -> Refinement:
+    loop: PodLoop, off: Placed, filters: LeadLag, required: float, bounds: tuple[float, float], judge: Judge,
+    others: Sequence[complex], search: SearchSettings | None = None, *, evenly: bool = False,
+) -> Refinement:  # fmt: skip
     """Search gain and lead/lag on the closed loop.
 
     ``required``: damping ratio of the target.
@@ -141,14 +133,9 @@ def refine(
 
 
 def sweep(
-    loop: PodLoop,
-    off: Placed,
-    filters: LeadLag,
-    required: float,
-    bounds: tuple[float, float],
-    why: str,
+    loop: PodLoop, off: Placed, filters: LeadLag, required: float, bounds: tuple[float, float], why: str,
     special: float | None = None,
-) -> GainSweep:
+) -> GainSweep:  # fmt: skip
     """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it.
 
     ``off``: the target with the controller off; following begins there.

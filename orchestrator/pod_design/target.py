@@ -35,15 +35,9 @@ class Target:
 
 
 def find_target(
-    case: Case,
-    controller: str,
-    *,
-    scenario: str | None,
-    pattern: str | None,
-    stages: int | None,
-    overrides: Mapping[str, Value],
-    parameters: Sequence[ParameterFile],
-) -> Target:
+    case: Case, controller: str, *, scenario: str | None, pattern: str | None, stages: int | None,
+    overrides: Mapping[str, Value], parameters: Sequence[ParameterFile],
+) -> Target:  # fmt: skip
     """Find the scenario and its components. By default it is the scenario in which all PODs exist and are off.
 
     ``controller``: ``pod_p`` or ``pod_q``.

@@ -170,12 +170,9 @@ def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
     setting, values = d.final.setting, {}
     for component in d.target.key:
         own: Mapping[str, bool | float | str] = {
-            "enabled": setting.gain > 0,
-            "K": _rounded(setting.gain),
-            "T_S1": _rounded(setting.filters.T_S1),
-            "T_S2": _rounded(setting.filters.T_S2),
-            "N_S": d.target.stages,
-        }
+            "enabled": setting.gain > 0, "K": _rounded(setting.gain), "T_S1": _rounded(setting.filters.T_S1),
+            "T_S2": _rounded(setting.filters.T_S2), "N_S": d.target.stages,
+        }  # fmt: skip
         values.update({f"{component}.{d.request.controller}.{key}": value for key, value in own.items()})
     return values
 
@@ -213,20 +210,14 @@ def _other_json(mode: Mode | None) -> dict[str, Any] | None:
 
 def _margins_json(m: Margins) -> dict[str, Any]:
     return {
-        "damping_limit": m.limit,
-        "gain_up": m.up,
-        "gain_down": m.down,
+        "damping_limit": m.limit, "gain_up": m.up, "gain_down": m.down,
         "lost_above": _complex(m.lost_up) if m.lost_up is not None else None,
-        "lost_below": _complex(m.lost_down) if m.lost_down is not None else None,
-        "largest_factor_tried": m.reach,
+        "lost_below": _complex(m.lost_down) if m.lost_down is not None else None, "largest_factor_tried": m.reach,
         "phase_margin_deg": m.loop.phase_deg if m.loop else None,
-        "phase_margin_hz": m.loop.phase_hz if m.loop else None,
-        "delay_margin_s": m.loop.delay if m.loop else None,
-        "delay_margin_hz": m.loop.delay_hz if m.loop else None,
-        "sensitivity_peak": m.loop.peak if m.loop else None,
-        "sensitivity_peak_hz": m.loop.peak_hz if m.loop else None,
-        "damping_ratio_with": m.variations,
-    }
+        "phase_margin_hz": m.loop.phase_hz if m.loop else None, "delay_margin_s": m.loop.delay if m.loop else None,
+        "delay_margin_hz": m.loop.delay_hz if m.loop else None, "sensitivity_peak": m.loop.peak if m.loop else None,
+        "sensitivity_peak_hz": m.loop.peak_hz if m.loop else None, "damping_ratio_with": m.variations,
+    }  # fmt: skip
 
 
 def _refinement_json(d: PodDesign) -> dict[str, Any]:

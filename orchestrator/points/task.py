@@ -33,25 +33,18 @@ class StudyCase:
 
     @classmethod
     def of(
-        cls,
-        prepared: PreparedScenario,
-        layers: Sequence[ParameterFile] = (),
-        step_size: float | None = None,
-        text: str | None = None,
-        **besides: Any,
-    ) -> Self:
+        cls, prepared: PreparedScenario, layers: Sequence[ParameterFile] = (), step_size: float | None = None,
+        text: str | None = None, **besides: Any,
+    ) -> Self:  # fmt: skip
         """The case of a scenario as it is without what differs between the points.
 
         ``text``: what stands for the case's own in keys. ``besides``: what the results depend on as well [JSON's
         types]."""
         case = prepared.case
         content = {
-            "case": case.text if text is None else text,
-            **scenario_content(prepared),
-            "layers": [list(layer.values.items()) for layer in layers],
-            "step": step_size,
-            **besides,
-        }
+            "case": case.text if text is None else text, **scenario_content(prepared),
+            "layers": [list(layer.values.items()) for layer in layers], "step": step_size, **besides,
+        }  # fmt: skip
         return cls(reference_to(case), fingerprint(case), prepared.name, tuple(layers), step_size, case.trust_fmus,
                    digest(content))  # fmt: skip
 

@@ -7,10 +7,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 def progress_bar(console: Console) -> Progress:
     """A bar on a terminal and in a notebook; elsewhere nothing."""
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeRemainingColumn(),
-    )
+        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn(),
+    )  # fmt: skip
     shown = console.is_terminal or console.is_jupyter
     return Progress(*columns, console=console, disable=not shown, transient=True)

@@ -67,13 +67,9 @@ def sha256_of(path: Path) -> str:
 
 
 def write_manifest(
-    folder: Path,
-    run: str,
-    names: Iterable[str],
-    scenarios: Iterable[str] = (),
-    before: Manifest | None = None,
+    folder: Path, run: str, names: Iterable[str], scenarios: Iterable[str] = (), before: Manifest | None = None,
     about: Mapping[str, str] | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Write a folder's manifest, after its files.
 
     ``scenarios``: folders beside them that are of the same run.

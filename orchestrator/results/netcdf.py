@@ -32,13 +32,9 @@ def name_of(stored: str) -> str:
 
 
 def netcdf_image(
-    names: Sequence[str],
-    times: NDArray[np.float64],
-    values: NDArray[np.float64],
-    units: Mapping[str, Attributes],
-    attributes: Attributes,
-    chunk: int,
-) -> bytes:
+    names: Sequence[str], times: NDArray[np.float64], values: NDArray[np.float64], units: Mapping[str, Attributes],
+    attributes: Attributes, chunk: int,
+) -> bytes:  # fmt: skip
     """A NetCDF-4 file as bytes.
 
     ``times``: [s], shape (n,).

@@ -123,13 +123,10 @@ class _Worker:
         first = results[0].found
         last = results[intact[-1]].found if intact else None
         return StretchRecord(
-            tuple(result.record for result in results),
-            None if first is None else _as_kept(first.modes),
-            None if last is None else _as_kept(last.modes),
-            intact[-1] if intact else 0,
-            self._bench.perturbed,
+            tuple(result.record for result in results), None if first is None else _as_kept(first.modes),
+            None if last is None else _as_kept(last.modes), intact[-1] if intact else 0, self._bench.perturbed,
             self._bench.reused,
-        )
+        )  # fmt: skip
 
     def _item(self, item: Item, neighbour: FoundModes | None, *, count: bool) -> _Result:
         """One operating point with an outage, or the reason why it has no modes."""
@@ -158,12 +155,9 @@ class _Worker:
             elsewhere = int(result.stability.stable is False and not (modes.eigenvalues.real > 0).any())
             fastest = result.stability.mode if elsewhere else None
             found = FoundModes(
-                modes,
-                True,
-                None if result.stability.stable is None else elsewhere,
-                None if fastest is None else fastest.eigenvalue,
-                result.stability.zeros,
-            )
+                modes, True, None if result.stability.stable is None else elsewhere,
+                None if fastest is None else fastest.eigenvalue, result.stability.zeros,
+            )  # fmt: skip
             warnings = (*warnings, *result.warnings)
             record = self._item_record(found, {}, point.residual, warnings, certain=True)
             return _Result(replace(record, map_steps=result.model.period), found)
@@ -178,32 +172,19 @@ class _Worker:
         return _Result(record, found)
 
     def _item_record(
-        self,
-        found: FoundModes,
-        residues: Mapping[str, Any],
-        residual: float,
-        warnings: tuple[str, ...],
-        *,
+        self, found: FoundModes, residues: Mapping[str, Any], residual: float, warnings: tuple[str, ...], *,
         certain: bool,
-    ) -> ItemRecord:
+    ) -> ItemRecord:  # fmt: skip
         critical, counted = found.critical(self._task.wanted), found.growing_elsewhere is not None
         return ItemRecord(
-            Status.COMPUTED,
-            warnings=warnings,
-            residual=residual,
-            stable=False if found.grows else True if counted and certain else None,
-            counted=counted,
+            Status.COMPUTED, warnings=warnings, residual=residual,
+            stable=False if found.grows else True if counted and certain else None, counted=counted,
             growing_elsewhere=found.growing_elsewhere or 0,
             fastest=None if found.fastest is None else (found.fastest.real, found.fastest.imag),
-            searched=found.searched,
-            zeros=found.zeros,
-            slowest=found.slowest,
-            eigenvalues=found.modes.eigenvalues,
-            critical=tuple(critical),
-            shares=_shares(found.modes),
-            residues=dict(residues),
+            searched=found.searched, zeros=found.zeros, slowest=found.slowest, eigenvalues=found.modes.eigenvalues,
+            critical=tuple(critical), shares=_shares(found.modes), residues=dict(residues),
             links=(-1,) * len(found.modes.eigenvalues),
-        )
+        )  # fmt: skip
 
     def _own_eigenvalues(self, whole: Mapping[str, Any]) -> Any:
         parts = []

@@ -52,12 +52,9 @@ def parameters_of(master: Master, patterns: Sequence[str] = (), *, fixed: bool =
 
 
 def parameters_in(
-    descriptions: Mapping[str, FmuDescription],
-    value_of: Callable[[str, str], float],
-    patterns: Sequence[str] = (),
-    *,
+    descriptions: Mapping[str, FmuDescription], value_of: Callable[[str, str], float], patterns: Sequence[str] = (), *,
     fixed: bool = False,
-) -> list[Parameter]:
+) -> list[Parameter]:  # fmt: skip
     """As `parameters_of`, of components that need not run.
 
     ``value_of``: value of a component's variable, in its unit; asked for the chosen ones only."""

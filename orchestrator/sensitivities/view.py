@@ -108,15 +108,12 @@ def as_json(result: SensitivityResult) -> dict[str, Any]:
     """What ``gfor sensitivities --json`` prints of a scenario."""
     modes, mode = result.modes, result.mode
     return {
-        "case": modes.prepared.case.name,
-        "scenario": modes.prepared.name,
-        "stable": modes.stability.stable,
+        "case": modes.prepared.case.name, "scenario": modes.prepared.name, "stable": modes.stability.stable,
         "stability": modes.stability.as_json(),
         "mode": {**eigenvalue_json(mode.eigenvalue, mode.damping_percent), "name": modes.name_of(mode)},
-        "derivative": "partial" if result.held else "total",
-        "warnings": [*modes.warnings, *result.warnings],
+        "derivative": "partial" if result.held else "total", "warnings": [*modes.warnings, *result.warnings],
         "sensitivities": rows_of(result),
-    }
+    }  # fmt: skip
 
 
 def _text(figure: float | None) -> str:

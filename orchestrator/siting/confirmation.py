@@ -66,13 +66,9 @@ class Confirmation:
 
 
 def confirmed(
-    prepared: PreparedScenario,
-    bus: str,
-    seen: SeenMode,
-    frequency_range: tuple[float, float],
-    controller: str | None,
+    prepared: PreparedScenario, bus: str, seen: SeenMode, frequency_range: tuple[float, float], controller: str | None,
     gain: float,
-) -> Confirmation:
+) -> Confirmation:  # fmt: skip
     """Compare a mode's predicted shift with that of the coupled FMUs.
 
     ``prepared``: With the device at the bus.

@@ -102,14 +102,9 @@ def _read(annotation: Element) -> SspStudy:
         for e in children(root, "gfor:Events/gfor:Set")
     )
     return SspStudy(
-        root.attrib["scenario"],
-        root.get("title", ""),
-        float(step.attrib["seconds"]),
-        schedule.attrib["name"],
-        groups,
-        settings,
-        parsed("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
-    )
+        root.attrib["scenario"], root.get("title", ""), float(step.attrib["seconds"]), schedule.attrib["name"], groups,
+        settings, parsed("".join(e.text or "" for e in children(root, "gfor:CaseTables"))),
+    )  # fmt: skip
 
 
 def _value(text: str) -> float | bool:

@@ -58,15 +58,9 @@ def _text(root: Element) -> bytes:
 
 
 def _description(
-    name: str,
-    title: str,
-    system: System,
-    fmus: Mapping[Path, str],
-    files: Mapping[str, str],
-    stop_time: float,
-    study: SspStudy,
-    tool: str,
-) -> Element:
+    name: str, title: str, system: System, fmus: Mapping[Path, str], files: Mapping[str, str], stop_time: float,
+    study: SspStudy, tool: str,
+) -> Element:  # fmt: skip
     root = Element(tag("ssd:SystemStructureDescription"), version=SSP_VERSION, name=name, generationTool=tool)
     if title:
         root.set("description", title)

@@ -15,12 +15,9 @@ from orchestrator.study.modes import Linearised, ModesResult, compute_modes, lin
 
 
 def compute_all_modes(
-    scenarios: Sequence[PreparedScenario],
-    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    critical: float | None = None,
-    *,
-    directional: bool = False,
-) -> list[ModesResult]:
+    scenarios: Sequence[PreparedScenario], frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    critical: float | None = None, *, directional: bool = False,
+) -> list[ModesResult]:  # fmt: skip
     """The same as `compute_modes` of each scenario, in their order, to the last bit.
 
     FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file.

@@ -177,14 +177,11 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
     difference = y_2 - y_1
     worst = int(np.argmax(np.abs(difference)))
     return Comparison(
-        expression,
-        str(first.attrs.get("units") or _unit(a, expression)),
-        (float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())),
-        float(abs(difference[worst])),
-        float(np.sqrt(np.mean(difference**2))),
-        float(common.times[worst]),
+        expression, str(first.attrs.get("units") or _unit(a, expression)),
+        (float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())), float(abs(difference[worst])),
+        float(np.sqrt(np.mean(difference**2))), float(common.times[worst]),
         (_strongest(first, start), _strongest(second, start)),
-    )
+    )  # fmt: skip
 
 
 def most_different(

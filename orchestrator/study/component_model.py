@@ -47,12 +47,9 @@ def component_model(prepared: PreparedScenario, name: str) -> EmbeddedModel:
         parameters=parameters,
         units={v: info[v].unit for v in (*c.states, *inputs, *outputs, *parameters)},
         origin={
-            "case": prepared.case.name,
-            "scenario": prepared.name,
-            "component": name,
-            "step_size_s": prepared.step_size,
+            "case": prepared.case.name, "scenario": prepared.name, "component": name, "step_size_s": prepared.step_size,
             "residual_per_step": point.residual,
             "derivatives": "directional derivatives" if exact else f"central differences of {PERTURBATIONS[0]:g}",
             "fmu_guid": plan.description.guid,
         },
-    )
+    )  # fmt: skip

@@ -89,29 +89,22 @@ def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd |
 def _mode_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
     return [
         {
-            "scenario": r.prepared.name,
-            "real [1/s]": f"{m.eigenvalue.real:.8g}",
-            "imag [rad/s]": f"{m.eigenvalue.imag:.8g}",
-            "frequency [Hz]": f"{m.frequency_hz:.6g}",
-            "damping [%]": f"{m.damping_percent:.6g}",
-            "name": r.name_of(m) or "",
+            "scenario": r.prepared.name, "real [1/s]": f"{m.eigenvalue.real:.8g}",
+            "imag [rad/s]": f"{m.eigenvalue.imag:.8g}", "frequency [Hz]": f"{m.frequency_hz:.6g}",
+            "damping [%]": f"{m.damping_percent:.6g}", "name": r.name_of(m) or "",
             "participation": "; ".join(f"{name} {factor:.4f}" for name, factor in m.participation[:6]),
         }
         for r in results
         for m in r.modes
-    ]
+    ]  # fmt: skip
 
 
 def _participation_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
     """Participation by state, by component and by area in every mode."""
     return [
         {
-            "scenario": r.prepared.name,
-            "frequency [Hz]": f"{m.frequency_hz:.6g}",
-            "damping [%]": f"{m.damping_percent:.6g}",
-            "name": r.name_of(m) or "",
-            "of": kind,
-            "element": element,
+            "scenario": r.prepared.name, "frequency [Hz]": f"{m.frequency_hz:.6g}",
+            "damping [%]": f"{m.damping_percent:.6g}", "name": r.name_of(m) or "", "of": kind, "element": element,
             "participation": f"{factor:.6g}",
         }
         for r in results
@@ -119,7 +112,7 @@ def _participation_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
         for kind, factors in (("state", dict(m.participation)), ("component", m.by_component), ("area", r.by_area(m)))
         for element, factor in factors.items()
         if factor >= _LEAST_PARTICIPATION
-    ]
+    ]  # fmt: skip
 
 
 def _shape_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
@@ -130,35 +123,28 @@ def _shape_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
             largest = max((m.shape[s] for s in r.swing), key=abs, default=0)
             rows += [
                 {
-                    "scenario": r.prepared.name,
-                    "frequency [Hz]": f"{m.frequency_hz:.6g}",
-                    "damping [%]": f"{m.damping_percent:.6g}",
-                    "name": r.name_of(m) or "",
-                    "state": state,
+                    "scenario": r.prepared.name, "frequency [Hz]": f"{m.frequency_hz:.6g}",
+                    "damping [%]": f"{m.damping_percent:.6g}", "name": r.name_of(m) or "", "state": state,
                     "magnitude": f"{abs(m.shape[state] / largest):.6g}",
                     "angle [deg]": f"{math.degrees(cmath.phase(m.shape[state] / largest)):.4g}",
                 }
                 for state in r.swing
                 if largest
-            ]
+            ]  # fmt: skip
     return rows
 
 
 def _shift_rows(results: Sequence[RunResult]) -> list[dict[str, Any]]:
     return [
         {
-            "scenario": r.modes.prepared.name,
-            "schedule": s.schedule,
-            "step size [s]": s.step_size,
-            "real [1/s]": f"{s.eigenvalue.real:.8g}",
-            "imag [rad/s]": f"{s.eigenvalue.imag:.8g}",
-            "continuous real [1/s]": f"{s.continuous.real:.8g}",
-            "continuous imag [rad/s]": f"{s.continuous.imag:.8g}",
+            "scenario": r.modes.prepared.name, "schedule": s.schedule, "step size [s]": s.step_size,
+            "real [1/s]": f"{s.eigenvalue.real:.8g}", "imag [rad/s]": f"{s.eigenvalue.imag:.8g}",
+            "continuous real [1/s]": f"{s.continuous.real:.8g}", "continuous imag [rad/s]": f"{s.continuous.imag:.8g}",
             "shift [rad/s]": f"{s.shift:.4g}",
         }
         for r in results
         for s in r.shifts
-    ]
+    ]  # fmt: skip
 
 
 def summary_of(result: RunResult) -> dict[str, Any]:
@@ -166,40 +152,30 @@ def summary_of(result: RunResult) -> dict[str, Any]:
     modes = result.modes
     seen, stats = result.ring_down, result.statistics
     return {
-        "name": modes.prepared.name,
-        "title": modes.prepared.title,
+        "name": modes.prepared.name, "title": modes.prepared.title,
         "residual": None if math.isnan(modes.operating_point.residual) else modes.operating_point.residual,
-        "states": modes.model.number_of_states,
-        "stable": modes.stability.stable,
-        "largest_growth_rate": modes.stability.largest_growth_rate,
-        "stability": modes.stability.as_json(),
+        "states": modes.model.number_of_states, "stable": modes.stability.stable,
+        "largest_growth_rate": modes.stability.largest_growth_rate, "stability": modes.stability.as_json(),
         "outside_range": None if modes.hidden is None else modes.hidden.as_json(),
         "modes": {name: eigenvalue_json(mode.eigenvalue, mode.damping_percent) for name, mode in modes.named.items()},
         "references": {name: table.model_dump(exclude_none=True) for name, table in modes.references.items()},
         "ring_down": None if seen is None else eigenvalue_json(seen.eigenvalue, seen.damping_percent),
         "steps_per_second": stats.steps_per_second if stats else None,
         "share_in_fmus": stats.share_in_fmus if stats else None,
-        "real_time_factor": stats.real_time_factor if stats else None,
-        "threads": stats.threads if stats else None,
+        "real_time_factor": stats.real_time_factor if stats else None, "threads": stats.threads if stats else None,
         "linear_difference": _linear_differences(result),
         "swing": {name: modes.swing_of(mode) for name, mode in modes.named.items()},
-        "step_size_s": modes.prepared.step_size,
-        "stop_time": modes.prepared.stop_time,
-        "schedule": modes.prepared.schedule.name,
-        "tolerance": modes.prepared.schedule.tolerance,
+        "step_size_s": modes.prepared.step_size, "stop_time": modes.prepared.stop_time,
+        "schedule": modes.prepared.schedule.name, "tolerance": modes.prepared.schedule.tolerance,
         "adaptive_steps": None if stats is None or stats.adaptive is None else asdict(stats.adaptive),
-        "events": [str(event) for event in modes.prepared.events],
-        "answer": of_run(result).as_json(),
-        "power_flow": _power_flow(modes.prepared),
-        "linearised": modes.linearised,
-        "fit_errors": modes.fit_errors,
-        "warnings": list(modes.warnings),
-        "stable_in_simulation": result.stable_in_simulation,
+        "events": [str(event) for event in modes.prepared.events], "answer": of_run(result).as_json(),
+        "power_flow": _power_flow(modes.prepared), "linearised": modes.linearised, "fit_errors": modes.fit_errors,
+        "warnings": list(modes.warnings), "stable_in_simulation": result.stable_in_simulation,
         "findings": [finding.as_json() for finding in result.findings],
         "failure": str(result.failure) if result.failure else None,
         "interrupted": isinstance(result.failure, RunInterruptedError),
         "isolated": {name: [asdict(p) for p in found] for name, found in result.protections.items()},
-    }
+    }  # fmt: skip
 
 
 def _power_flow(prepared: PreparedScenario) -> dict[str, Any] | None:

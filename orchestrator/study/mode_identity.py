@@ -58,13 +58,9 @@ Undamped = Callable[[Mapping[str, float]], NamedSystem]  # gives the system itse
 
 
 def settled(
-    system: NamedSystem,
-    computed: Computed,
-    known: Mapping[str, NamedSystem],
-    *,
-    undamped: Undamped | None = None,
+    system: NamedSystem, computed: Computed, known: Mapping[str, NamedSystem], *, undamped: Undamped | None = None,
     far: bool = True,
-) -> NamedSystem:
+) -> NamedSystem:  # fmt: skip
     """A scenario's names, where shapes do not tell by following the mode that it was.
 
     ``known``: scenarios that are settled already, by name, with the values that hold for all.
@@ -167,12 +163,9 @@ class _Others:
     ``lost``: Where the name last looked for is borne by a mode from which no way leads here; empty if nowhere."""
 
     def __init__(
-        self,
-        system: NamedSystem,
-        computed: Computed,
-        known: Mapping[str, NamedSystem],
+        self, system: NamedSystem, computed: Computed, known: Mapping[str, NamedSystem],
         undamped: Undamped | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._system, self._computed, self._known, self._by_gains = system, computed, known, undamped
         self._kept: dict[tuple[str, bool], NamedSystem | None] = {}
         self._ways: dict[str, _Way | None] = {}

@@ -108,12 +108,9 @@ class ModesResult:
 
 
 def compute_modes(
-    prepared: PreparedScenario,
-    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    critical: float | None = None,
-    *,
-    directional: bool = False,
-) -> ModesResult:
+    prepared: PreparedScenario, frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    critical: float | None = None, *, directional: bool = False,
+) -> ModesResult:  # fmt: skip
     """Initialise a scenario's FMUs, verify their steady state, and linearise around it.
 
     ``critical``: damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The
@@ -133,25 +130,17 @@ def running(prepared: PreparedScenario, federation: Federation | None = None, th
 
 
 def modes_of(
-    prepared: PreparedScenario,
-    master: Master,
-    frequency_range: tuple[float, float],
-    critical: float | None = None,
-    *,
+    prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None = None, *,
     directional: bool = False,
-) -> ModesResult:
+) -> ModesResult:  # fmt: skip
     """`compute_modes` of a running system, whose FMUs stand at the operating point afterwards."""
     return _computed(linearised(prepared, master, frequency_range, critical, directional=directional))
 
 
 def linearised(
-    prepared: PreparedScenario,
-    master: Master,
-    frequency_range: tuple[float, float],
-    critical: float | None = None,
-    *,
+    prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None = None, *,
     directional: bool = False,
-) -> "Linearised":
+) -> "Linearised":  # fmt: skip
     """The same before its eigenvalues are computed."""
     misfits, said = misfits_of(master), start_warnings(master)
     point = find_operating_point(master)
@@ -161,14 +150,9 @@ def linearised(
 
 
 def modes_from(
-    prepared: PreparedScenario,
-    master: Master,
-    point: OperatingPoint,
-    blocks: Blocks,
-    frequency_range: tuple[float, float],
-    critical: float | None = None,
-    black_boxes: BlackBoxes | None = None,
-) -> ModesResult:
+    prepared: PreparedScenario, master: Master, point: OperatingPoint, blocks: Blocks,
+    frequency_range: tuple[float, float], critical: float | None = None, black_boxes: BlackBoxes | None = None,
+) -> ModesResult:  # fmt: skip
     """The modes of components that were linearised at an operating point; ``black_boxes`` as `identified`."""
     misfits = misfits_of(master)
     return _computed(Linearised(prepared, master, point, blocks, frequency_range, critical, (), misfits, black_boxes))
@@ -187,17 +171,10 @@ class Linearised:
     ``said`` are earlier warnings, behind those of ``misfits``, which are as `misfits_of` gives them."""
 
     def __init__(
-        self,
-        prepared: PreparedScenario,
-        master: Master,
-        point: OperatingPoint,
-        blocks: Blocks,
-        frequency_range: tuple[float, float],
-        critical: float | None,
-        said: tuple[str, ...] = (),
-        misfits: Mapping[str, list[Misfit]] = MappingProxyType({}),
-        black_boxes: BlackBoxes | None = None,
-    ) -> None:
+        self, prepared: PreparedScenario, master: Master, point: OperatingPoint, blocks: Blocks,
+        frequency_range: tuple[float, float], critical: float | None, said: tuple[str, ...] = (),
+        misfits: Mapping[str, list[Misfit]] = MappingProxyType({}), black_boxes: BlackBoxes | None = None,
+    ) -> None:  # fmt: skip
         self._misfits = misfits
         self._prepared, self._master, self._point, self._blocks = prepared, master, point, blocks
         self._range, self._critical, self._said = frequency_range, critical, (*sentences(misfits), *said)
@@ -271,10 +248,7 @@ class Linearised:
             references=dict(prepared.references),
             misfits=self._misfits,
             warnings=(
-                *self._said,
-                *map(str, prepared.questions),
-                *examined.warnings,
-                *naming.doubts,
+                *self._said, *map(str, prepared.questions), *examined.warnings, *naming.doubts,
                 *(f"{fault}: the modes are those before it" for fault in failing),
             ),
             swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
@@ -293,7 +267,7 @@ class Linearised:
             system=self._system,
             fit_errors={name: c.disagreement for name, c in self._blocks.components.items() if c.source == IDENTIFIED},
             unnamed=naming.reasons,
-        )
+        )  # fmt: skip
 
 
 def _faults(misfits: Mapping[str, list[Misfit]]) -> list[str]:
@@ -301,17 +275,12 @@ def _faults(misfits: Mapping[str, list[Misfit]]) -> list[str]:
 
 
 def identified(
-    prepared: PreparedScenario,
-    point: OperatingPoint,
-    model: LinearModel,
-    modes: Sequence[Mode],
+    prepared: PreparedScenario, point: OperatingPoint, model: LinearModel, modes: Sequence[Mode],
     frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
     known: Mapping[str, NamedSystem] = MappingProxyType({}),
-    at_gains: Callable[[Mapping[str, float]], LinearModel] | None = None,
-    *,
-    directional: bool = False,
+    at_gains: Callable[[Mapping[str, float]], LinearModel] | None = None, *, directional: bool = False,
     black_boxes: BlackBoxes | None = None,
-) -> NamedSystem:
+) -> NamedSystem:  # fmt: skip
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 
     ``at_gains``: the linear model with other gains of damping controllers, where the scenario still runs.

@@ -109,16 +109,10 @@ class RunResult:
 
 
 def run_scenario(
-    prepared: PreparedScenario,
-    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
-    observers: Sequence[Observer] = (),
-    *,
-    linear: bool = False,
-    recording: RecordingFolder | None = None,
-    checkpoints: Checkpoints | None = None,
-    federates: Federates | None = None,
-    threads: int | None = 1,
-) -> RunResult:
+    prepared: PreparedScenario, frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    observers: Sequence[Observer] = (), *, linear: bool = False, recording: RecordingFolder | None = None,
+    checkpoints: Checkpoints | None = None, federates: Federates | None = None, threads: int | None = 1,
+) -> RunResult:  # fmt: skip
     """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
 
     A system that cannot be linearised is simulated from its initial state, with a warning instead of modes.
@@ -145,15 +139,10 @@ def run_scenario(
 
 
 def _run(
-    prepared: PreparedScenario,
-    frequency_range: tuple[float, float],
-    observers: Sequence[Observer],
-    linear: bool,
-    recording: RecordingFolder | None,
-    checkpoints: Checkpoints | None,
-    threads: int | None,
+    prepared: PreparedScenario, frequency_range: tuple[float, float], observers: Sequence[Observer], linear: bool,
+    recording: RecordingFolder | None, checkpoints: Checkpoints | None, threads: int | None,
     federation: Federation | None = None,
-) -> RunResult:
+) -> RunResult:  # fmt: skip
     watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None

@@ -137,20 +137,15 @@ class RunComparison:
         """Largest deviation of each run, largest difference and its time [s], and the strongest oscillation of each."""
         rows = [
             {
-                "signal": c.expression,
-                "unit": c.unit,
-                "deviation_a": c.deviations[0],
-                "deviation_b": c.deviations[1],
-                "largest_difference": c.largest,
-                "at_s": c.at,
-                "rms": c.rms,
+                "signal": c.expression, "unit": c.unit, "deviation_a": c.deviations[0], "deviation_b": c.deviations[1],
+                "largest_difference": c.largest, "at_s": c.at, "rms": c.rms,
                 "frequency_hz_a": c.modes[0].frequency_hz if c.modes[0] else None,
                 "damping_percent_a": c.modes[0].damping_percent if c.modes[0] else None,
                 "frequency_hz_b": c.modes[1].frequency_hz if c.modes[1] else None,
                 "damping_percent_b": c.modes[1].damping_percent if c.modes[1] else None,
             }
             for c in self.signals
-        ]
+        ]  # fmt: skip
         return pd.DataFrame(rows).set_index("signal")
 
     def as_json(self) -> list[dict[str, Any]]:

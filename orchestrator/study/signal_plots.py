@@ -47,13 +47,9 @@ def plot_signals(table: PlotTable, results: Sequence[RunResult], path: Path) -> 
 
 
 def draw_signal(
-    axis: Any,
-    results: Sequence[RunResult],
-    expression: str,
-    scale: float = 1.0,
-    first: int = 0,
+    axis: Any, results: Sequence[RunResult], expression: str, scale: float = 1.0, first: int = 0,
     label: str | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """One signal of all runs that recorded it; dashed, the linear model's response where there is one.
 
     ``axis``: Matplotlib Axes.

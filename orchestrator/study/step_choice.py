@@ -99,12 +99,9 @@ class StepChoice:
 
 
 def choose_step(
-    prepared: PreparedScenario,
-    allowed: Allowed,
-    steps: Sequence[float] = (),
-    schedules: Sequence[ScheduleName] = (),
+    prepared: PreparedScenario, allowed: Allowed, steps: Sequence[float] = (), schedules: Sequence[ScheduleName] = (),
     frequency_range: tuple[float, float] = (0.1, 2.0),
-) -> StepChoice:
+) -> StepChoice:  # fmt: skip
     """What schedules do to a scenario's critical modes at several steps, against the continuous system.
 
     ``steps``: communication steps [s]; by default `MULTIPLES` of the case's own.
@@ -175,14 +172,9 @@ def _growth(values: NDArray[np.complex128], *, step_map: bool) -> float:
 
 
 def _tried(
-    prepared: PreparedScenario,
-    master: Master,
-    name: ScheduleName,
-    steps: Sequence[float],
-    critical: NDArray[np.complex128],
-    growth: float,
-    allowed: Allowed | None,
-) -> list[TriedStep]:
+    prepared: PreparedScenario, master: Master, name: ScheduleName, steps: Sequence[float],
+    critical: NDArray[np.complex128], growth: float, allowed: Allowed | None,
+) -> list[TriedStep]:  # fmt: skip
     """Trials of one schedule; up to some steps that are too long, where it is said what is allowed."""
     trials: list[TriedStep] = []
     for step in steps:
@@ -199,13 +191,9 @@ def _tried(
 
 
 def _trial(
-    prepared: PreparedScenario,
-    master: Master,
-    name: ScheduleName,
-    step: float,
-    critical: NDArray[np.complex128],
+    prepared: PreparedScenario, master: Master, name: ScheduleName, step: float, critical: NDArray[np.complex128],
     growth: float,
-) -> TriedStep:
+) -> TriedStep:  # fmt: skip
     schedule = prepared.rescheduled(name).schedule
     if name == "newton":
         stuck = [n for n, c in master.components.items() if not c.description.can_save_state]
@@ -219,15 +207,10 @@ def _trial(
     seen = _partners(values, critical)
     rate = _growth(values, step_map=True)
     return TriedStep(
-        name,
-        step,
-        (seen.imag - critical.imag) / (2 * np.pi),
-        np.array([damping_percent(a) - damping_percent(b) for a, b in zip(seen, critical, strict=True)]),
-        seen,
-        rate,
-        keeps_stability(rate, growth, seen, critical),
-        doubts=_doubts(blocks, schedule, model),
-    )
+        name, step, (seen.imag - critical.imag) / (2 * np.pi),
+        np.array([damping_percent(a) - damping_percent(b) for a, b in zip(seen, critical, strict=True)]), seen, rate,
+        keeps_stability(rate, growth, seen, critical), doubts=_doubts(blocks, schedule, model),
+    )  # fmt: skip
 
 
 def keeps_stability(rate: float, growth: float, seen: NDArray[np.complex128], critical: NDArray[np.complex128]) -> bool:
@@ -273,16 +256,11 @@ def step_choice_json(choice: StepChoice) -> dict[str, Any]:
         "left_out_s": list(choice.left_out),
         "trials": [
             {
-                "schedule": trial.schedule,
-                "step_size_s": trial.step_size,
-                "frequency_error_hz": trial.hertz.tolist(),
-                "damping_error_points": trial.points.tolist(),
-                "growth_rate": None if trial.refused else trial.growth,
-                "stable": None if trial.refused else trial.stable,
-                "within": trial.is_within(choice.allowed),
-                "refused": trial.refused,
-                "doubts": list(trial.doubts),
+                "schedule": trial.schedule, "step_size_s": trial.step_size, "frequency_error_hz": trial.hertz.tolist(),
+                "damping_error_points": trial.points.tolist(), "growth_rate": None if trial.refused else trial.growth,
+                "stable": None if trial.refused else trial.stable, "within": trial.is_within(choice.allowed),
+                "refused": trial.refused, "doubts": list(trial.doubts),
             }
             for trial in choice.trials
         ],
-    }
+    }  # fmt: skip

@@ -74,17 +74,11 @@ class Samples:
             yield (
                 place,
                 {
-                    "real": value.real,
-                    "imag": value.imag,
-                    "frequency": value.imag / (2 * np.pi),
-                    "damping": damping_percent(value),
-                    "similarity": point.similarity,
-                    "named": point.named,
-                    "beginning": point.beginning,
-                    "states": states,
-                    "components": components,
+                    "real": value.real, "imag": value.imag, "frequency": value.imag / (2 * np.pi),
+                    "damping": damping_percent(value), "similarity": point.similarity, "named": point.named,
+                    "beginning": point.beginning, "states": states, "components": components,
                 },
-            )
+            )  # fmt: skip
 
     def setting(self, place: GridPlace) -> dict[str, float | bool]:
         """Values of the varied parameters at a place of the grid."""
@@ -270,14 +264,11 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
 
 def _point_json(setting: dict[str, float | bool], sample: dict[str, Any]) -> dict[str, Any]:
     return {
-        "values": setting,
-        **eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"]),
-        "similarity": None if np.isnan(sample["similarity"]) else sample["similarity"],
-        "named": sample["named"],
-        "beginning": sample["beginning"].name.lower(),
-        "participation": sample["states"],
+        "values": setting, **eigenvalue_json(complex(sample["real"], sample["imag"]), sample["damping"]),
+        "similarity": None if np.isnan(sample["similarity"]) else sample["similarity"], "named": sample["named"],
+        "beginning": sample["beginning"].name.lower(), "participation": sample["states"],
         "components": sample["components"],
-    }
+    }  # fmt: skip
 
 
 def save_sweep(samples: Samples, folder: Path) -> list[str]:

@@ -190,13 +190,10 @@ def mode_behind(record: PointRecord, speeds: Sequence[str]) -> tuple[dict[str, A
 
 def _mode_json(name: str, value: complex, components: dict[str, float]) -> dict[str, Any]:
     return {
-        "name": name,
-        "frequency_hz": value.imag / (2 * np.pi),
-        "damping_percent": damping_percent(value),
-        "real": value.real,
-        "imag": value.imag,
+        "name": name, "frequency_hz": value.imag / (2 * np.pi), "damping_percent": damping_percent(value),
+        "real": value.real, "imag": value.imag,
         "components": {component: share for component, share in components.items() if share >= 0.01},
-    }
+    }  # fmt: skip
 
 
 def _who(mode: Mode, speeds: Sequence[str]) -> str:

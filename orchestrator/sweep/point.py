@@ -56,9 +56,6 @@ def _record(result: ModesResult) -> PointRecord:
     return PointRecord(
         ModeSet.of(modes, result.model.names),
         {name: next(i for i, m in enumerate(modes) if m is mode) for name, mode in result.named.items()},
-        residual=result.operating_point.residual,
-        warnings=result.warnings,
-        linearised=result.linearised,
-        stability=result.stability.as_json(),
-        because=result.stability.because(),
-    )
+        residual=result.operating_point.residual, warnings=result.warnings, linearised=result.linearised,
+        stability=result.stability.as_json(), because=result.stability.because(),
+    )  # fmt: skip

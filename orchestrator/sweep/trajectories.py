@@ -94,13 +94,9 @@ def _route(modes: Iterable[GridPlace]) -> Iterator[tuple[GridPlace, list[GridPla
 
 
 def _history(
-    followed: Followed[GridPlace],
-    modes: Mapping[GridPlace, ModeSet],
-    first: set[GridPlace],
-    place: GridPlace,
-    index: int,
-    frequency_range: tuple[float, float],
-) -> tuple[float, Beginning]:
+    followed: Followed[GridPlace], modes: Mapping[GridPlace, ModeSet], first: set[GridPlace], place: GridPlace,
+    index: int, frequency_range: tuple[float, float],
+) -> tuple[float, Beginning]:  # fmt: skip
     """Least similarity since the last grid point, and the kind of the trajectory's beginning."""
     number, refined, alike = followed.trajectory[place][index], False, 1.0
     while True:

@@ -9,15 +9,10 @@ Kind = Literal["growth", "growing_oscillation", "sustained_oscillation", "run_aw
 
 UNSTABLE: frozenset[Kind] = frozenset(
     {
-        "growth",
-        "growing_oscillation",
-        "sustained_oscillation",
-        "run_away",
-        "loss_of_synchronism",
-        "not_finite",
+        "growth", "growing_oscillation", "sustained_oscillation", "run_away", "loss_of_synchronism", "not_finite",
         "failure",
     }
-)
+)  # fmt: skip
 """Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may
 be, or the run ends too early after an event; ``misfit`` is of a device and its binding, whatever the run does."""
 
@@ -43,12 +38,7 @@ class Finding:
 
     def as_json(self) -> dict[str, Any]:
         return {
-            "kind": self.kind,
-            "time": self.time,
-            "until": self.until,
-            "component": self.component,
-            "variable": self.variable,
-            "message": self.message,
-            **self.figures,
+            "kind": self.kind, "time": self.time, "until": self.until, "component": self.component,
+            "variable": self.variable, "message": self.message, **self.figures,
             **({} if self.represented else {"represented": False}),
-        }
+        }  # fmt: skip

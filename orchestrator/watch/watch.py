@@ -88,12 +88,9 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
     if happened and happened[0] > 0:
         parts.insert(0, Stretch(0.0, happened[0]))
     found = [
-        *undisturbed,
-        *above_declared(seen, system),
-        *active_limits(seen, system, settings),
-        *lost,
+        *undisturbed, *above_declared(seen, system), *active_limits(seen, system, settings), *lost,
         *run_away(seen, system, settings, parts, slipped=bool(lost)),
-    ]
+    ]  # fmt: skip
     if any(finding.figures["slips_at_the_end"] for finding in lost):
         return found  # all signals swing with the slip
     if happened and [finding.kind for finding in undisturbed] != ["undisturbed_motion"]:

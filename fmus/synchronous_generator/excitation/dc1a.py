@@ -25,14 +25,9 @@ from fmus.toolchain.symbols import Expr, Scalar
 
 
 def dc1a(
-    m: ModelBuilder,
-    start: Start,
-    terminal_voltage: TerminalVoltage,
-    I_fd: Expr,
-    v_s: Scalar = 0.0,
-    *,
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0, *,
     compensated: bool = True,
-) -> tuple[Expr, Expr]:
+) -> tuple[Expr, Expr]:  # fmt: skip
     """Declare it and return (E_fd, |v_t|) [pu].
 
     ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B)."""

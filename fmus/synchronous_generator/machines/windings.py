@@ -51,16 +51,9 @@ class _Circuit:
 
 
 def declare_wound_machine(
-    m: ModelBuilder,
-    port: DevicePort,
-    common: Common,
-    d: WoundAxis,
-    q: WoundAxis,
-    stator_flux: FluxDeclaration,
-    saturation: Saturation | None = None,
-    *,
-    salient: bool = False,
-) -> Machine:
+    m: ModelBuilder, port: DevicePort, common: Common, d: WoundAxis, q: WoundAxis, stator_flux: FluxDeclaration,
+    saturation: Saturation | None = None, *, salient: bool = False,
+) -> Machine:  # fmt: skip
     """Declare windings, speed and angle in the steady state of the operating point.
 
     ``port``: gives the operating point; ``common``: transformer, stator resistance and motion; ``d``, ``q``: data of
@@ -121,14 +114,9 @@ def _circuit(m: ModelBuilder, port: DevicePort, name: str, axis: WoundAxis, X_t:
 
 
 def _axis(
-    m: ModelBuilder,
-    axis: WoundAxis,
-    circuit: _Circuit,
-    stator_flux: FluxDeclaration,
-    stator: tuple[str, Expr],
-    gap: Expr,
-    i: Expr,
-) -> Axis:
+    m: ModelBuilder, axis: WoundAxis, circuit: _Circuit, stator_flux: FluxDeclaration, stator: tuple[str, Expr],
+    gap: Expr, i: Expr,
+) -> Axis:  # fmt: skip
     """Declare the fluxes of an axis; in steady state its slowest winding alone has a current."""
     name, psi = stator
     stator_psi = stator_flux(m, name, psi, f"Flux of stator and transformer, {name[-1]} axis")

@@ -14,11 +14,8 @@ from orchestrator.units import base_exponents
 
 _SOME = 3
 _PORT_UNITS = {
-    "v_re": ("pu", "V", "kV"),
-    "v_im": ("pu", "V", "kV"),
-    "i_re": ("pu", "A", "kA"),
-    "i_im": ("pu", "A", "kA"),
-}
+    "v_re": ("pu", "V", "kV"), "v_im": ("pu", "V", "kV"), "i_re": ("pu", "A", "kA"), "i_im": ("pu", "A", "kA"),
+}  # fmt: skip
 _PLAIN = ("", "1", "-", "%", "pu", "p.u.", "p.u", "per unit", "per_unit")
 _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 

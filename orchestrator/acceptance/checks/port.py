@@ -19,12 +19,9 @@ from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.port import BoundDescription
 
 POINTS = (
-    OperatingAt(1.0, 0.0, 0.5, 0.1),
-    OperatingAt(1.03, 0.4, 0.7, -0.1),
-    OperatingAt(0.97, -0.5, 0.3, 0.2),
-    OperatingAt(1.0, 2.0, 0.6, 0.0),
-    OperatingAt(1.01, -2.5, 0.4, -0.2),
-)
+    OperatingAt(1.0, 0.0, 0.5, 0.1), OperatingAt(1.03, 0.4, 0.7, -0.1), OperatingAt(0.97, -0.5, 0.3, 0.2),
+    OperatingAt(1.0, 2.0, 0.6, 0.0), OperatingAt(1.01, -2.5, 0.4, -0.2),
+)  # fmt: skip
 IMPORTING = (OperatingAt(1.0, 0.3, -0.5, 0.15), OperatingAt(1.02, -0.4, -0.3, -0.1))  # points at which it takes power
 DRIFT = 1e-3  # movement of the current in steady state [pu, S_n] that is a fault; 1e-6 is worth a remark
 ANSWER = 400  # steps of the answer that is compared at several times
@@ -238,13 +235,8 @@ def _judged(
     in_power, in_current = _fit(s_0, s), _fit((s_0 / v).conj(), (s / v).conj())
     of, (a, b, c, rest) = ("S", in_power) if in_power[3] <= 1.01 * in_current[3] else ("i", in_current)
     figures = {
-        "of": of,
-        "a": [a.real, a.imag],
-        "b": [b.real, b.imag],
-        "c": [c.real, c.imag],
-        "rest": rest,
-        "worst": worst,
-    }
+        "of": of, "a": [a.real, a.imag], "b": [b.real, b.imag], "c": [c.real, c.imag], "rest": rest, "worst": worst,
+    }  # fmt: skip
     if worst <= BALANCE:
         return passed(
             "power_balance", f"S is what is asked within {worst:.2g} pu of the rating at {len(s)} points", **figures

@@ -189,12 +189,8 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     )
     seen += f"; {left_out} more were left out for time" if left_out else ""
     figures = {
-        "peak": highest.peak,
-        "mean": worst.mean,
-        "declared": declared,
-        "tried": len(answers),
-        "left_out": left_out,
-    }
+        "peak": highest.peak, "mean": worst.mean, "declared": declared, "tried": len(answers), "left_out": left_out,
+    }  # fmt: skip
     if declared is not None and worst.mean > 1.05 * declared:
         return failed("limits", "above its current limit", f"{seen}; {declared:g} pu is declared", **figures)
     if declared is None and worst.mean > NO_LIMIT:

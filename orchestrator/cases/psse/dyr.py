@@ -36,14 +36,9 @@ class MachineModel:
 
 
 def machine_models(
-    records: Sequence[DynamicRecord],
-    machines: Sequence[Machine],
-    leaving_out: Sequence[str] = (),
-    replaced: Collection[tuple[int, str]] = (),
-    idle: Collection[tuple[int, str]] = (),
-    *,
-    approximate: bool = False,
-) -> dict[tuple[int, str], MachineModel]:
+    records: Sequence[DynamicRecord], machines: Sequence[Machine], leaving_out: Sequence[str] = (),
+    replaced: Collection[tuple[int, str]] = (), idle: Collection[tuple[int, str]] = (), *, approximate: bool = False,
+) -> dict[tuple[int, str], MachineModel]:  # fmt: skip
     """Models of the machines in service, by bus and identifier.
 
     ``leaving_out``: models whose records may be left out; their generators keep what the case says of that part.

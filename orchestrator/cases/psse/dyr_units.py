@@ -32,15 +32,9 @@ def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:
 
 
 def with_records(
-    rows: Sequence[UnitRow],
-    machines: Sequence[Machine],
-    path: Path,
-    leaving_out: Sequence[str],
-    without: Collection[str],
-    idle: Collection[tuple[int, str]] = (),
-    *,
-    approximate: bool = False,
-) -> list[UnitRow]:
+    rows: Sequence[UnitRow], machines: Sequence[Machine], path: Path, leaving_out: Sequence[str],
+    without: Collection[str], idle: Collection[tuple[int, str]] = (), *, approximate: bool = False,
+) -> list[UnitRow]:  # fmt: skip
     """The units with what the records say of them.
 
     ``rows`` and ``machines``: in the same order.

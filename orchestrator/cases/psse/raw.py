@@ -95,16 +95,10 @@ class _Reading:
         for row, m in zip(gen, machines, strict=True):
             row[[0, 1, 3, 4, 5, 7, 8]] = m.bus, m.p_mw, m.q_max_mvar, m.q_min_mvar, m.v_pu, 1, m.rating_mva
         tables = SourceTables(
-            self._raw.place,
-            self._raw.base_mva,
-            np.array(list(self._rows.values())),
-            np.array(self._branches).reshape(-1, _BRANCH_COLUMNS),
-            gen,
-            np.array(self._to_earth, dtype=complex).reshape(-1, 2),
-            self._labels,
-            self._raw.frequency,
-            self._load_parts,
-        )
+            self._raw.place, self._raw.base_mva, np.array(list(self._rows.values())),
+            np.array(self._branches).reshape(-1, _BRANCH_COLUMNS), gen,
+            np.array(self._to_earth, dtype=complex).reshape(-1, 2), self._labels, self._raw.frequency, self._load_parts,
+        )  # fmt: skip
         flat = all(
             record.number(7, "VM", 1.0) == 1 and record.number(8, "VA", 0.0) == 0 for record in self._raw.of("bus")
         )
@@ -243,13 +237,9 @@ class _Reading:
         if len(windings) == 2:
             first, second = windings
             self._branch(
-                first.bus,
-                second.bus,
-                t.impedances[0] * second.ratio**2,
-                1,
-                tap=first.ratio / second.ratio,
+                first.bus, second.bus, t.impedances[0] * second.ratio**2, 1, tap=first.ratio / second.ratio,
                 shift=first.shift - second.shift,
-            )
+            )  # fmt: skip
             return
         inner = max(self._rows) + 1
         self._rows[inner] = [inner, 1, *[0.0] * (_BUS_COLUMNS - 2)]

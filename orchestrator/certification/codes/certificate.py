@@ -58,13 +58,9 @@ class CodeCertificate(Certificate[RowVerdict]):
 
 
 def certify_code(
-    request: CertificationRequest,
-    code: GridCode,
-    executor: Executor,
-    folder: Path,
-    rows: Sequence[str] = (),
+    request: CertificationRequest, code: GridCode, executor: Executor, folder: Path, rows: Sequence[str] = (),
     report: CountReport = nobody,
-) -> CodeCertificate:
+) -> CodeCertificate:  # fmt: skip
     request.check()
     f_n = rated_frequency(request, code.f_n)
     chosen = [row for row in code.rows if not rows or row.name in rows]

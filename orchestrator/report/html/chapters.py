@@ -209,14 +209,11 @@ _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"device", "buses", "confirmed", "answer"}, _site),
     ({"counted_at_all_frequencies", "failures", "modes"}, _screening),
     ({"controller", "target_mode", "T_S1", "verdict"}, _design),
-    ({"settings", "verdict", "met", "ranking"}, _coordinated),
-    ({"cells", "codes", "sentence"}, _matrix),
-    ({"sentence", "verdict", "files", "seal"}, _certificate),
-    ({"trusted", "checks", "faults"}, _check),
-    ({"scenarios", "facts", "step_size_s"}, _modes),
-    ({"expression", "deviations", "rms"}, _comparison),
+    ({"settings", "verdict", "met", "ranking"}, _coordinated), ({"cells", "codes", "sentence"}, _matrix),
+    ({"sentence", "verdict", "files", "seal"}, _certificate), ({"trusted", "checks", "faults"}, _check),
+    ({"scenarios", "facts", "step_size_s"}, _modes), ({"expression", "deviations", "rms"}, _comparison),
     ({"amplitude", "doubts"}, _identified),
-)
+)  # fmt: skip
 """What the JSON of each study has, the first that fits."""
 
 

@@ -19,16 +19,11 @@ from orchestrator.watch.finding import NOT_JUDGED
 _BARS = 8
 
 _KINDS = {
-    "growth": "the undisturbed state grows",
-    "undisturbed_motion": "the undisturbed state moves",
-    "growing_oscillation": "growing oscillation",
-    "sustained_oscillation": "sustained oscillation",
-    "run_away": "run-away",
-    "active_limit": "active limit",
-    "loss_of_synchronism": "loss of synchronism",
-    "not_judged": "not judged",
-    "not_finite": "not a number",
-}
+    "growth": "the undisturbed state grows", "undisturbed_motion": "the undisturbed state moves",
+    "growing_oscillation": "growing oscillation", "sustained_oscillation": "sustained oscillation",
+    "run_away": "run-away", "active_limit": "active limit", "loss_of_synchronism": "loss of synchronism",
+    "not_judged": "not judged", "not_finite": "not a number",
+}  # fmt: skip
 """What a run found, in words."""
 
 

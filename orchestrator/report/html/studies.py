@@ -168,12 +168,9 @@ def design(sheet: dict[str, Any]) -> str:
     sensitivity, target = sheet["sensitivity"], sheet["target_mode"]
     modes = {"Target, POD off": target, "Predicted": sheet["predicted_mode"], "Achieved": sheet["achieved_mode"]}
     settings = [
-        ["T_S1 [s]", f"{sheet['T_S1']:.4f}"],
-        ["T_S2 [s]", f"{sheet['T_S2']:.4f}"],
-        ["N_S", str(sheet["N_S"])],
-        ["K", f"{sheet['K']:.1f}"],
-        ["K before its bounds", f"{sheet['K_unbounded']:.1f}"],
-    ]
+        ["T_S1 [s]", f"{sheet['T_S1']:.4f}"], ["T_S2 [s]", f"{sheet['T_S2']:.4f}"], ["N_S", str(sheet["N_S"])],
+        ["K", f"{sheet['K']:.1f}"], ["K before its bounds", f"{sheet['K_unbounded']:.1f}"],
+    ]  # fmt: skip
     rows = []
     for name, mode in modes.items():
         percent = -100 * mode["real"] / np.hypot(mode["real"], mode["imag"])

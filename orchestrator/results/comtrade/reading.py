@@ -53,14 +53,11 @@ def read_comtrade(path: Path) -> xr.Dataset:
         for k, channel in enumerate(channels)
     }
     attributes = {
-        "scenario": str(path),
-        "station": configuration.station,
-        "device": configuration.device,
-        "comtrade_revision": configuration.revision,
-        "first_sample": configuration.start,
+        "scenario": str(path), "station": configuration.station, "device": configuration.device,
+        "comtrade_revision": configuration.revision, "first_sample": configuration.start,
         "trigger": configuration.trigger,
         "referred_to_primary": ", ".join(channel.name for channel in channels if channel.secondary),
-    }
+    }  # fmt: skip
     coordinates = {"time": ("time", times, {"units": "s"}), LINE_FREQUENCY: configuration.frequency}
     return xr.Dataset(data, coords=coordinates, attrs=attributes)
 
