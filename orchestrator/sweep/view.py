@@ -48,15 +48,7 @@ class ParameterSweep:
     def __getitem__(self, name: str) -> xr.Dataset:
         """One mode as it was followed, over scenario and varied parameters; NaN where it is not.
 
-        ``name``: of the followed mode, as `table` has it under ``mode``.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> sweep = gfor.load("two_area").sweep({"grid.X_L": [0.1, 0.2]}, ["gfor"])
-        >>> sweep["electromechanical"].damping.dims
-        ('scenario', 'grid.X_L')
-        """
+        ``name``: of the followed mode, as `table` has it under ``mode``; ``sweep["electromechanical"].damping``."""
         data = self.dataset
         names = data["trajectory_name"].values
         known = sorted({str(one) for one in names.ravel() if one})
