@@ -140,7 +140,7 @@ class ModesRequest:
     def check(self) -> None:
         """Refuse what contradicts itself."""
         if self.critical is not None and not self.frequencies[0] > 0:
-            raise InputError("--critical needs a --range that begins above 0 Hz, such as 0.1:2")
+            raise InputError("--critical needs --range to begin above 0 Hz, such as 0.1:2")
         if self.black_box and self.directional:
             raise InputError("--black-box identifies, --directional asks the FMUs for derivatives; give one of them")
 

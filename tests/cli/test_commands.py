@@ -522,7 +522,7 @@ def test_critical_modes_alone(gfor):
     [
         (("--critical", "120"), "between 0 and 90"),
         (("--critical", "0.1"), "read in percent; write 10 for a ratio of 0.1"),
-        (("--critical", "--range", "0:2"), "begins above 0"),
+        (("--critical", "--range", "0:2"), "begin above 0"),
     ],
 )
 def test_a_search_over_nothing_is_refused(gfor, arguments, word):

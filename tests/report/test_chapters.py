@@ -1,6 +1,7 @@
 """A report of results of any study: its first page, its chapters, what cannot be used, and what changed since."""
 
 import json
+import re
 import shutil
 
 import pytest
@@ -127,3 +128,13 @@ def test_a_file_that_was_changed_since_is_refused(gfor, tmp_path):
     (tmp_path / "site.json").write_text(content)
     with pytest.raises(InputError, match="SHA-256 differs"):
         write_report(tmp_path)
+
+
+def test_a_page_tells_of_the_mode_that_the_name_was_without_the_controller(gfor, tmp_path):
+    """With this gain another mode, at 0.202 Hz, fits the name as well."""
+    planted = "--set", "grid.X_L=0.3", "--set", "gfor.pod_p.K=200"
+    assert gfor("modes", "two_area", "--scenario", "gfor", "--scenario", "pod_p", *planted, "--out", tmp_path)[0] == 0
+    assert gfor("report", tmp_path, "--out", tmp_path / "page.html")[0] == 0
+    cells = re.sub(r"<[^>]+>", " ", (tmp_path / "page.html").read_text(encoding="utf-8")).split()
+    named = [(cells[k - 3], cells[k - 2]) for k, word in enumerate(cells) if word == "electromechanical"]
+    assert [pair for pair in named if pair[0] in ("gfor", "pod_p")] == [("gfor", "0.3502"), ("pod_p", "0.7257")]
