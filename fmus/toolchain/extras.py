@@ -5,7 +5,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 EXTRAS = {
-    "pythonfmu": "build", "ziglang": "build", "matpowercaseframes": "networks", "pandapower": "networks",
+    "ziglang": "build", "matpowercaseframes": "networks", "pandapower": "networks",
     "pypowsybl": "cgmes", "skrf": "black-box", "distributed": "cluster", "helics": "federation",
 }  # fmt: skip
 """Name of a library in an import → extra of this distribution that installs it."""

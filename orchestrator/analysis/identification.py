@@ -58,7 +58,7 @@ def identify_modes(
     hankel = np.lib.stride_tricks.sliding_window_view(y, pencil + 1)
     triangle, columns = scipy.linalg.qr(np.linalg.qr(hankel, mode="r"), mode="r", pivoting=True)
     size = np.abs(np.diagonal(triangle))
-    kept = triangle[: np.count_nonzero(size > _DROPPED * tolerance * size[0])]
+    kept = triangle[: max(1, np.count_nonzero(size > _DROPPED * tolerance * size[0]))]
     _, singular, right = np.linalg.svd(kept[:, np.argsort(columns)], full_matrices=False)
     order = min(int((singular > tolerance * singular[0]).sum()), max_order)
     basis = right[:order].T

@@ -31,7 +31,7 @@ def plan_fmu(
     model: str, network: Network | None = None, native: bool = False, parts: tuple[tuple[str, str], ...] = ()
 ) -> PlannedFmu:
     """FMU of a catalogue's model, described and not yet built."""
-    require(f"building the FMU {model!r} of the catalogue", "ziglang" if native else "pythonfmu")
+    require(f"building the native FMU {model!r} of the catalogue", *(["ziglang"] if native else []))
     from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
 
     place = known(entry_of(model), _asked(model, network, native, parts))

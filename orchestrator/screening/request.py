@@ -28,7 +28,8 @@ class ScreeningRequest(OverCluster):
     Examples
     --------
     >>> import orchestrator as gfor
-    >>>     >>> lines = "time,grid.X_L", "00:00,0.1", "01:00,0.5"
+    >>> from pathlib import Path
+    >>> lines = "time,grid.X_L", "00:00,0.1", "01:00,0.5"
     >>> _ = Path("day.csv").write_text(chr(10).join(lines))
     >>> screening = gfor.load("two_area").screen("day.csv", scenario="gfor")
     >>> screening.stable

@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from orchestrator.cli import run as command
-from orchestrator.cli import sweep as sweep_command
+from orchestrator.cli import study as study_command
 from orchestrator.cli.checkpoints import Checkpoints
 from orchestrator.cli.interrupted import is_interrupt
 from orchestrator.coupling.progress import Progress
@@ -103,7 +103,7 @@ def test_the_interval_of_the_checkpoints_is_kept(gfor, tmp_path, monkeypatch):
 
 
 def test_a_sweep_of_which_nothing_is_kept(gfor, tmp_path, monkeypatch):
-    for place, stage in ((sweep_command, "plan"), (PointStudy, "compute")):
+    for place, stage in ((study_command, "print_questions"), (PointStudy, "compute")):
         with monkeypatch.context() as planted:
             planted.setattr(place, stage, interrupts)
             assert gfor(*SWEEP, "--out", tmp_path) == (130, "", "interrupted\n")
@@ -113,9 +113,9 @@ def test_a_sweep_whose_points_are_kept(gfor, tmp_path, monkeypatch):
     """It is interrupted while its files are written, and another time before its points are counted."""
     said = f"points are in {tmp_path}; the same command continues from there\n"
     with monkeypatch.context() as planted:
-        planted.setattr(sweep_command, "present", interrupts)
+        planted.setattr(study_command, "present", interrupts)
         assert gfor(*SWEEP, "--out", tmp_path) == (130, "", f"interrupted: 2 of 2 {said}")
-        planted.setattr(sweep_command, "plan", interrupts)
+        planted.setattr(study_command, "print_questions", interrupts)
         assert gfor(*SWEEP, "--out", tmp_path) == (130, "", f"interrupted: {said}")
     _, text, _ = gfor(*SWEEP, "--out", tmp_path)
     assert "0 points computed, 2 were there already" in text

@@ -240,7 +240,7 @@ def test_parts_merged_are_the_whole_to_the_last_bit(gfor, day, tmp_path, monkeyp
         assert not (part / "items.csv").exists()
     code, out, _ = gfor(*common, "--out", tmp_path / "merged", "--merge", parts[0], "--merge", parts[1])
     assert code == 0
-    assert "0 computed, 5 were there already" in " ".join(out.split())
+    assert "0 items computed, 5 were there already" in " ".join(out.split())
     for name in ("items.csv", "modes.csv", "screening.json"):
         assert (tmp_path / "merged" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
@@ -253,7 +253,7 @@ def test_a_part_without_a_stretch_is_merged(gfor, day, tmp_path):
         assert gfor(*common, "--shard", f"{k}/2", "--out", part)[0] == 0
     code, out, _ = gfor(*common, "--out", tmp_path / "merged", "--merge", parts[0], "--merge", parts[1])
     assert code == 0
-    assert "0 computed, 5 were there already" in " ".join(out.split())
+    assert "0 items computed, 5 were there already" in " ".join(out.split())
 
 
 def test_modes_are_followed_over_stretches(two_area, day, tmp_path, monkeypatch):
