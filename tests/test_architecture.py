@@ -184,7 +184,7 @@ def test_plain_data_are_read_without_symbols(name):
 
 
 FOR_TYPES = {"api.certification", "api.results", "cases.given", "cli.terminal", "coupling.observers",
-             "report.plot_style", "results.recording", "results.room", "results.storage"}  # fmt: skip
+             "report.plot_style", "report.tables", "results.recording", "results.room", "results.storage"}  # fmt: skip
 """Imported by `signal compare` and `gfor verify`, which start without what computes; `imports` counts these arrows."""
 
 

@@ -51,7 +51,6 @@ class PointsDesignRequest(OverCluster):
     --------
     >>> import orchestrator as gfor
     >>> from pathlib import Path
-    from typing import Any
     >>> lines = "name,grid.X_L", "short,0.05", "long,0.3"
     >>> _ = Path("two.csv").write_text(chr(10).join(lines))
     >>> design = gfor.load("two_area").design_over_points("two.csv", damping=15)
