@@ -28,6 +28,7 @@ def pytest_configure(config):
         config.pluginmanager.register(Measure(Path(os.environ[MEASURED])), "seconds")
 
 
+@pytest.hookimpl(optionalhook=True)  # where pytest-xdist is there
 def pytest_xdist_auto_num_workers():
     """Two a core for ``-n auto``: a test waits for processes, signals and time-outs as long as it computes."""
     return 2 * len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
