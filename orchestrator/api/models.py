@@ -99,7 +99,8 @@ def build(
     flag(sources, "sources")
     if sources and not native:
         raise InputError("only native FMUs are made of C source that a tool can compile; build a native one")
-    require("building native FMUs", *(["ziglang"] if native else []))
+    if native:
+        require("building native FMUs", "ziglang")
     from fmus.toolchain.compiler import TARGETS  # noqa: PLC0415 - as above
     from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above

@@ -31,7 +31,8 @@ def plan_fmu(
     model: str, network: Network | None = None, native: bool = False, parts: tuple[tuple[str, str], ...] = ()
 ) -> PlannedFmu:
     """FMU of a catalogue's model, described and not yet built."""
-    require(f"building the native FMU {model!r} of the catalogue", *(["ziglang"] if native else []))
+    if native:
+        require(f"building the native FMU {model!r} of the catalogue", "ziglang")
     from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
 
     place = known(entry_of(model), _asked(model, network, native, parts))

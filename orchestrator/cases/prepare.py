@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from fmus.grid.network import Network
 from fmus.toolchain.catalogue import model_names, network_of, parts_of
+from fmus.toolchain.extras import installed_version
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import assign_values
@@ -225,8 +226,10 @@ class Preparer:
             self.draft.note_network(self.draft.given.place("units", origin.common.removesuffix("_parameters")), text)
 
     def _is_native(self, name: str, table: ComponentTable) -> bool:
-        """The kind of FMU that a component of the catalogue gets; the strongest layer decides."""
-        native = table.native
+        """The kind of FMU that a component of the catalogue gets; the strongest layer decides.
+
+        What the component's table wants is for speed alone, with the same bits, and needs a compiler to be there."""
+        native = table.native and bool(installed_version("ziglang"))
         for choice in (choice for layer in self.draft.given.layers for choice in layer.natives if choice.fits(name)):
             try:
                 native = choice.native

@@ -54,7 +54,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
     if options.sources and not options.native:
         raise InputError("--sources is for native FMUs, which are compiled from C; add --native")
-    require("building native FMUs", *(["ziglang"] if options.native else []))
+    if options.native:
+        require("building native FMUs", "ziglang")
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     parts = {part: name for part in PARTS if (name := getattr(options, part)) is not None}
     if parts and not options.names:
