@@ -18,7 +18,8 @@ from orchestrator.certification.case_file import FMU
 from orchestrator.certification.experiments import experiments_of
 from orchestrator.certification.files import JSON, read_record
 from orchestrator.certification.issue import NTS631
-from orchestrator.errors import InputError
+from orchestrator.errors import FmuFileError, InputError
+from orchestrator.fmi.archive import extract, names_in
 from orchestrator.safe_files import write_bytes
 from orchestrator.ssp.reference_experiment import FOLDER as LS_REF
 from orchestrator.ssp.reference_experiment import manifest
@@ -64,7 +65,7 @@ def put_inside(folder: Path, fmu: Path, target: Path) -> Path:
 def check_target(fmu: Path, target: Path) -> tuple[bytes, Mapping[str, bytes]]:
     """Refuse an FMU or a file that a certificate cannot go into; gives the FMU and the members that others left."""
     tested = fmu.read_bytes()
-    _check_names(tested, fmu)
+    _check_names(fmu)
     return tested, _others(target, tested) if target.exists() else {}
 
 
@@ -80,31 +81,30 @@ def laid_out(certificate: Path) -> Iterator[list[Path]]:
 
 def taken_out(fmu: Path, into: Path) -> list[Path]:
     """Lay each certificate of an FMU into a folder of its own, beside the FMU that was tested."""
-    content = fmu.read_bytes()
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            members = {name: archive.read(name) for name in archive.namelist() if name.startswith(f"{FOLDER}/")}
-    except (OSError, zipfile.BadZipFile, RuntimeError, ValueError) as error:
-        raise InputError(f"{fmu}: it is no FMU: {error}") from error
-    tested = _tested(content, members)
-    if tested is None:
+    tested = _unpacked(fmu, into)
+    folders = sorted(place for place in (into / FOLDER).glob("*") if place.is_dir())
+    if tested is None or not folders:
         raise InputError(f"{fmu}: there is no certificate in it; `gfor certify --into` writes one, and a certificate "
                          "beside an FMU is verified by its folder")  # fmt: skip
-    codes = sorted({name.split("/")[2] for name in members if name.count("/") > 2})
-    for name, data in [*members.items(), *((f"{FOLDER}/{code}/{FMU}", tested) for code in codes)]:
-        parts = name.split("/")[2:]
-        if any(part in ("", ".", "..") or "\\" in part or ":" in part for part in parts):
-            raise InputError(f"{fmu}: the member {name!r} leads out of its folder")
-        write_bytes(into.joinpath(*parts), data)
-    return [into / code for code in codes]
+    for folder in folders:
+        write_bytes(folder / FMU, tested)
+    return folders
 
 
-def _check_names(tested: bytes, fmu: Path) -> None:
+def _unpacked(fmu: Path, into: Path) -> bytes | None:
+    """Unpack an FMU, which anybody may have made; gives the file that was tested, None without certificates.
+
+    The hash of what was tested is compared with the certificates' later."""
+    extract(fmu, into)
     try:
-        with zipfile.ZipFile(io.BytesIO(tested)) as archive:
-            names = archive.namelist()
-    except zipfile.BadZipFile as error:
-        raise InputError(f"--into: {fmu} is no FMU, which alone takes a certificate: {error}") from error
+        said: dict[str, Any] = json.loads((into / _TESTED).read_bytes())
+        return fmu.read_bytes()[: said["members_end"]] + b64decode(said["directory"], validate=True)
+    except (OSError, KeyError, ValueError, TypeError):
+        return None
+
+
+def _check_names(fmu: Path) -> None:
+    names = names_in(fmu)
     if taken := [name for name in names if name.startswith(f"{FOLDER}/")]:
         raise InputError(f"--into: {fmu} holds {taken[0]}; certify the FMU without certificates, and name this file "
                          "as --into: the new certificate joins those in it")  # fmt: skip
@@ -115,16 +115,17 @@ def _check_names(tested: bytes, fmu: Path) -> None:
 
 def _others(target: Path, tested: bytes) -> Mapping[str, bytes]:
     """The certificates that a file holds, of the FMU that was tested."""
-    content = target.read_bytes()
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            found = {name: archive.read(name) for name in archive.namelist() if name.startswith(f"{FOLDER}/")}
-    except zipfile.BadZipFile as error:
-        raise InputError(f"--into: {target} exists and is no FMU: {error}; name another file") from error
-    if _tested(content, found) != tested:
-        raise InputError(f"--into: {target} exists and is not the FMU that was tested, with certificates; name another "
-                         "file")  # fmt: skip
-    return {name: data for name, data in found.items() if name != _TESTED}
+    with TemporaryDirectory() as folder:
+        place = Path(folder)
+        try:
+            same = _unpacked(target, place) == tested
+        except FmuFileError as error:
+            raise InputError(f"--into: {target} exists and is no FMU: {error}; name another file") from error
+        if not same:
+            raise InputError(f"--into: {target} exists and is not the FMU that was tested, with certificates; name "
+                             "another file")  # fmt: skip
+        files = {file.relative_to(place).as_posix(): file for file in sorted((place / FOLDER).rglob("*"))}
+        return {name: file.read_bytes() for name, file in files.items() if file.is_file() and name != _TESTED}
 
 
 def _signature(tested: bytes) -> bytes:
@@ -133,15 +134,6 @@ def _signature(tested: bytes) -> bytes:
     said = {"sha256": hashlib.sha256(tested).hexdigest(), "members_end": directory,
             "directory": b64encode(tested[directory:]).decode()}  # fmt: skip
     return (json.dumps(said, indent=1) + "\n").encode()
-
-
-def _tested(content: bytes, members: Mapping[str, bytes]) -> bytes | None:
-    """The file that was tested, from the one that holds certificates; its hash is compared with theirs later."""
-    try:
-        said: dict[str, Any] = json.loads(members[_TESTED])
-        return content[: said["members_end"]] + b64decode(said["directory"], validate=True)
-    except (KeyError, ValueError, TypeError):
-        return None
 
 
 def _purpose(name: str) -> tuple[str, str, str]:

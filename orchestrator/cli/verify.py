@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         said = [one for one, _ in found]
         print_json(said[0] if options.certificate.suffix.lower() != ".fmu" else {"certificates": said})
     codes = [code for _, code in found]
-    return DOES_NOT_HOLD if DOES_NOT_HOLD in codes else max(codes, key=bool)
+    return DOES_NOT_HOLD if DOES_NOT_HOLD in codes else next(filter(None, codes), 0)
 
 
 def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any], int]:
@@ -76,7 +76,8 @@ def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any],
             "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
             "agreed": found.agreed, "computed": chosen if computed else []}  # fmt: skip
     if not options.json:
-        console.print(escape(f"{content['title']}:" if place != options.certificate else ""), highlight=False)
+        if place != options.certificate:
+            console.print(escape(f"{content['title']}:"), highlight=False)
         _show(found, content, chosen, console, computed=computed, norm=norm)
     code = exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
     return said | ({"code": content.get("code", NTS631)} if place != options.certificate else {}), code

@@ -121,6 +121,29 @@ def test_a_changed_byte_of_the_fmu_does_not_hold(certified, tmp_path, gfor_comma
     )
 
 
+def test_a_file_of_a_stranger_is_refused_in_words(certified, tmp_path, gfor_command):
+    """No certificate is left in it, its archive is damaged, a member leads out of its folder."""
+    emptied, cut, hostile = (tmp_path / f"{name}.fmu" for name in ("emptied", "cut", "hostile"))
+    with zipfile.ZipFile(certified) as old, zipfile.ZipFile(emptied, "w") as new:
+        for name in old.namelist():
+            if not name.startswith(f"{FOLDER}/ercot/"):
+                new.writestr(name, old.read(name))
+    content = bytearray(certified.read_bytes())
+    with zipfile.ZipFile(certified) as archive:
+        begin = archive.getinfo(f"{FOLDER}/ercot/responses.nc").header_offset
+    content[begin + 200 : begin + 400] = bytes(200)
+    cut.write_bytes(content)
+    shutil.copy(certified, hostile)
+    with zipfile.ZipFile(hostile, "a") as archive:
+        archive.writestr(f"{FOLDER}/ercot/../../../../out.json", "{}")
+    for fmu, words in ((emptied, "there is no certificate in it"), (cut, "damaged"), (hostile, "a path out of")):
+        code, _, said = gfor_command("verify", fmu, "--files-only")
+        assert code == 2
+        assert words in " ".join(said.split()), said
+    with pytest.raises(gfor.CosimError, match="no certificate in it"):
+        gfor.verify(emptied, anew=())
+
+
 def test_what_cannot_take_a_certificate_is_refused_before_anything_is_computed(
     certified, converter, tmp_path, gfor_command
 ):
