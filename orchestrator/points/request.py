@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from orchestrator.asked import FLAG, NAMES, FieldKind, asked, text_or_none
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
+from orchestrator.asked import FLAG, FREQUENCIES, NAMES, FieldKind, asked, text_or_none
 from orchestrator.cases.given import Paths, Time, case_values, in_seconds, kept, parameter_files
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
@@ -42,6 +43,11 @@ def of_values() -> Any:
         _VALUES, None, 'values by ``component.variable``, as with ``--set``: numbers, truth values, or text such as '
         '``"1350 MW"``; they go before the parameter files', option=None,
     )  # fmt: skip
+
+
+def of_frequencies(python: str = "") -> Any:
+    """The range of a study's modes; ``python`` says what they are for where "frequencies" does not."""
+    return asked(FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range", python=python)
 
 
 class _Layered:

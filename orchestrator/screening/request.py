@@ -5,11 +5,10 @@ from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Any
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.asked import FLAG, FREQUENCIES, OUTAGES, FieldKind, Names, asked, one_of, percent, read_percent
+from orchestrator.asked import FLAG, OUTAGES, FieldKind, Names, asked, one_of, percent, read_percent
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import InputError
-from orchestrator.points.request import POINTS_FILE, OverCluster, of_scenario, of_values
+from orchestrator.points.request import POINTS_FILE, OverCluster, of_frequencies, of_scenario, of_values
 from orchestrator.screening.modes import MOST_DAMPING, CriticalRegion
 
 _MOST = 100 * MOST_DAMPING
@@ -54,10 +53,9 @@ class ScreeningRequest(OverCluster):
         one_of(SharingRule), None, "who feeds what an outage takes: droop (units by droop and rating, the default), "
         "rating, or slack (the slack alone)",
     )  # fmt: skip
-    frequencies: tuple[float, float] = asked(
-        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range",
-        python="modes from the first to the second are critical [Hz], where they are damped less than ``damping``",
-    )  # fmt: skip
+    frequencies: tuple[float, float] = of_frequencies(
+        "modes from the first to the second are critical [Hz], where they are damped less than ``damping``"
+    )
     damping: float = asked(_DAMPING, 0.2, "damping below which a mode is critical, at most 60 (default: 20)")
     whole: bool = asked(
         FLAG, False, "count growing modes of all frequencies at every point; takes longer",

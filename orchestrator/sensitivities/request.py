@@ -3,10 +3,9 @@
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.asked import FLAG, FREQUENCIES, NAME, NAMES, Names, asked
+from orchestrator.asked import FLAG, NAME, NAMES, Names, asked
 from orchestrator.points.points import nobody
-from orchestrator.points.request import ANYTHING
+from orchestrator.points.request import ANYTHING, of_frequencies
 
 
 @dataclass(frozen=True)
@@ -45,9 +44,7 @@ class SensitivitiesRequest:
         FLAG, False, "partial derivatives at the held operating point, instead of the total ones; tunable parameters "
         "only",
     )  # fmt: skip
-    frequencies: tuple[float, float] = asked(
-        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range"
-    )
+    frequencies: tuple[float, float] = of_frequencies()
     directional: bool = asked(
         FLAG, False, "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)"
     )

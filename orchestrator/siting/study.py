@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, cast
 
 from orchestrator.analysis.linearization import Blocks
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, damping_percent
+from orchestrator.analysis.modes import damping_percent
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.asked import FILE, FREQUENCIES, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
+from orchestrator.asked import FILE, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable
@@ -17,7 +17,7 @@ from orchestrator.errors import CosimError, InputError
 from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import INTACT, read_outages
 from orchestrator.operating_points.preparation import ItemPreparation, failure
-from orchestrator.points.request import OfCase, of_scenario, of_values
+from orchestrator.points.request import OfCase, of_frequencies, of_scenario, of_values
 from orchestrator.siting.confirmation import Confirmation, confirmed
 from orchestrator.siting.placing import converter, foreign, name_at, placed
 from orchestrator.siting.residues import SeenMode, Situation, situation_of
@@ -60,9 +60,7 @@ class SiteRequest(OfCase):
         POSITIVE, 10.0, "damping of poorly damped modes (default: 10)", "PERCENT",
         python="damping [%] of the modes that are looked at; the least damped one where none is damped so little",
     )  # fmt: skip
-    frequencies: tuple[float, float] = asked(
-        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range"
-    )
+    frequencies: tuple[float, float] = of_frequencies()
     outages: Names | None = asked(OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)")
     confirm: int = asked(RANKED, 3, "confirm the best N by coupled FMUs (default: 3)", python="how many of the best "
                          "buses are confirmed by coupled FMUs")  # fmt: skip

@@ -4,11 +4,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
-from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.asked import FREQUENCIES, FieldKind, Names, asked, plain_value
+from orchestrator.asked import FieldKind, Names, asked, plain_value
 from orchestrator.cases.given import check_case_name
 from orchestrator.errors import InputError
-from orchestrator.points.request import OverCluster, of_scenarios, of_values
+from orchestrator.points.request import OverCluster, of_frequencies, of_scenarios, of_values
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.limit import Until
 
@@ -107,7 +106,4 @@ class SweepRequest(OverCluster):
         'damping such as ``"5 %"``: bisect how far the only range that is varied may go, such as ``"grid.X_L=0.1:2"``; '
         "the result is in ``limits``",
     )  # fmt: skip
-    frequencies: tuple[float, float] = asked(
-        FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range",
-        python="modes from the first to the second are followed [Hz]",
-    )  # fmt: skip
+    frequencies: tuple[float, float] = of_frequencies("modes from the first to the second are followed [Hz]")
