@@ -51,10 +51,11 @@ def test_points_are_tables_and_mappings():
         case.screen({"short": {"grid.X_l": 0.1}}, scenario="gfor")
 
 
-def test_a_binding_is_a_mapping():
-    binding = tomllib.loads(gfor.bind(gfor.build("gfor")))
+def test_a_binding_is_a_mapping(tmp_path):
+    fmu = gfor.build("gfor", tmp_path)
+    binding = tomllib.loads(gfor.bind(fmu))
     with pytest.raises(gfor.CosimError, match=r"binding\.toml"):
-        gfor.open_fmu(gfor.build("gfor"), binding=binding | {"voltage": {}})
+        gfor.open_fmu(fmu, binding=binding | {"voltage": {}})
 
 
 @pytest.fixture(scope="module")
