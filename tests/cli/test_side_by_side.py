@@ -45,7 +45,7 @@ def untimed(text, folder):
     lines = text.splitlines()
     first = next(n for n, line in enumerate(lines) if line.strip() == "Run")
     end = next(n for n in range(first, len(lines)) if lines[n].startswith("└"))
-    return "\n".join(lines[:first] + lines[end:]).replace(str(folder), "")
+    return "\n".join(lines[:first] + lines[end + 1 :]).replace(str(folder), "")
 
 
 @pytest.mark.slow
