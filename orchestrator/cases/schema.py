@@ -574,6 +574,12 @@ class ConventionsTable(Table):
     governor_gives: Literal["power", "torque"] | None = None
 
 
+class DiagramTable(Table):
+    """The network as ``gfor explore`` draws it: places of buses, to the right and downwards, about 900 by 600."""
+
+    positions: dict[str, tuple[float, float]] = {}
+
+
 class CaseTable(Table):
     """A whole case file; ``meant`` names values ``component.variable`` that are unusual on purpose, ``directory`` is
     what paths are relative to, the file's own folder where None."""
@@ -599,3 +605,4 @@ class CaseTable(Table):
     analysis: AnalysisTable = AnalysisTable()
     reference: ReferenceTable | None = None
     plots: list[PlotTable] = []
+    diagram: DiagramTable = DiagramTable()

@@ -16,12 +16,16 @@ from orchestrator.errors import InputError
 from orchestrator.explore.saved import save_page
 from orchestrator.explore.server import Explorer
 from orchestrator.explore.worker import Desk
+from orchestrator.report.cells import read_cells
 from orchestrator.sweep.axes import parse_vary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "case", metavar="CASE", help="a built-in case (two_area), or the path of a case file or an .ssp"
+        "case",
+        metavar="CASE",
+        help="a built-in case (two_area), the path of a case file or an .ssp, or a folder of "
+        "gfor screen, sweep or interactions",
     )
     option(parser, "--scenario", "NAME", "the one that is shown first (default: the case's last one)")
     repeatable(parser, "--set", "COMPONENT.PARAMETER=VALUE", "a value to begin with (repeatable)", read=assignment)
@@ -40,13 +44,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Serve the page until it was closed for a minute, or Ctrl-C."""
-    case = load(options.case, trust_fmus=options.trust_fmus)
-    name = options.scenario or case.scenarios[-1]
+    study = read_cells(Path(options.case)) if Path(options.case).is_dir() else None
+    word = options.case if study is None else study["case"]
+    case = load(word, trust_fmus=options.trust_fmus)
+    name = options.scenario or (case.scenarios[-1] if study is None else study["scenario"])
     if name not in case.scenarios:
         raise InputError(f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}")
     beginning = {"case": case.name, "scenario": name, "values": values_set(options), "range": list(options.range)}
+    if study is not None:
+        beginning |= {"study": study, "values": study["values"] | beginning["values"], "range": study["range"]}
     if options.save is not None:
-        desk = Desk(options.case, options.trust_fmus)
+        desk = Desk(word, options.trust_fmus)
         with shown_progress("Points", shown=True) as report, catch_warnings():
             simplefilter("ignore", UnusualDataWarning)  # the page has them
             save_page(options.save, case, desk, beginning, options.vary, report)
@@ -54,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.vary:
         raise InputError("--vary is for a page that is saved; give --save FILE.html as well, or drag the slider")
-    explorer = Explorer(options.case, beginning, port=options.port, trust_fmus=options.trust_fmus)
+    explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus)
     print(f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)", flush=True)
     if not options.no_browser:
         webbrowser.open(explorer.address)

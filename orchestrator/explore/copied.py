@@ -1,8 +1,10 @@
 """What stands in the page, as text that makes it again: a command, a scenario of a case file, and Python."""
 
+import json
 import shlex
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import tomli_w
@@ -10,15 +12,22 @@ import tomli_w
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import flatten
+from orchestrator.errors import InputError
+from orchestrator.results.staging import new_run_id
+from orchestrator.safe_files import made_folder, write_text
 
 EXPLORED = "explored"
 """Name of the scenario that a state of the page becomes."""
 
 
 def copied(
-    file: CaseFile, word: str, scenario: str, values: Mapping[str, Value], frequencies: tuple[float, float]
-) -> dict[str, str]:
-    """``command``, ``toml`` and ``python``; ``word`` is the case as it was given."""
+    file: CaseFile, word: str, scenario: str, values: Mapping[str, Value], frequencies: tuple[float, float],
+    events: Sequence[Mapping[str, Any]] | None = None, places: Mapping[str, Sequence[float]] | None = None,
+) -> dict[str, str]:  # fmt: skip
+    """``command``, ``toml`` and ``python``; ``word`` is the case as it was given.
+
+    ``events``: instead of the scenario's; they do not move the modes, and a command has none. ``places``: of buses in
+    the diagram."""
     low, high = frequencies
     sets = [
         text
@@ -26,14 +35,53 @@ def copied(
         for text in ("--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}")
     ]
     words = ["gfor", "modes", word, "--scenario", scenario, *sets, "--range", f"{low!r}:{high!r}"]
+    case = f"gfor.load({word!r})"
+    if events is not None:
+        case += f".with_(scenarios={ {scenario: {'events': list(events)}}!r})"
     lines = [
-        "import orchestrator as gfor", "", f"scenario = gfor.load({word!r}).scenario({scenario!r}, {dict(values)!r})",
+        "import orchestrator as gfor", "", f"scenario = {case}.scenario({scenario!r}, {dict(values)!r})",
         f"modes = scenario.modes(({low!r}, {high!r}))", "print(modes.stability.sentence())", "print(modes.table())",
     ]  # fmt: skip
-    return {"command": shlex.join(words), "toml": as_scenario(file, scenario, values), "python": "\n".join(lines)}
+    return {
+        "command": shlex.join(words),
+        "toml": as_scenario(file, scenario, values, places),
+        "python": "\n".join(lines),
+    }
 
 
-def as_scenario(file: CaseFile, scenario: str, values: Mapping[str, Value]) -> str:
+def events_of(file: CaseFile, scenario: str) -> list[dict[str, Any]]:
+    """The events of a scenario, as its file has them."""
+    try:
+        raw = tomllib.loads(file.text)
+        own = raw["scenarios"][scenario].get("events")
+        return list(own if own is not None else raw.get("events", []))
+    except (tomllib.TOMLDecodeError, KeyError):  # of an SSP
+        own = file.scenarios[scenario].events
+        return [
+            event.model_dump(mode="json", exclude_unset=True) for event in (file.table.events if own is None else own)
+        ]
+
+
+def saved(file: CaseFile, toml: str, folder: Path) -> Path:
+    """Write a copy of the case file with one scenario more, as `as_scenario` gives it; the file as it is stays."""
+    head = "" if file.table.directory else f"directory = {json.dumps(str(file.directory.resolve()))}\n"
+    try:
+        given = tomllib.loads(file.text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{file.path}: it is no TOML file, so that no scenario can be added: {error}") from error
+    added = tomllib.loads(toml)
+    if EXPLORED in given.get("scenarios", {}):
+        raise InputError(f"{file.path}: it has a scenario {EXPLORED!r} already; rename that one, then save again")
+    if "diagram" in given:
+        added.pop("diagram", None)
+    place = made_folder(folder) / f"{file.name}_{new_run_id()}.toml"
+    write_text(place, f"{head}{file.text.rstrip()}\n\n{tomli_w.dumps(added)}")
+    return place
+
+
+def as_scenario(
+    file: CaseFile, scenario: str, values: Mapping[str, Value], places: Mapping[str, Sequence[float]] | None = None
+) -> str:
     """A scenario of the case with further values, to be put at the end of its file."""
     try:
         table: dict[str, Any] = dict(tomllib.loads(file.text)["scenarios"][scenario])
@@ -42,4 +90,5 @@ def as_scenario(file: CaseFile, scenario: str, values: Mapping[str, Value]) -> s
     kept = {".".join(path): value for path, value in flatten(table.get("set", {})) if ".".join(path) not in values}
     table["set"] = {**kept, **values}
     table["title"] = f"{table.get('title') or scenario}, explored"
-    return tomli_w.dumps({"scenarios": {EXPLORED: table}})
+    diagram = {"diagram": {"positions": {bus: list(xy) for bus, xy in places.items()}}} if places else {}
+    return tomli_w.dumps({"scenarios": {EXPLORED: table}, **diagram})

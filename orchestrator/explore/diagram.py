@@ -38,10 +38,12 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     ends = [(line["from"], line["to"]) for line in lines]
     points = places(network.buses, ends)
     points += np.array([WIDTH, HEIGHT]) / 2 - (points.max(axis=0) + points.min(axis=0)) / 2
+    given = prepared.case.table.diagram.positions
+    at = [given.get(bus, tuple(xy)) for bus, xy in zip(network.buses, points.tolist(), strict=True)]
     return {
         "width": WIDTH,
         "height": HEIGHT,
-        "buses": [{"name": bus, "x": x, "y": y} for bus, (x, y) in zip(network.buses, points.tolist(), strict=True)],
+        "buses": [{"name": bus, "x": x, "y": y} for bus, (x, y) in zip(network.buses, at, strict=True)],
         "lines": lines,
         "loads": [
             {

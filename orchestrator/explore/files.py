@@ -7,7 +7,7 @@ from typing import Any
 from orchestrator.report.html.elements import held_data
 
 PAGE = "page.html"
-SCRIPTS = ("base.js", "map.js", "table.js", "values.js", "network.js", "response.js", "page.js")
+SCRIPTS = ("base.js", "map.js", "table.js", "values.js", "network.js", "response.js", "study.js", "page.js")
 STYLE = "page.css"
 FILES = {
     PAGE: "text/html; charset=utf-8",

@@ -14,15 +14,20 @@ from typing import Any
 from orchestrator.api.case import Case, load
 from orchestrator.api.scenario import Scenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import CosimError
-from orchestrator.explore.copied import copied
+from orchestrator.explore.copied import as_scenario, copied, events_of, saved
 from orchestrator.explore.diagram import diagram
 from orchestrator.explore.responses import linear, plotted, simulated
 from orchestrator.explore.slopes import slopes
 from orchestrator.fmi.interrupts import calls
+from orchestrator.operating_points.item import Item
+from orchestrator.operating_points.preparation import ItemPreparation
 from orchestrator.spelling import as_options
 
 Say = Callable[[dict[str, Any]], None]
+
+_FOLDER = Path("results") / "explore"
 
 
 class Desk:
@@ -34,24 +39,33 @@ class Desk:
         self._stamp: list[float] = []
 
     def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
-        """What is asked for under ``ask``: open, parameters, modes, slopes, response or run."""
+        """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, run or save."""
         ask = str(question["ask"])
         case = self._read()
         if ask == "open":
             titles = {name: table.title or name for name, table in case.file.scenarios.items()}
             named = case.file.table.title or case.name
             return {"case": case.name, "title": named, "scenarios": titles, "stamp": self._stamp}
-        scenario = partial(case.scenario, question["scenario"])
+        events, original = question.get("events"), case
+        if events is not None:
+            case = case.with_(scenarios={question["scenario"]: {"events": events}})
+        name = str(question["scenario"])
+        scenario = partial(case.scenario, name)
         values: dict[str, Value] = dict(question.get("values") or {})
         low, high = question.get("range") or (0.1, 2.0)
         signals = question.get("signals") or ()
+        if ask == "cell":
+            return {"values": _values_of(case, question, values), "stamp": self._stamp}
         answers: dict[str, Callable[[], dict[str, Any]]] = {
-            "parameters": lambda: _parameters(scenario(values)),
-            "modes": lambda: self._modes(case, scenario(values), values, (low, high)),
+            "parameters": lambda: _parameters(case, scenario(values)),
+            "modes": lambda: self._modes(case, scenario(values), values, (low, high), question),
             "slopes": lambda: slopes(
                 scenario, values, str(question["parameter"]), (low, high), lambda text: say({"progress": text})
             ),
             "response": lambda: linear(scenario(values), signals),
+            "save": lambda: {
+                "file": str(saved(original.file, as_scenario(case.file, name, values, question.get("places")), _FOLDER))
+            },
             "run": lambda: simulated(scenario(values), signals, lambda part: say({"part": part})),
         }
         return {**answers[ask](), "stamp": self._stamp}
@@ -64,8 +78,9 @@ class Desk:
         return self._case
 
     def _modes(
-        self, case: Case, scenario: Scenario, values: Mapping[str, Value], frequencies: tuple[float, float]
-    ) -> dict[str, Any]:
+        self, case: Case, scenario: Scenario, values: Mapping[str, Value], frequencies: tuple[float, float],
+        question: Mapping[str, Any],
+    ) -> dict[str, Any]:  # fmt: skip
         """The JSON of ``gfor modes``, the verdict in its words, and what reproduces it."""
         modes = scenario.modes(frequencies)
         hidden = modes.result.hidden
@@ -75,18 +90,34 @@ class Desk:
             "verdict": modes.stability.sentence(),
             "outside": None if hidden is None else hidden.sentence(),
             "swings": [modes.result.swing_of(mode) for mode in modes],
-            "copied": copied(case.file, self._word, scenario.name, values, frequencies),
-        }
+            "copied": copied(
+                case.file, self._word, scenario.name, values, frequencies, question.get("events"),
+                question.get("places"),
+            ),
+        }  # fmt: skip
 
 
-def _parameters(scenario: Scenario) -> dict[str, Any]:
+def _values_of(case: Case, question: Mapping[str, Any], values: dict[str, Value]) -> dict[str, Value]:
+    """Values by which the case is at a cell of a study: at an operating point, with its outage."""
+    own, lost = ([str(name) for name in question.get(key) or ()] for key in ("own", "lost"))
+    if not own and not lost:
+        return values
+    rule = question.get("sharing")
+    preparation = ItemPreparation(
+        case.file, question["scenario"], (), sharing=None if rule is None else SharingRule(rule)
+    )
+    lost = [name for name in lost if name not in own]
+    return preparation.live(Item(0, int(bool(lost)), values, (*own, *lost), tuple(lost)))
+
+
+def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:
     """The parameters that a slider or a switch can set, the signals that can be drawn, and the diagram."""
     listed = scenario.parameters().reset_index().to_dict("records")
     return {
         "parameters": [row for row in listed if row["type"] in ("Real", "Integer", "Boolean")],
         "signals": list(scenario.prepared.record),
         "plotted": plotted(scenario),
-        "events": [str(event) for event in scenario.prepared.events],
+        "events": events_of(case.file, scenario.name),
         "diagram": diagram(scenario),
     }
 

@@ -21,6 +21,7 @@ from orchestrator.interactions.study import InteractionsResult
 from orchestrator.interactions.systems import Kind, SystemName
 from orchestrator.interactions.words import damping_text, frequency_text, sentences, stand_in_sentence, verdict_word
 from orchestrator.late import pd
+from orchestrator.report.cells import CELLS, Cell, Cells, CellLine
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, paragraphs
 from orchestrator.report.notebook import page
@@ -116,7 +117,20 @@ class Interactions:
                 save_table(rows, staging / name)
             save_json(self.as_json(), staging / SUMMARY)
             write_text(staging / PAGE, _page(self))
-        return [place / name for name in (*wanted, SUMMARY, PAGE)]
+            self._cells().save(staging, place)
+        return [place / name for name in (*wanted, SUMMARY, CELLS, PAGE)]
+
+    def _cells(self) -> Cells:
+        """The vendors by the vendors: each alone on the diagonal, and each pair."""
+        plan = self.result.plan
+
+        def cell(system: JudgedSystem) -> Cell:
+            return Cell(f"{verdict_word(system)}, {damping_text(system)} %", system.least_damping, system.stable)
+
+        sides = [CellLine(vendor, None) for vendor in plan.vendors]
+        pairs = [[cell(_together(self.judgement, a, b)) for b in plan.vendors] for a in plan.vendors]
+        title = f"Least damping of vendors alone and in pairs; {stand_in_sentence(self.judgement)}"
+        return Cells(title, plan.case, plan.prepared.name, (0.1, 2.0), sides, sides, pairs)
 
     def __repr__(self) -> str:
         plan = self.result.plan
@@ -278,18 +292,18 @@ def _page(found: Interactions) -> str:
 
 def _pairs(judgement: JudgedInteractions, figures: Figures) -> str:
     vendors = judgement.result.plan.vendors
-
-    def at(a: str, b: str) -> JudgedSystem:
-        pair = (a,) if a == b else tuple(sorted((a, b), key=vendors.index))
-        return judgement.systems[SystemName(Kind.PAIR if len(pair) > 1 else Kind.ALONE, pair)]
-
     text = (
         "Least damping [%] of each vendor alone, on the diagonal, and of each pair; "
         f"{stand_in_sentence(judgement)}. U: unstable; ?: not known."
     )
-    cells = [[at(row, column) for column in vendors] for row in vendors]
+    cells = [[_together(judgement, row, column) for column in vendors] for row in vendors]
     picture = _heat_picture("Least damping of vendors alone and in pairs", vendors, cells)
     return figures.add(picture, text)[0] + systems_table(judgement).html()
+
+
+def _together(judgement: JudgedInteractions, a: str, b: str) -> JudgedSystem:
+    pair = (a,) if a == b else tuple(sorted((a, b), key=judgement.result.plan.vendors.index))
+    return judgement.systems[SystemName(Kind.PAIR if len(pair) > 1 else Kind.ALONE, pair)]
 
 
 def _swap(judgement: JudgedInteractions, figures: Figures) -> str:

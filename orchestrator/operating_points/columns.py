@@ -13,7 +13,7 @@ from orchestrator.errors import InputError
 from orchestrator.units import read_value
 
 IN_SERVICE, ACTIVE, REACTIVE = "in_service", "P_mw", "Q_mvar"
-_SWITCHES = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
+_SWITCHES = {"1": True, "1.0": True, "true": True, "yes": True, "0": False, "0.0": False, "false": False, "no": False}
 
 
 @dataclass(frozen=True)

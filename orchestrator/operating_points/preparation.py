@@ -87,6 +87,18 @@ class ItemPreparation:
             text = lost_and_shared(units, loads, valued, self.elements.grid, dispatch, found)
         return PreparedItem(without_units(found, remains.units, self.elements), text)
 
+    def live(self, item: Item) -> dict[str, Value]:
+        """Values by which the case alone is at an item: what is off, and what units feed instead of what was lost.
+
+        Raises as `prepared`."""
+        remains = what_remains(valued := self._valued(item), self.elements, item.out)
+        prepared = self.prepared(item)
+        found = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
+        flow, left = prepared.scenario.power_flow, prepared.scenario.system.components
+        if prepared.text and flow is not None:
+            found |= {f"{name}.P_0": power.real for name, power in flow.powers.items() if name in left and power}
+        return found
+
     def _before_outage(self, item: Item, own: tuple[str, ...], without: Remains) -> PreparedScenario:
         """The item's operating point before its outage; that of the last item serves all of one point."""
         if self._before is None or self._before[0] != item.point:

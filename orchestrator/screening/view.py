@@ -11,6 +11,7 @@ from rich.markup import escape as escape_markup
 
 from orchestrator.late import pd
 from orchestrator.operating_points.item import Status
+from orchestrator.report.cells import CELLS, Cell, Cells, CellLine
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, colour, paragraphs
@@ -74,13 +75,14 @@ class Screening:
         return as_json(self.summary)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write ``items.csv``, ``modes.csv``, ``screening.json`` and the page ``screening.html`` into a folder."""
+        """Write ``items.csv``, ``modes.csv``, ``screening.json``, ``cells.json`` and the page ``screening.html``."""
         place = made_folder(Path(folder))
         items_table(self.summary).save(place / ITEMS)
         _every_mode(self.summary).save(place / MODES)
         save_json(self.as_json(), place / SUMMARY)
+        _cells(self.summary).save(place, place)
         write_text(place / PAGE, _page(self.summary))
-        return [place / name for name in (ITEMS, MODES, SUMMARY, PAGE)]
+        return [place / name for name in (ITEMS, MODES, SUMMARY, CELLS, PAGE)]
 
     def __repr__(self) -> str:
         return f"<Screening of {self.result.plan.case.name}: {self.verdict}>"
@@ -108,6 +110,35 @@ def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
         Column("", lambda item: "; ".join(filter(None, (item.record.text, *item.record.warnings))), name="why"),
         Column("Why", lambda item: item.record.text),
     ), summary.result.items, left=4)  # fmt: skip
+
+
+def _cells(summary: Summary) -> Cells:
+    """Outages by operating points, the worst outage first."""
+    result, plan = summary.result, summary.result.plan
+    of = {(item.outage.name, item.point.name): item for item in result.items}
+    taken = {one.name: one.elements for one in plan.outages}
+    outages = [row.name for row in by_outage(summary)]
+
+    def cell(item: ScreenedItem | None) -> Cell | None:
+        if item is None:
+            return None
+        least, record = _least(item), item.record
+        text = "; ".join(filter(None, ("" if record.status is Status.COMPUTED else record.status, record.text)))
+        if least is None:
+            return Cell(text or f"no mode below {100 * plan.wanted.damping:g} %", None, record.stable)
+        figures = f"{least.frequency:.3f} Hz, {least.damping:.2f} %"
+        return Cell("; ".join(filter(None, (figures, text))), least.damping, record.stable, least.value.real,
+                    least.frequency)  # fmt: skip
+
+    return Cells(
+        f"Least damping of {plan.case.table.title or plan.case.name}: outages, worst first, by operating points",
+        plan.case,
+        plan.prepared.name, (plan.wanted.lowest_hz, plan.wanted.highest_hz),
+        [CellLine(name, out=taken[name]) for name in outages],
+        [CellLine(one.name, one.values, out=one.out) for one in plan.points],
+        [[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
+        {key: value for layer in plan.layers for key, value in layer.values.items()}, plan.tasks[0].sharing,
+    )  # fmt: skip
 
 
 def _every_mode(summary: Summary) -> ColumnTable[tuple[ModeAt, str]]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.late import pd, xr
+from orchestrator.report.cells import CELLS, Cell, Cells, CellLine
 from orchestrator.report.notebook import Axes, axes_or_new, page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
@@ -89,14 +90,49 @@ class ParameterSweep:
         return sweep_json(self.samples)
 
     def save(self, folder: str | Path) -> list[Path]:
-        """Write ``sweep.nc``, ``sweep.csv`` and the plots, as ``gfor sweep`` does; return their paths."""
+        """Write ``sweep.nc``, ``sweep.csv``, ``cells.json`` and the plots, as ``gfor sweep`` does; give their paths."""
         from orchestrator.sweep.plots import save_sweep_plots  # noqa: PLC0415 - a second to import
 
         place = made_folder(Path(folder))
         with staged(place, new_run_id()) as staging:
             tables = save_sweep(self.samples, staging)
             plots = save_sweep_plots(self.samples, staging)
-        return [place / name for name in (*tables, *(path.name for path in plots))]
+            self._cells().save(staging, place)
+        return [place / name for name in (*tables, CELLS, *(path.name for path in plots))]
+
+    def _cells(self) -> Cells:
+        """Followed modes by the values of the last axis; where there are several axes, each setting of the others."""
+        plan, samples = self.result.plan, self.samples
+        *others, last = range(len(plan.axes))
+        named = any(t.carries for s in self.result.scenarios for t in s.trajectories)
+        rows: dict[tuple[str, str, tuple[float, ...]], dict[int, Cell]] = {}
+        for sweep in self.result.scenarios:
+            for trajectory in sweep.trajectories:
+                if named and trajectory.carries is None:
+                    continue
+                for place, one in samples.of(sweep, trajectory):
+                    stable = sweep.points[place].stability.get("stable")
+                    word = {True: "", False: "; another mode grows" if one["real"] < 0 else "", None: "; not known"}
+                    text = f"{one['frequency']:.3f} Hz, {one['damping']:.2f} %{word[stable]}"
+                    cell = Cell(text, one["damping"], stable, one["real"], one["frequency"])
+                    key = sweep.prepared.name, trajectory.name, tuple(place[k] for k in others)
+                    rows.setdefault(key, {})[int(place[last])] = cell
+        titles = {sweep.prepared.name: sweep.prepared.title for sweep in self.result.scenarios}
+
+        def side(scenario: str, mode: str, setting: tuple[float, ...]) -> CellLine:
+            chosen = [(plan.axes[k], plan.axes[k].values[int(x)]) for k, x in zip(others, setting, strict=True)]
+            words = [f"{axis.key} = {value:g} {axis.unit}".rstrip() for axis, value in chosen]
+            values = {key: value for axis, one in chosen for key, value in axis.sets(one).items()}
+            who = [titles[scenario]] if len(titles) > 1 else []
+            return CellLine(", ".join([*words, *who, mode]), values, scenario)
+
+        axis = plan.axes[last]
+        return Cells(
+            f"Damping of followed modes over {axis.key} [{axis.unit or 1}]", plan.case, plan.scenarios[0].name,
+            plan.frequency_range, [side(*key) for key in rows],
+            [CellLine(f"{value:g}", axis.sets(value)) for value in axis.values],
+            [[row.get(k) for k in range(len(axis.values))] for row in rows.values()], plan.overrides, followed=True,
+        )  # fmt: skip
 
     def plot(self, ax: Axes = None) -> Axes:
         """The modes in the complex plane, on Matplotlib Axes or a new figure's; a circle where each begins."""

@@ -6,7 +6,8 @@ const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9
 const SVG = "http://www.w3.org/2000/svg";
 
 // What the address holds; everything else follows from it.
-const state = { scenario: "", values: {}, range: [0.1, 2], controls: [], mode: null, pin: null, tab: "map", signals: "" };
+const state = { scenario: "", values: {}, range: [0.1, 2], controls: [], mode: null, pin: null, tab: "map", signals: "", events: null, places: {} };
+const theCase = () => ({ scenario: state.scenario, values: state.values, events: state.events, places: state.places });
 // What was answered to it.
 const seen = { titles: {}, answer: null, modes: [], info: null, pinned: null, estimate: null, slopes: {}, trails: [], curves: {}, pinnedCurves: {}, stamp: null, timing: {} };
 
@@ -91,14 +92,14 @@ function failed(text, place = null) {
 // -- the state in the address ---------------------------------------------------------------------------------------
 
 function keepState() {
-  const kept = { s: state.scenario, v: state.values, r: state.range, c: state.controls, m: state.mode, t: state.tab, g: state.signals, p: state.pin };
+  const kept = { s: state.scenario, v: state.values, r: state.range, c: state.controls, m: state.mode, t: state.tab, g: state.signals, p: state.pin, e: state.events, d: state.places };
   history.replaceState(null, "", `#${encodeURIComponent(JSON.stringify(kept))}`);
 }
 function readState(beginning) {
   Object.assign(state, { scenario: beginning.scenario, values: beginning.values, range: beginning.range, controls: Object.keys(beginning.values) });
   try {
     const kept = JSON.parse(decodeURIComponent(location.hash.slice(1)));
-    Object.assign(state, { scenario: String(kept.s), values: kept.v ?? {}, range: kept.r ?? [0.1, 2], controls: kept.c ?? [], mode: kept.m ?? null, tab: kept.t ?? "map", signals: kept.g ?? "", pin: kept.p ?? null });
+    Object.assign(state, { scenario: String(kept.s), values: kept.v ?? {}, range: kept.r ?? [0.1, 2], controls: kept.c ?? [], mode: kept.m ?? null, tab: kept.t ?? "map", signals: kept.g ?? "", pin: kept.p ?? null, events: kept.e ?? null, places: kept.d ?? {} });
   } catch { /* no state, or none that can be read: that of the command */ }
 }
 

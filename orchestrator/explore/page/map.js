@@ -18,6 +18,7 @@ function frame() {
 // All that lies near the axis of damping; what decays at once would squeeze the rest together and is a zoom away.
 function fitMap() {
   const all = [...seen.modes, ...(seen.pinned?.modes.scenarios[0].modes ?? [])];
+  for (const m of followedPaths().flat()) all.push({ real: m.real, frequency_hz: m.hz, damping_percent: m.percent });
   const near = all.filter(m => m.damping_percent < 75), shown = near.length ? near : all;
   const low = Math.min(-0.4, ...shown.map(m => m.real)), high = Math.max(0.15, ...shown.map(m => m.real));
   const wide = high - low;
@@ -53,6 +54,10 @@ function paintMap() {
       if (trail.length > 1) clip.append(draw("path", { class: "trail", d: trail.map((m, k) => `${k ? "L" : "M"}${f.x(m.real)} ${f.y(m.hz)}`).join("") }));
       for (const m of trail.slice(0, -1)) clip.append(draw("circle", { class: "trail-dot", cx: f.x(m.real), cy: f.y(m.hz), r: 2.2 }));
     }
+  }
+  for (const path of followedPaths()) {
+    clip.append(draw("path", { class: "followed", d: path.map((m, k) => `${k ? "L" : "M"}${f.x(m.real)} ${f.y(m.hz)}`).join("") }));
+    for (const m of path) clip.append(draw("circle", { class: "followed-dot", cx: f.x(m.real), cy: f.y(m.hz), r: 2.6 }, draw("title", {}, `${m.row}, ${m.column}: ${m.text}`)));
   }
   const partners = pinnedPartners();
   for (const m of seen.pinned?.modes.scenarios[0].modes ?? []) clip.append(draw("rect", { class: "pinned", x: f.x(m.real) - 5, y: f.y(m.frequency_hz) - 5, width: 10, height: 10 }, draw("title", {}, `A: ${fixed(m.frequency_hz, 4)} Hz, ${fixed(m.damping_percent, 2)} %`)));

@@ -28,6 +28,7 @@ function paintNetwork() {
   if (!d) { svg.replaceChildren(draw("text", { x: 20, y: 30 }, seen.info ? "this case has no network behind a power flow" : "loading …")); svg.setAttribute("viewBox", "0 0 500 300"); return; }
   if (!lens.w) Object.assign(lens, { x: -30, y: -30, w: d.width + 60, h: d.height + 60 });
   svg.setAttribute("viewBox", `${lens.x} ${lens.y} ${lens.w} ${lens.h}`);
+  d.buses.forEach(b => { if (state.places[b.name]) [b.x, b.y] = state.places[b.name]; });
   const at = Object.fromEntries(d.buses.map(b => [b.name, b])), volts = Object.fromEntries((flow?.buses ?? []).map(b => [b.name, b]));
   const branches = Object.fromEntries((flow?.branches ?? []).map(b => [b.name, b])), machines = Object.fromEntries((flow?.machines ?? []).map(m => [m.name, m]));
   const most = Math.max(1, ...(flow?.branches ?? []).map(b => Math.abs(b.p_from_mw)));
@@ -72,9 +73,8 @@ function paintNetwork() {
   });
   for (const bus of d.buses) {
     const v = volts[bus.name]?.v_pu, label = `bus ${bus.name}${v ? `: ${fixed(v, 4)} pu, ${fixed(volts[bus.name].angle_deg, 2)}°` : ""}`;
-    const dot = draw("circle", { class: `bus${v < 0.95 ? " low" : v > 1.05 ? " high" : ""}`, cx: bus.x, cy: bus.y, r: few ? 6 : 4.5 });
-    dot.addEventListener("pointermove", event => showTip(event, label));
-    dot.addEventListener("pointerleave", hideTip);
+    const dot = things("bus", bus.name, label, draw("circle", { class: `bus${v < 0.95 ? " low" : v > 1.05 ? " high" : ""}`, cx: bus.x, cy: bus.y, r: few ? 6 : 4.5 }));
+    dot.addEventListener("pointerdown", event => dragBus(event, bus));
     parts.push(dot);
     if (d.buses.length <= 130) parts.push(draw("text", { class: "flow", x: bus.x + 8, y: bus.y + 14 }, few && v ? `${bus.name} ${fixed(v, 3)}` : bus.name));
   }
@@ -82,6 +82,19 @@ function paintNetwork() {
   svg.replaceChildren(...parts);
   paintArrows(1);
   if (focused !== undefined) svg.querySelector(`[data-thing="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
+}
+// A bus goes where it is dragged; the address and the copied scenario keep its place.
+function dragBus(event, bus) {
+  const svg = $("network"), place = e => new DOMPoint(e.clientX, e.clientY).matrixTransform(svg.getScreenCTM().inverse()), from = place(event);
+  const move = e => {
+    const to = place(e);
+    if (!state.places[bus.name] && Math.hypot(to.x - from.x, to.y - from.y) < 4) return;
+    state.places[bus.name] = [Math.round(to.x), Math.round(to.y)];
+    paintNetwork();
+  };
+  const end = () => { removeEventListener("pointermove", move); removeEventListener("pointerup", end); if (state.places[bus.name]) keepState(); };
+  addEventListener("pointermove", move);
+  addEventListener("pointerup", end);
 }
 // The chosen mode's shape at the places of the machines; `part` of the swing, from -1 to 1.
 function paintArrows(part) {
@@ -97,7 +110,7 @@ const isOn = name => (name ? (state.values[name] ?? parameterOf(name)?.value ?? 
 
 function paintElement() {
   const place = $("element"), d = seen.info?.diagram;
-  if (!element || !d) { place.replaceChildren(make("p", { class: "soft" }, "Click a line, a unit or a load.")); return; }
+  if (!element || !d) { place.replaceChildren(make("p", { class: "soft" }, "Click a bus, a line, a unit or a load; drag a bus to where it belongs.")); return; }
   const error = make("p", { class: "bad", role: "alert" }), parts = [make("h3", {}, `${element.kind} ${element.name}`)];
   const onOff = (name, text) => {
     const tick = make("input", { type: "checkbox" });
@@ -112,23 +125,38 @@ function paintElement() {
     slider.addEventListener("change", () => apply(Math.abs(+slider.value) < 0.006 ? 1 : +Math.exp(+slider.value).toPrecision(3)));
     return make("label", { class: "block" }, `${label} `, said, slider);
   };
-  if (element.kind === "line") {
+  const happens = (words, first, unit, most, made) => {
+    const size = unit && make("input", { type: "text", size: 5, value: first, inputmode: "decimal", "aria-label": `${words}: ${unit}` }), when = make("input", { type: "text", size: 4, value: 1, inputmode: "decimal", "aria-label": `${words}: time in s` }), add = make("button", {}, "add");
+    add.addEventListener("click", () => {
+      const x = size ? Number(size.value.replace(",", ".")) : 0, t = Number(when.value.replace(",", "."));
+      if (!(t >= 0) || (size && !(x > 0 && x <= most))) { error.textContent = `${words}: the time is a number of at least 0 s${size ? `, and the ${unit} above 0, at most ${most}` : ""}`; return; }
+      error.textContent = "";
+      setEvents([...eventsNow(), { time: `${t} s`, ...made(x) }]);
+    });
+    return make("p", { class: "block" }, `${words} `, ...(size ? [size, ` ${unit} `] : []), "at ", when, " s ", add);
+  };
+  const added = make("p", { class: "soft" }, `Events: ${eventsNow().map(wordsOf).join("; ") || "none"}. The tab Response runs them.`);
+  if (element.kind === "bus") parts.push(happens("Three-phase fault here for", 100, "ms", 10000, ms => ({ type: "bus_fault", bus: element.name, duration: `${ms} ms` })));
+  else if (element.kind === "line") {
     const line = d.lines.find(l => l.name === element.name);
     if (line.open) parts.push(onOff(line.open, "closed"));
     if (line.length && parameterOf(line.length)) {
       const now = (state.values[line.length] ?? original(line.length)) / original(line.length);
       parts.push(times("Length, times the case's", now, 0.2, 5, factor => setOnes(Object.fromEntries([line.length, line.resistance, line.charging].filter(n => n && parameterOf(n) && original(n)).map(n => [n, factor === 1 ? null : original(n) * factor])), error)));
     }
+    parts.push(happens("It opens", 0, "", 0, () => ({ type: "line_trip", line: element.name })));
   } else if (element.kind === "load") {
+    parts.push(happens("It steps to", 101, "% of its power", 1000, x => ({ type: "load_change", load: element.name, scale: x / 100 })));
     const load = d.loads.find(l => l.name === element.name);
     if (load.scale) parts.push(times("Load, times the case's", state.values[load.scale] ?? 1, 0.2, 3, factor => setOnes({ [load.scale]: factor === 1 ? null : factor }, error)));
   } else {
+    parts.push(happens("It trips", 0, "", 0, () => ({ type: "unit_trip", unit: element.name })));
     const unit = d.units.find(u => u.name === element.name), its = make("button", {}, "its values");
     if (unit.out) parts.push(onOff(unit.out, "in service (what it feeds is shared by the others)"));
     its.addEventListener("click", () => { $("search").value = `${unit.name}.`; paintFound(); $("search").focus(); });
     parts.push(its);
   }
-  place.replaceChildren(...parts, error);
+  place.replaceChildren(...parts, added, error);
 }
 async function setOnes(values, error) {
   for (const [name, value] of Object.entries(values)) if (value === null) delete state.values[name]; else { state.values[name] = value; if (!state.controls.includes(name)) state.controls.push(name); }

@@ -1,9 +1,10 @@
 "use strict";
 // What happens when: the page is opened, a value is set, a button pressed.
+const TABS = ["map", "network", "response", "study"];
 
 // The exact modes of the state; `place` is where a refusal is said.
 async function compute(place = null) {
-  const begin = performance.now(), asked = copyOf({ ask: "modes", scenario: state.scenario, values: state.values, range: state.range });
+  const begin = performance.now(), asked = copyOf({ ask: "modes", ...theCase(), range: state.range });
   failed("");
   document.querySelectorAll(".control .error").forEach(one => { one.textContent = ""; });
   const found = await ask("modes", asked, place);
@@ -14,7 +15,7 @@ async function compute(place = null) {
     if (seen.answer) { paintVerdict(); paintMap(); paintTable(); }
     return;
   }
-  seen.computed = { scenario: asked.scenario, values: asked.values, range: asked.range };
+  seen.computed = { scenario: asked.scenario, values: asked.values, events: asked.events, range: asked.range };
   const before = seen.modes, after = found.modes.scenarios[0].modes;
   const partners = partnersIn(after, before);
   const trails = after.map((m, k) => {
@@ -49,7 +50,7 @@ async function loadInfo() {
 }
 async function pin() {
   if (state.pin) { state.pin = null; seen.pinned = null; seen.pinnedCurves = {}; }
-  else { state.pin = copyOf({ scenario: state.scenario, values: state.values, range: state.range }); seen.pinned = seen.answer; seen.pinnedCurves = copyOf(seen.curves); }
+  else { state.pin = copyOf({ ...theCase(), range: state.range }); seen.pinned = seen.answer; seen.pinnedCurves = copyOf(seen.curves); }
   paintPin();
   keepState();
   paintMap(); paintTable(); paintPlots();
@@ -66,20 +67,27 @@ function showCopies() {
     copy.addEventListener("click", async () => { await navigator.clipboard.writeText(text); copy.textContent = "Copied"; });
     return [make("h3", {}, names[kind] ?? kind), make("pre", { "data-kind": kind }, text), copy];
   }));
+  const save = make("button", {}, "Save as scenario"), said = make("p", { role: "status" });
+  save.addEventListener("click", async () => {
+    const found = await ask("saving", { ask: "save", ...theCase() }, said);
+    if (found) said.textContent = `Written: ${found.file}, a copy of the case with the scenario 'explored'.`;
+  });
+  if (!SAVED) $("dialog").querySelector("div").append(make("div", {}, save), said);
   $("dialog").showModal();
 }
 function openTab(name) {
   state.tab = name;
-  for (const one of ["map", "network", "response"]) {
+  for (const one of TABS) {
     $(`panel-${one}`).hidden = one !== name;
     $(`tab-${one}`).setAttribute("aria-selected", String(one === name));
     $(`tab-${one}`).tabIndex = one === name ? 0 : -1;
   }
   $("trails-label").hidden = name !== "map";
-  for (const id of ["fit", "in", "out"]) $(id).hidden = name === "response";
+  for (const id of ["fit", "in", "out"]) $(id).hidden = name === "response" || name === "study";
   keepState();
   if (name === "network") { paintNetwork(); paintElement(); }
   if (name === "response") paintPlots();
+  if (name === "study") paintCells();
   if (name === "map" && seen.modes.length) paintMap();
 }
 function setRange(low, high) {
@@ -127,14 +135,15 @@ async function begin() {
   $("svg").addEventListener("click", () => download("explore.svg", "image/svg+xml", pictureOf(picture())));
   $("png").addEventListener("click", () => asPng(picture(), "explore.png"));
   $("csv").addEventListener("click", () => download("modes.csv", "text/csv", asCsv([["real [1/s]", "imag [rad/s]", "frequency [Hz]", "damping [%]", "name"], ...seen.modes.map(m => [m.real, m.imag, m.frequency_hz, m.damping_percent, m.name])])));
-  for (const name of ["map", "network", "response"]) {
+  for (const name of TABS) {
     $(`tab-${name}`).addEventListener("click", () => openTab(name));
     $(`tab-${name}`).addEventListener("keydown", event => {
-      const names = ["map", "network", "response"], step = { ArrowRight: 1, ArrowLeft: 2 }[event.key];
-      if (step) { openTab(names[(names.indexOf(state.tab) + step) % 3]); $(`tab-${state.tab}`).focus(); }
+      const names = TABS.filter(one => !$(`tab-${one}`).hidden), step = { ArrowRight: 1, ArrowLeft: names.length - 1 }[event.key];
+      if (step) { openTab(names[(names.indexOf(state.tab) + step) % names.length]); $(`tab-${state.tab}`).focus(); }
     });
   }
-  openTab(["map", "network", "response"].includes(state.tab) ? state.tab : "map");
+  beginStudy();
+  openTab(TABS.includes(state.tab) && !$(`tab-${state.tab}`).hidden ? state.tab : "map");
   paintControls(); paintChosen(); paintPlots(); paintPin();
   const opened = await ask("case", { ask: "open" });
   if (!opened) { $("verdict").textContent = ""; return; }
@@ -144,7 +153,7 @@ async function begin() {
   if (!(state.scenario in opened.scenarios)) state.scenario = seen.beginning.scenario;
   $("scenario").replaceChildren(...Object.entries(opened.scenarios).map(([name, title]) => make("option", { value: name }, `${name}: ${title}`)));
   $("scenario").value = state.scenario;
-  $("scenario").addEventListener("change", () => { state.scenario = $("scenario").value; seen.slopes = {}; compute(); });
+  $("scenario").addEventListener("change", () => { state.scenario = $("scenario").value; state.events = null; seen.slopes = {}; compute(); });
   if (state.pin) {
     const was = await ask("A", { ask: "modes", ...state.pin });
     seen.pinned = was; paintPin();

@@ -6,12 +6,36 @@ const wantedSignals = () => state.signals.split(",").map(s => s.trim()).filter(B
 function paintSignals() {
   const info = seen.info;
   $("signal-names").replaceChildren(...(info?.signals ?? []).slice(0, 400).map(name => make("option", { value: name })));
-  $("events").textContent = info ? `Events: ${info.events.join("; ") || "none"}` : "";
+  paintEvents();
   $("signals").value = state.signals;
   for (const id of ["linear", "run"]) $(id).disabled = Boolean(SAVED);
 }
+const eventsNow = () => state.events ?? seen.info?.events ?? [];
+function wordsOf(event) {
+  const { type, time, component, ...rest } = event;
+  return `at ${typeof time === "number" ? `${time} s` : time}: ${type.replaceAll("_", " ")}${Object.entries(rest).map(([name, value]) => `, ${name} ${typeof value === "object" ? JSON.stringify(value) : value}`).join("")}`;
+}
+function paintEvents() {
+  const events = eventsNow();
+  const parts = events.map((event, k) => {
+    const away = make("button", { "aria-label": `take away: ${wordsOf(event)}`, title: "take away" }, "×");
+    away.addEventListener("click", () => setEvents(events.filter((_, j) => j !== k)));
+    return make("span", {}, wordsOf(event), " ", SAVED ? null : away, "; ");
+  });
+  const back = make("button", {}, "those of the case");
+  back.addEventListener("click", () => setEvents(null));
+  $("events").replaceChildren("Events: ", ...(parts.length ? parts : ["none; click a bus, line, load or unit in the network. "]), ...(state.events && !SAVED ? [back] : []));
+}
+// Other events leave the modes as they are; the curves are of the events before.
+function setEvents(events) {
+  state.events = events === null || same(events, seen.info?.events) ? null : events;
+  seen.curves = {};
+  keepState();
+  paintEvents(); paintPlots(); paintElement();
+  compute();
+}
 async function linearResponse() {
-  const found = await ask("linear response", { ask: "response", scenario: state.scenario, values: state.values, signals: wantedSignals() }, $("run-said"));
+  const found = await ask("linear response", { ask: "response", ...theCase(), signals: wantedSignals() }, $("run-said"));
   if (!found) { $("run-said").classList.add("bad"); return; }
   $("run-said").textContent = "";
   seen.curves = { ...Object.fromEntries(Object.entries(seen.curves).map(([k, c]) => [k, { ...c, linear: undefined }])) };
@@ -23,7 +47,7 @@ async function coSimulation() {
   for (const c of Object.values(seen.curves)) delete c.run;
   $("run-said").classList.remove("bad");
   $("run-said").textContent = "the FMUs are started …";
-  const found = await ask("co-simulation", { ask: "run", scenario: state.scenario, values: state.values, signals: wantedSignals() }, $("run-said"));
+  const found = await ask("co-simulation", { ask: "run", ...theCase(), signals: wantedSignals() }, $("run-said"));
   if (!found) { $("run-said").classList.add("bad"); return; }
   for (const [name, curve] of Object.entries(found.curves)) (seen.curves[name] ??= {}).run = curve;
   const ring = found.ring_down ? `; it rings with ${fixed(found.ring_down.frequency_hz, 4)} Hz, ${fixed(found.ring_down.damping_percent, 2)} %` : "";

@@ -1,0 +1,96 @@
+"""A study in rows and columns, by which ``gfor explore`` opens it: each cell a figure, and a case that can be live."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from orchestrator.cases.case import BUILT_IN, Case
+from orchestrator.cases.schema import Value
+from orchestrator.errors import InputError
+from orchestrator.results.storage import save_json
+
+CELLS = "cells.json"
+
+_FORMAT = 1
+_MOST = 200_000  # cells that a page is given; the first rows are the worst
+
+
+@dataclass(frozen=True)
+class Cell:
+    text: str = ""  # what stands under the pointer
+    percent: float | None = None  # damping, by which it is coloured
+    stable: bool | None = None
+    real: float | None = None  # of the eigenvalue [1/s]
+    hz: float | None = None
+
+
+@dataclass(frozen=True)
+class CellLine:
+    """A row or a column."""
+
+    name: str
+    # what the case must have set there, by ``component.variable``; None where it cannot be had as a live case
+    values: Mapping[str, Value] | None = field(default_factory=dict)
+    scenario: str = ""
+    out: Sequence[str] = ()  # elements that are out of service
+
+
+@dataclass(frozen=True)
+class Cells:
+    title: str
+    case: Case
+    scenario: str
+    frequencies: tuple[float, float]  # [Hz]
+    rows: Sequence[CellLine]
+    columns: Sequence[CellLine]
+    cells: Sequence[Sequence[Cell | None]]
+    values: Mapping[str, Value] = field(default_factory=dict)  # that hold in all cells
+    sharing: str | None = None  # who feeds what an outage takes, where it is not as the case says
+    followed: bool = False  # whether a row is a mode that is followed over the columns
+
+    def save(self, staging: Path, folder: Path) -> Path:
+        """Write ``cells.json``; ``folder`` is where it will be read from, and the case is named from there."""
+        path = self.case.path
+        built_in = path.is_relative_to(BUILT_IN)
+        fit = max(1, _MOST // max(1, len(self.columns)))
+        content = {
+            "format": _FORMAT, "title": self.title, "scenario": self.scenario, "range": self.frequencies,
+            "case": path.parent.name if built_in else os.path.relpath(path.resolve(), folder.resolve()),
+            "values": dict(self.values), "sharing": self.sharing, "followed": self.followed,
+            "left_out": max(0, len(self.rows) - fit),
+            "rows": [asdict(side) for side in self.rows[:fit]], "columns": [asdict(side) for side in self.columns],
+            "cells": [[_told(cell) for cell in row] for row in self.cells[:fit]],
+        }  # fmt: skip
+        save_json(content, staging / CELLS)
+        return staging / CELLS
+
+
+def _told(cell: Cell | None) -> dict[str, Any] | None:
+    return None if cell is None else {name: value for name, value in asdict(cell).items() if value not in (None, "")}
+
+
+def read_cells(folder: Path) -> dict[str, Any]:
+    """What `Cells.save` wrote, with the ``case`` as a word that opens it."""
+    file = folder / CELLS
+    if not file.is_file():
+        raise InputError(
+            f"{folder}: there is no {CELLS} in it; `gfor screen`, `gfor sweep` and `gfor interactions` write one. "
+            f"Give such a folder or a case; `gfor report {folder}` shows other results"
+        )
+    try:
+        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        if found["format"] != _FORMAT:
+            raise InputError(f"{file}: its format is {found['format']!r}, and only {_FORMAT} is known; compute it anew")
+        sides = [*found["rows"], *found["columns"]]
+        whole = len(found["cells"]) == len(found["rows"])
+        whole = whole and all(len(row) == len(found["columns"]) for row in found["cells"])
+        if not whole or not all(isinstance(side["name"], str) for side in sides):
+            raise ValueError("rows and columns do not fit the cells")
+        word = found["case"]
+        near = (folder / word).resolve()
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise InputError(f"{file}: it cannot be read as rows and columns: {error}; compute the study anew") from error
+    return found | {"case": str(near) if near.is_file() else word}

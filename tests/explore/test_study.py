@@ -1,0 +1,147 @@
+"""A folder of a screening or a sweep in `gfor explore`: its cells, and the live case behind each."""
+
+import json
+import math
+import threading
+from contextlib import contextmanager
+
+import pandas as pd
+import pytest
+
+import orchestrator as gfor
+from orchestrator.cli import main
+from orchestrator.explore.server import Explorer
+from orchestrator.explore.worker import Desk
+from orchestrator.report.cells import read_cells
+from tests.explore.test_page import browser, computed, needs_chromium, of_command, opened, shown
+
+__all__ = ["browser"]
+
+POINTS = {"night": {"load": 0.9, "generation": 0.9}, "day": {"line_4_5.in_service": 0}}
+
+
+@pytest.fixture(scope="module")
+def screened(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("screened")
+    points = pd.DataFrame([{"name": name, **given} for name, given in POINTS.items()])
+    screening = gfor.load("wscc9").screen(points, "sg3,load_8", "gfor", sharing="slack", workers=1, progress=False)
+    screening.save(folder)
+    return folder, screening.items()
+
+
+def test_cells_of_a_screening_have_the_figures_of_its_items(screened):
+    folder, items = screened
+    study = read_cells(folder)
+    assert (study["case"], study["scenario"], [c["name"] for c in study["columns"]]) == ("wscc9", "gfor", [*POINTS])
+    places = {(r["name"], c["name"]): cell for r, row in zip(study["rows"], study["cells"], strict=True)
+              for c, cell in zip(study["columns"], row, strict=True)}  # fmt: skip
+    assert len(places) == len(items) == 6
+    for item in items.itertuples():
+        cell = places[item.outage, item.point]
+        assert cell.get("percent", math.nan) == pytest.approx(item.least_damping_percent, nan_ok=True)
+        assert cell.get("stable") == item.stable
+    least = [min(cell.get("percent", math.inf) for cell in row) for row in study["cells"]]
+    assert least == sorted(least)
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::orchestrator.api.scenario.UnusualDataWarning")
+def test_the_live_case_of_each_cell_has_the_modes_of_the_screening(screened):
+    folder, _ = screened
+    study = read_cells(folder)
+    desk, seen = Desk(study["case"], False), []
+    for row, cells in zip(study["rows"], study["cells"], strict=True):
+        for column, cell in zip(study["columns"], cells, strict=True):
+            if "percent" not in cell:
+                continue
+            question = {"ask": "cell", "scenario": "gfor", "values": study["values"] | column["values"],
+                        "own": column["out"], "lost": row["out"], "sharing": study["sharing"]}  # fmt: skip
+            values = desk.answer(question, print)["values"]
+            modes = gfor.load("wscc9").scenario("gfor", values).modes(tuple(study["range"]))
+            least = min(mode.damping_percent for mode in modes)
+            assert least == pytest.approx(cell["percent"], abs=0.01)  # a screening has no communication step
+            seen.append(row["name"])
+    assert {"intact", "sg3", "load_8"} == set(seen)
+
+
+@pytest.mark.slow
+def test_cells_of_a_sweep_are_its_followed_modes(tmp_path):
+    sweep = gfor.load("two_area").sweep({"gfor.pod_p.K": [100, 150]}, "pod_p", workers=1, progress=False)
+    sweep.save(tmp_path)
+    study = read_cells(tmp_path)
+    table = sweep.table()
+    named = table[table["mode"] == "electromechanical"]
+    assert [cell["percent"] for cell in study["cells"][0]] == pytest.approx(list(named["damping_percent"]))
+    assert [column["values"] for column in study["columns"]] == [{"gfor.pod_p.K": 100.0}, {"gfor.pod_p.K": 150.0}]
+    assert study["followed"] is True
+
+
+@pytest.mark.parametrize(("change", "text"), [
+    ({"format": 7}, "format is 7"), ({"cells": []}, "do not fit"), ({"rows": [{"name": 3}]}, "do not fit"),
+    (None, "there is no cells.json"),
+])  # fmt: skip
+def test_what_is_no_study_is_refused_by_name(tmp_path, capsys, change, text):
+    if change is not None:
+        whole = {"format": 1, "case": "wscc9", "rows": [{"name": "a"}], "columns": [{"name": "b"}], "cells": [[None]]}
+        (tmp_path / "cells.json").write_text(json.dumps(whole | change), encoding="utf-8")
+    assert main(["explore", str(tmp_path), "--no-browser"]) == 2
+    error = capsys.readouterr().err
+    assert text in error
+    assert str(tmp_path) in error
+
+
+@contextmanager
+def served(folder):
+    study = read_cells(folder)
+    beginning = {"case": study["case"], "scenario": "gfor", "values": {}, "range": study["range"], "study": study}
+    explorer = Explorer(study["case"], beginning)
+    threading.Thread(target=explorer.serve, daemon=True).start()
+    yield explorer
+    explorer.close()
+
+
+@needs_chromium
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::orchestrator.api.scenario.UnusualDataWarning")
+def test_a_click_on_a_cell_opens_it_and_faults_places_and_scenario_are_kept(
+    browser,  # noqa: F811 - the fixture
+    screened, capsys, tmp_path, monkeypatch,
+):  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    folder, _ = screened
+    with served(folder) as explorer, opened(browser, explorer.address) as view:
+        assert view.locator("#tab-study").get_attribute("aria-selected") == "true"
+        view.locator("#cells").focus()
+        view.keyboard.press("ArrowRight")
+        view.keyboard.press("Enter")
+        view.locator("#study-said", has_text="Open now").wait_for()
+        content = of_command(view, capsys)
+        least = min(content["modes"], key=lambda m: m["damping_percent"])
+        assert (
+            f"Live, least damped: {least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %"
+            in view.locator("#study-said").inner_text()
+        )
+        assert [[c.strip() for c in row.locator("td").all_inner_texts()[:2]] for row in view.locator("#table tbody tr").all()] == shown(content["modes"])  # fmt: skip
+        view.locator("#tab-network").click()
+        bus = view.locator('[data-thing="bus bus_7"]')
+        box = bus.locator("circle").bounding_box()
+        view.mouse.move(box["x"] + 4, box["y"] + 4)
+        view.mouse.down()
+        view.mouse.move(box["x"] + 50, box["y"] + 40, steps=4)
+        view.mouse.up()
+        moved = bus.locator("circle").bounding_box()
+        assert abs(moved["x"] - box["x"]) > 20
+        bus.click(force=True)
+        view.locator("#element button", has_text="add").click()
+        computed(view, 3)
+        view.locator("#tab-response").click()
+        assert "bus fault, bus bus_7, duration 100 ms" in view.locator("#events").inner_text()
+        view.locator("#copy").click()
+        view.locator("#dialog button", has_text="Save as scenario").click()
+        said = view.locator("#dialog [role=status]", has_text="Written: ")
+        said.wait_for()
+        file = tmp_path / said.inner_text().removeprefix("Written: ").split(",")[0]
+    saved = gfor.load(file).scenario("explored")
+    assert any("bus_7" in str(event) for event in saved.prepared.events)
+    assert "bus_7" in saved.prepared.case.table.diagram.positions
+    assert shown(gfor.Modes.as_json(saved.modes(tuple(content["range"]) if "range" in content else (0.1, 2.0)))["scenarios"][0]["modes"]) == shown(content["modes"])  # fmt: skip
