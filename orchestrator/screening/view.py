@@ -11,7 +11,7 @@ from rich.markup import escape as escape_markup
 
 from orchestrator.late import pd
 from orchestrator.operating_points.item import Status
-from orchestrator.report.cells import CELLS, Cell, Cells, CellLine
+from orchestrator.report.cells import CELLS, Cell, CellLine, Cells
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, colour, paragraphs

@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.late import pd, xr
-from orchestrator.report.cells import CELLS, Cell, Cells, CellLine
+from orchestrator.report.cells import CELLS, Cell, CellLine, Cells
 from orchestrator.report.notebook import Axes, axes_or_new, page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
