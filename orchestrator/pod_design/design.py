@@ -4,7 +4,7 @@ The sensitivities are finite differences between two real linearisations, and th
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import KW_ONLY, MISSING, dataclass, replace
 from typing import Any
 
@@ -34,8 +34,16 @@ from orchestrator.pod_design.lead_lag import (
     sensitivity,
 )
 from orchestrator.pod_design.margins import Margins, compute_margins
-from orchestrator.pod_design.refinement import Judgement, Refinement, refine
-from orchestrator.pod_design.target import Target, check_range, find_target, mode_name, require_controllers
+from orchestrator.pod_design.refinement import Judgement, Refinement, refine, sweep
+from orchestrator.pod_design.target import (
+    CRITICAL,
+    Target,
+    check_range,
+    find_target,
+    mode_name,
+    naming_critical,
+    require_controllers,
+)
 from orchestrator.points.request import ANYTHING, OfCase, of_scenario, of_values
 from orchestrator.points.store import PointStore
 from orchestrator.study.modes import identified, running
@@ -71,7 +79,9 @@ class DesignRequest(OfCase):
     values: Mapping[str, Any] | None = of_values()
     _: KW_ONLY
     component: str | None = asked(NAME, None, "the converter, or a pattern for several with one setting")
-    mode: str | None = asked(NAME, None, "the case's mode to damp (default: its first)")
+    mode: str | None = asked(
+        NAME, None, "the case's mode to damp (default: its first; the least damped swing where it names none)"
+    )
     damping: float | None = asked(DAMPING, None, "required damping, such as 20")
     damping_increment: float | None = asked(
         DAMPING, None, "required increase of the damping in points (default: 10)", "POINTS",
@@ -137,6 +147,9 @@ class PodDesign:
     gain: float
     designed: Placed
     refinement: Refinement | None
+    # with the design's lead/lag, the smallest gain within the bounds that has the required damping, else that with
+    # most; None where the design has it, or was refined
+    other_gain: Placed | None
     final: Placed  # the closed loop with the final setting: the refined setting, or ``designed`` without refinement
     # before, after: the other modes without the controller, and with the final setting.
     before: Surroundings
@@ -218,9 +231,10 @@ def design_pod(
     overrides = {key: value for key, value in request.overrides.items() if key not in own} | own
     name = mode_name(case, request.mode)
     (prepared,) = case.prepare([target.scenario], overrides, request.step_size, None, request.files)
+    rules: CaseDefinition = case
 
     def naming(model: LinearModel, modes: list[Mode]) -> Mode | None:
-        fitting = named_modes(case, model, modes).fits.get(name)  # with a gain of any size, a tie counts as a change
+        fitting = named_modes(rules, model, modes).fits.get(name)  # with a gain of any size, a tie counts as a change
         return None if fitting is None else fitting[0]
 
     for value, option in ((request.delta_gain, "--delta-gain"), (request.gain_bounds[1], "--gain-bounds")):
@@ -235,6 +249,9 @@ def design_pod(
             model = loop.model(_OFF)
             before = surroundings(model, None, naming)
             modes = [mode for mode in before.others if mode.is_oscillation]
+            if name == CRITICAL:
+                rules = replace(case, table=naming_critical(case.table, modes))
+                prepared = replace(prepared, case=rules)
             names = identified(prepared, point, model, modes).naming
             before = replace(before, named=names.named.get(name))
             if before.named is None:
@@ -322,6 +339,11 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         )  # fmt: skip
         final = refinement.chosen or designed
     after, examined = around(final), loop.examine(final.setting)
+    other_gain = None
+    if refinement is None and damping_ratio(after.counting(final.eigenvalue)) < required - _MET:
+        report("other gains")
+        with suppress(AnalysisError):  # the mode cannot be followed
+            other_gain = sweep(loop, off, filters, required, request.gain_bounds, "as designed").chosen
     margins = None
     if request.margins and final.setting.gain and examined.stability.stable is not False:
         report("margins")
@@ -331,7 +353,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         initial=initial, required_damping=required, predicted=predicted,
         sensitivities=GainSensitivities(bare.eigenvalue, S, turned.eigenvalue, S_turned), filters=filters,
         gain_non_compensated=gains[0], gain_compensated=gains[1], gain=gain, designed=designed, refinement=refinement,
-        final=final, before=before, after=after,
+        other_gain=other_gain, final=final, before=before, after=after,
         broken=breach(before, after, request.least_damping) or _unstable(examined.stability), margins=margins,
         examined_before=start.examined, examined=examined,
     )  # fmt: skip

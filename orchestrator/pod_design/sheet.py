@@ -179,16 +179,26 @@ def verdict(d: PodDesign) -> str:
         return text
     if d.refinement:
         return text + _out_of_reach(d, d.refinement)
-    if d.active_bound == "upper":
-        text += (
+    return text + _other_gain(d)
+
+
+def _other_gain(d: PodDesign) -> str:
+    """What another gain does with the design's lead/lag."""
+    if d.other_gain is None:
+        return "; use --refine"
+    low, high = d.request.gain_bounds
+    gain, there = f"K = {d.other_gain.setting.gain:.4g} pu", percent(d.other_gain.damping_ratio)
+    if d.other_gain.damping_ratio >= d.required_damping:
+        return f"; {gain} with the same lead/lag has {there}; or use --refine"
+    if d.active_bound == "upper" and d.other_gain.setting.gain == high:
+        return (
             f"; the upper bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: raise "
             "--gain-bounds, choose another controller, or see with --refine what is within reach"
         )
-    elif d.active_bound == "lower":
-        text += "; more gain than the sensitivity asks for does not help here: see with --refine what does"
-    else:
-        text += "; the sensitivity at ΔK does not hold as far as the mode has to move: use --refine"
-    return text
+    return (
+        f"; with this lead/lag no gain from {low:g} to {high:g} pu has more than {there}, at {gain}: see with --refine "
+        "what another one does"
+    )
 
 
 def _out_of_reach(d: PodDesign, r: Refinement) -> str:

@@ -5,12 +5,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from orchestrator.analysis.modes import Mode
 from orchestrator.cases.case import Case
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
 from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.schema import Value
+from orchestrator.cases.schema import CaseTable, NamedModeTable, Value
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
+
+CRITICAL = "least damped swing"
+"""The mode that is designed for where the case names none."""
 
 
 def require_controllers(controllers: Sequence[str]) -> None:
@@ -116,15 +120,24 @@ def _all_off(plan: Mapping[str, ComponentPlan]) -> bool:
 
 
 def mode_name(case: Case, wanted: str | None) -> str:
-    """The name of the mode to design for: the requested one, or by default the first mode that the case names."""
-    names = [table.name for table in case.table.analysis.modes]
-    if not names:
-        raise InputError(
-            f"{case.name}: the case names no mode to design for; design over points (--points), where "
-            "every swing counts, or add one to its file, such as\n"
-            '[analysis]\nmodes = [{ name = "local", states = ["sg1.machine.omega"] }]'
-        )
+    """The name of the mode to design for: the requested one, or by default the first mode that the case names; in a
+    case without names the least damped swing, which is called `CRITICAL`."""
+    names = [table.name for table in case.table.analysis.modes] or [CRITICAL]
     name = wanted if wanted is not None else names[0]
     if name not in names:
         raise InputError(f"--mode: the case names no mode {name!r}; it names: {', '.join(names)}")
     return name
+
+
+def naming_critical(table: CaseTable, modes: Sequence[Mode]) -> CaseTable:
+    """A case's tables that call the first of some modes `CRITICAL`: by the machines that swing against each other in
+    it, else by the state that takes part most."""
+    if not modes:
+        return table
+    speeds = [state for state, _ in modes[0].participation if state.endswith(".omega")]
+    together, against = modes[0].swing(speeds)
+    if against:
+        rule = NamedModeTable(name=CRITICAL, against=(list(together), list(against)))
+    else:
+        rule = NamedModeTable(name=CRITICAL, states=speeds[:1] or [modes[0].participation[0][0]])
+    return table.model_copy(update={"analysis": table.analysis.model_copy(update={"modes": [rule]})})

@@ -103,7 +103,11 @@ def shown(modes):
 @needs_chromium
 def test_map_table_and_verdict_are_those_of_the_command(view, capsys):
     content = of_command(view, capsys)
-    assert view.locator("#verdict").inner_text() == f"SG + GFOR POD-P: {content['stability']['sentence']}"
+    least = min(content["modes"], key=lambda m: m["damping_percent"])
+    said = f"{least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %"
+    assert view.locator("#verdict").inner_text().startswith("SG + GFOR POD-P: stable; least damped from 0.1 to 2 Hz: ")
+    assert said in view.locator("#verdict").inner_text()
+    assert content["stability"]["sentence"] in view.locator("#outside span").inner_text()
     assert [row[:2] for row in rows(view)] == shown(content["modes"])
     assert view.locator("#map .mark").count() == len(content["modes"])
     assert view.locator("#map text", has_text="electromechanical").count() == 1
@@ -202,7 +206,7 @@ def test_a_click_on_the_diagram_takes_a_unit_out_and_makes_a_line_longer(view, c
     slider.focus()
     for _ in range(5):
         slider.press("ArrowRight")
-    view.locator("#work", has_text="painted").wait_for()
+    view.locator("#work", has_text="drawn").wait_for()
     view.wait_for_timeout(500)
     content = of_command(view, capsys)
     assert view.evaluate("state.values['grid.X_L']") > 0.1

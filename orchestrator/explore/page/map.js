@@ -28,7 +28,7 @@ function ticks(low, high, count) {
   const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map(k => k * power).find(x => x >= rough);
   const found = [];
-  for (let x = Math.ceil(low / step) * step; x <= high + 1e-9; x += step) found.push(+x.toPrecision(8));
+  for (let x = Math.ceil(low / step) * step; x <= high + 1e-9; x += step) found.push(Math.abs(x) < 1e-9 * step ? 0 : +x.toPrecision(8));
   return found;
 }
 const cross = (x, y, r) => `M${x - r} ${y - r}L${x + r} ${y + r}M${x - r} ${y + r}L${x + r} ${y - r}`;

@@ -42,7 +42,7 @@ function paintNetwork() {
     const path = `M${a.x} ${a.y}Q${mx} ${my} ${b.x} ${b.y}`, p = f ? f.p_from_mw : null;
     const label = `${line.kind} ${line.name}, ${line.from} to ${line.to}: ${closed ? (f ? `${fixed(p, 1)} MW, ${fixed(f.q_from_mvar, 1)} Mvar` : "closed") : "open"}`;
     const wire = draw("path", { class: `wire${closed ? "" : " open"}`, d: path });
-    if (p !== null && closed) wire.setAttribute("stroke-width", (1.2 + 4 * Math.abs(p) / most).toFixed(2));
+    if (p !== null && closed) wire.style.strokeWidth = (1.2 + 4 * Math.abs(p) / most).toFixed(2);
     const group = things("line", line.name, label, draw("path", { class: "hit", d: path }), wire);
     if (line.kind === "branch") for (const s of [-1, 1]) group.append(draw("circle", { class: "unit", cx: mx + s * 3 * (b.x - a.x) / length, cy: my + s * 3 * (b.y - a.y) / length, r: 4.5, "fill-opacity": 0 }));
     if (p !== null && closed && few) {

@@ -35,8 +35,10 @@ async function compute(place = null) {
 function paintVerdict() {
   const one = seen.answer.modes.scenarios[0];
   $("verdict").className = one.stable === true ? "good" : one.stable === false ? "bad" : "";
-  $("verdict").textContent = `${seen.answer.title}: ${seen.answer.verdict}`;
-  $("outside").querySelector("span").textContent = [seen.answer.outside, ...one.warnings.map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
+  const least = [...seen.modes].sort((a, b) => a.damping_percent - b.damping_percent)[0], [low, high] = state.range;
+  const swing = least ? `least damped from ${number(low)} to ${number(high)} Hz: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} % (${Object.keys(least.components).slice(0, 2).join(", ")})` : `no oscillation from ${number(low)} to ${number(high)} Hz`;
+  $("verdict").textContent = `${seen.answer.title}: ${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"}; ${swing}`;
+  $("outside").querySelector("span").textContent = [`${seen.answer.verdict}.`, seen.answer.outside && `${seen.answer.outside}.`, ...one.warnings.map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
   $("wider").hidden = Boolean(SAVED) || !seen.answer.outside || state.range[1] >= 1000;
 }
 async function loadInfo() {

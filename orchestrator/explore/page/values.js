@@ -123,7 +123,7 @@ function painted(begin, what) {
     seen.timing[`${what} ms`] = ms;
     document.body.dataset[what] = ms.toFixed(1);
     document.body.dataset[`${what}Count`] = +(document.body.dataset[`${what}Count`] ?? 0) + 1;
-    seen.timing.text = `${what} painted ${ms < 1000 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`} after the input`;
+    seen.timing.text = `${what === "exact" ? "modes computed and drawn" : "estimate drawn"} within ${ms < 1000 ? `${ms.toFixed(0)} ms` : `${(ms / 1000).toFixed(1)} s`}`;
     tick();
   }, 0));
 }
