@@ -34,7 +34,6 @@ def unit_of(info: VariableInfo, given: str | None) -> str:
 
 
 def factor(unit: str, target: str, name: str) -> float:
-    """The number of ``target`` in one ``unit``."""
     try:
         return to_unit(f"1 {unit}", target)
     except ValueError as error:
@@ -96,7 +95,6 @@ class Bases:
         return kiloampere * peak[value] * factor("kA", unit, name)
 
     def power_unit(self, unit: str, base: str | None, name: str) -> float:
-        """Number of the FMU's units in 1 pu of power on the rating."""
         if unit == PER_UNIT:
             return self.rating / self._power_base(base, name)
         for mega in ("MW", "Mvar", "MVA"):
@@ -105,7 +103,6 @@ class Bases:
         raise ValueError(f"{name}: {unit!r} is not a unit of power; use pu, W, var or VA with their prefixes")
 
     def frequency_unit(self, unit: str, name: str) -> float:
-        """Number of the FMU's units in 1 pu of frequency."""
         if unit == PER_UNIT:
             return 1.0
         if "Hz" in unit:

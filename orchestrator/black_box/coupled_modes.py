@@ -48,7 +48,6 @@ class BoxedSystem:
     def modes(
         self, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
     ) -> list[Mode]:
-        """Modes of a range of frequencies, least damped first."""
         return find_spectrum(self.model, lowest_hz, highest_hz).modes
 
     def participation(self, mode: Mode) -> float:

@@ -60,7 +60,6 @@ class FrequencyResponse:
 
     @property
     def z(self) -> Complex:
-        """The points e^{jωH} on the unit circle."""
         return np.asarray(np.exp(2j * np.pi * self.frequencies * self.step_size))
 
     @property

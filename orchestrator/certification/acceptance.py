@@ -24,7 +24,6 @@ class Acceptance:
         return list(self.report["checks"])
 
     def keep(self, folder: Path) -> None:
-        """Write the report into a certificate's folder."""
         text = json.dumps(self.report, indent=1, ensure_ascii=False)
         write_text(folder / KEPT, text + "\n")
 

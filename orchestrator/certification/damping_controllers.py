@@ -21,8 +21,6 @@ _AS_DECLARED = " as declared by the applicant"
 
 @dataclass(frozen=True)
 class DampingControllers:
-    """Active damping controllers of the converter."""
-
     pod: str
     source: str
     # values to be set for these controllers, by the FMU's variable.
@@ -70,7 +68,6 @@ def variable(letter: str) -> str:
 
 
 def _unseen(description: FmuDescription, known: Mapping[str, bool | None], pod: str) -> str:
-    """Letters of active controllers with a switch whose effect cannot be seen."""
     switched = [letter for letter in pod.removeprefix("none") if known[letter] is not None]
     return "".join(letter for letter in switched if f"delta_{letter}_pod" not in description.variables)
 
@@ -81,7 +78,6 @@ def _with_unseen(source: str, unseen: str) -> str:
 
 
 def _partly(known: Mapping[str, bool | None], pod: str) -> str:
-    """The source of ``pod`` if the FMU does not show both controllers."""
     hidden = [f"POD-{letter.upper()}" for letter, value in known.items() if value is None]
     if len(hidden) == len(known):
         return DECLARED
@@ -89,7 +85,6 @@ def _partly(known: Mapping[str, bool | None], pod: str) -> str:
 
 
 def _state(description: FmuDescription, request: CertificationRequest, letter: str) -> bool | None:
-    """Whether a controller is on; None where the FMU does not show it."""
     name = variable(letter)
     bound = _bound(description, name)
     if bound is not None:

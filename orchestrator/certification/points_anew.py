@@ -49,7 +49,6 @@ def chosen_points(content: dict[str, Any], wanted: Sequence[float] = (), *, ever
 def verify_points(
     folder: Path, content: dict[str, Any], reactances: Sequence[float], executor: Executor, report: CountReport = nobody
 ) -> Verification:
-    """Compute points anew, with and without the converter, and compare them with what was certified."""
     found = Verification()
     case = load_case(folder / CASE)
     study = {name: StudyCase.of(case.prepare([name], {"grid.X_L": reactances[0]})[0]) for name in (WITHOUT, WITH)}
@@ -82,8 +81,6 @@ def _compare_point(
 
 
 def _differ_figures(point: dict[str, Any], scenario: str, again: PointResult, tolerance: float) -> Iterator[str]:
-    """Differences in stability at all frequencies, in the power fed in, and in the model that replaces the
-    converter."""
     stated, growth = point["growth"][scenario], again.growth
     known = np.nan if stated is None else float(stated)
     if not (np.isnan(known) and np.isnan(growth)) and not abs(known - growth) <= tolerance * max(1.0, abs(growth)):
@@ -106,7 +103,6 @@ def _stated_modes(point: dict[str, Any], scenario: str) -> list[dict[str, Any]]:
 
 
 def _differ_modes(stated: list[complex], again: list[complex], tolerance: float) -> tuple[str, str]:
-    """A fault, or otherwise a sentence on the difference."""
     if len(stated) != len(again):
         return f"{len(again)} come out and {len(stated)} were certified", ""
     pairs = zip(_sorted(stated), _sorted(again), strict=True)

@@ -25,19 +25,16 @@ Hashes = Mapping[str, str | None]
 
 
 def details(c: Certification) -> str:
-    """Names, number, date, and lines to sign."""
     rows = [[label, escape(text).replace("\n", "<br>") or _LINE] for label, text in c.details.rows()]
     rows += [[f"Signature of the {who}", _LINE] for who in ("tester", "applicant")]
     return table("Filled in from the file of --details, or by hand", ["", ""], rows, left=2)
 
 
 def signal_name(signal: str) -> str:
-    """The signal of the time-domain criterion, in words."""
     return "the frequency at bus 2" if signal == FREQUENCY else "SG1's active power"
 
 
 def converter(c: Certification, hashes: Hashes) -> str:
-    """The FMU, its changed values, and how its modes were found."""
     origin = read_origin(c.description.path)
     values = {**c.request.values, **c.controllers.settings, **c.request.study_values}
     given = {
@@ -100,7 +97,6 @@ def binding(c: Certification, hashes: Hashes) -> str:
 
 
 def acceptance(c: Certification) -> str:
-    """The results of `gfor fmu check`."""
     if c.acceptance is None:
         return "<p>They were not run (--no-check).</p>"
     marks = {"fail": "bad", "pass": "good"}

@@ -43,13 +43,11 @@ class CertificationRequest:
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """Changes of the study itself, by which it departs from the norm."""
         changed = {f"converter.{name}": self.values[name] for name in GIVEN if name in self.values}
         return tuple(f"{name} = {shown(value)}" for name, value in {**self.study_values, **changed}.items())
 
 
 def same_reactance(one: float, other: float) -> bool:
-    """Whether two reactances [pu] are equal."""
     return math.isclose(one, other, rel_tol=1e-9)
 
 

@@ -44,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Build every model and print the files' paths."""
     if options.from_dll is not None:
         return _from_dll(options)
     if options.host is not None:

@@ -36,7 +36,6 @@ def show(found: Certificate[Judged], files: Sequence[Path], folder: Path, consol
 
 
 def _verdicts(found: CodeCertificate) -> PlainTable:
-    """The verdict on the whole, and on each row with its narrowest margin."""
     table = make_table(f"{found.code.title}: {found.description.model_name}", "Row", "Verdict", "Criteria met",
                        "Least margin", "Remark", left=99)  # fmt: skip
     judged = [v for v in found.verdicts if v.judged]

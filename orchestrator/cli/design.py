@@ -44,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Design, print, and write the parameter file."""
     if options.points is not None:
         _check_over_points(options)
         out = options.out and _writable(_given(options.out))

@@ -12,14 +12,12 @@ from orchestrator.coordinated_design.study import ALL, PointsDesignRequest
 
 
 def add_points_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options that a design over operating points has beside those of a design for one."""
     group = parser.add_argument_group("over operating points")
     add_request_arguments(group, PointsDesignRequest)
     add_executor_arguments(group)
 
 
 def run_over_points(options: argparse.Namespace, path: Path) -> int:
-    """Design, write the files and print."""
     several = {"controllers": tuple(options.controller), "components": tuple(options.component),
                "modes": () if ALL in options.mode else tuple(options.mode)}  # fmt: skip
     with working_in(options, "design", STUDY, path.with_suffix(".points"), **several) as (planned, compute, folder):

@@ -25,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Plan, compute, write and print."""
     with working_in(options, "screen", STUDY) as (planned, compute, folder):
         _merge(options.merge, folder / POINTS)
         found, shard = compute(options.shard), options.shard

@@ -42,7 +42,6 @@ class PodPlace:
 
     @classmethod
     def of(cls, name: str) -> "PodPlace":
-        """From ``component.controller``."""
         component, _, controller = name.rpartition(".")
         return cls(component, controller)
 
@@ -115,12 +114,10 @@ class OpenLoops:
         return whole
 
     def solve(self, setting: Setting) -> ClosedLoop:
-        """Eigenvalues and eigenvectors of the closed loop."""
         values, left, right = scipy.linalg.eig(self.closed(setting), left=True, right=True)
         return ClosedLoop(self._with_rest(values), left, right)
 
     def eigenvalues(self, setting: Setting) -> Complex:
-        """Eigenvalues of the closed loop [rad/s]."""
         return self._with_rest(np.linalg.eigvals(self.closed(setting)).astype(complex))
 
     def _with_rest(self, values: Complex) -> Complex:

@@ -58,8 +58,6 @@ class PointModes:
 
 @dataclass(frozen=True)
 class PointsRecord(Kept):
-    """The points of a task, in its order."""
-
     points: tuple[PointModes, ...]
 
     @property
@@ -69,8 +67,6 @@ class PointsRecord(Kept):
 
 @dataclass(frozen=True)
 class PointsTask(Task):
-    """Operating points with outages that are computed together."""
-
     record = PointsRecord
     items: tuple[Item, ...]
     places: tuple[PodPlace, ...]  # loops that are measured; none where only the modes are asked for
@@ -86,7 +82,6 @@ class PointsTask(Task):
 
 
 def compute_points(task: PointsTask) -> PointsRecord:
-    """Compute all points of a task; failures become records as well."""
     return computed(task, _of_task)
 
 

@@ -52,7 +52,6 @@ class SettingSpace:
         return SettingSpace([group], self._gain_bounds, self.frequency)
 
     def clipped(self, x: Numbers) -> Numbers:
-        """The nearest vector within the bounds."""
         return np.clip(x, self.lowest, self.highest)
 
     def vector(self, turns_deg: Sequence[float], centres: Sequence[float], gains: Sequence[float]) -> Numbers:

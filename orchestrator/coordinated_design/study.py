@@ -102,7 +102,6 @@ class PointsDesignPlan:
 
 
 def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesignPlan:
-    """Check a design over operating points, and build the FMUs that it needs."""
     require_controllers(request.controllers)
     groups = _groups(case, request)
     known = [table.name for table in case.table.analysis.modes]
@@ -132,7 +131,6 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
 
 
 def naming_of(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -> Mapping[str, Mode]:
-    """The modes that a case names, from the names of the states and the candidates."""
     return modes_named(case, names, modes).named
 
 
@@ -260,7 +258,6 @@ def _confirmed(
 
 
 def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
-    """N_S of every candidate."""
     own = {place: group.stages for group in plan.groups for place in group.places}
     plans = plan.prepared.system.components
     return {
@@ -270,7 +267,6 @@ def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
 
 
 def _frequency(points: Sequence[PointModes]) -> float:
-    """The mean frequency of the least damped electromechanical modes [rad/s]."""
     found = [point.values[point.swinging[0]].imag for point in points if point.swinging]
     if not found:
         raise AnalysisError("no operating point has a mode from 0.1 to 2 Hz, so there is nothing to damp")

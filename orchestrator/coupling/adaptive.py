@@ -138,7 +138,6 @@ class AdaptiveLoop:
             return error_in_tolerances
 
     def _once(self, index: int, length: float, start: "_Start") -> Values:
-        """The outputs after one step [s] from the start."""
         start.go_back(length)
         self._inner.advance(index, 1, length)
         return self._y.copy()

@@ -54,17 +54,14 @@ class Recorder:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """Times of the rows that are kept [s]."""
         return self._kept.joined(self._first, self._times[: self._filled], self._block[: self._filled])[0]
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """Recorded values, a row for each time and a column for each name."""
         return self._kept.joined(self._first, self._times[: self._filled], self._block[: self._filled])[1]
 
     @property
     def rows(self) -> int:
-        """Number of rows that were recorded, whether they are kept in memory or not."""
         return self._first + self._filled
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:

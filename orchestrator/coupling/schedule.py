@@ -96,7 +96,6 @@ class Schedule:
         return max(1, math.ceil(step_size / self.micro_step - 1e-6))
 
     def check(self, components: set[str]) -> None:
-        """Raise unless every component is in exactly one group."""
         listed = [name for group in self.groups for name in group]
         wrong = {
             "not in any group": components - set(listed),

@@ -23,7 +23,6 @@ class StepCounts:
     longest: float = 0.0
 
     def accept(self, count: int, step_size: float) -> None:
-        """Count steps [s]."""
         self.accepted += count
         self.shortest, self.longest = min(self.shortest, step_size), max(self.longest, step_size)
 

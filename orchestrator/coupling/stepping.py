@@ -64,7 +64,6 @@ class Stepper(CoupledComponents):
 
     @property
     def time(self) -> float:
-        """Present time [s]."""
         return self.clock.time(self.index)
 
     def exchange(self) -> None:

@@ -152,7 +152,6 @@ class OwnFederate:
         return {"protocol": PROTOCOL, "version": version("gfor-cosim"), "guid": self._description.guid}
 
     def do_configure(self, setting: dict[str, Any]) -> None:
-        """Take times, and the names of the inputs that are fed."""
         self._setting = setting
 
     def do_begin(self) -> None:
@@ -187,7 +186,6 @@ class OwnFederate:
         self._fmu().set(values)
 
     def do_values(self, names: list[str]) -> dict[str, float | bool]:
-        """Read variables of any numeric type."""
         return self._fmu().values(names)
 
     def _real(self, command: str, references: list[int], values: list[float]) -> list[float]:

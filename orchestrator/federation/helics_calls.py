@@ -70,7 +70,6 @@ def ask(federate: Any, target: str, query: str) -> Any:
 
 
 def optional_subscription(federate: Any, name: str, unit: str) -> Any:
-    """An input that may stay without a source."""
     helics = library()
     handle = helics.helicsFederateRegisterSubscription(federate, name, unit)
     helics.helicsInputSetOption(handle, helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, 1)

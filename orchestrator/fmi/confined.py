@@ -69,7 +69,6 @@ class ConfinedProcess:
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended."""
         return self._process.poll() is None
 
     @property

@@ -44,8 +44,6 @@ class Form(IntEnum):
 
 @dataclass(frozen=True)
 class PhasorMap:
-    """Voltage or current as the FMU has it."""
-
     form: Form
     variables: tuple[str, ...]
     # Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
@@ -108,7 +106,6 @@ class PortMap:
 
     @property
     def omega(self) -> float:
-        """Rated angular frequency [rad/s]."""
         return 2 * pi * self.f_n
 
     @property

@@ -57,7 +57,6 @@ def host_path() -> Path:
 
 
 def compile_programs() -> list[Path]:
-    """Compile both, or find them compiled; returns their paths."""
     try:
         wine.find_wine()
         mailbox_library()

@@ -39,7 +39,6 @@ class InteractionsPlan:
 
     @property
     def vendors(self) -> tuple[str, ...]:
-        """The vendors, in the order of their first places."""
         return vendors_of(self.places)
 
     def converters(self, name: SystemName) -> frozenset[str]:
@@ -50,7 +49,6 @@ class InteractionsPlan:
 
     @cached_property
     def study(self) -> StudyCase:
-        """What all systems have in common."""
         return StudyCase.of(self.prepared, self.layers, self.step_size)
 
     def task(self, exchanged: Exchanged) -> SystemTask:

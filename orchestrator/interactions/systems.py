@@ -34,7 +34,6 @@ class SystemName:
 
     @property
     def text(self) -> str:
-        """In words: ``A + B``, ``A alone``."""
         match self.kind:
             case Kind.ALONE:
                 return f"{self.names[0]} alone"

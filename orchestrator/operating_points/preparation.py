@@ -117,7 +117,6 @@ class ItemPreparation:
 
 
 def _power_of(units: Collection[str], before: PreparedScenario) -> float:
-    """Active power of units [MW]."""
     flow, plans = before.power_flow, before.system.components
     return sum(flow.powers[name].real * plans[name].number("S_n") for name in units) if flow is not None else 0.0
 

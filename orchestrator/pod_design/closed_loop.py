@@ -41,7 +41,6 @@ class Placed:
 
     @property
     def eigenvalue(self) -> complex:
-        """[rad/s]"""
         return self.pair.eigenvalue
 
     @property

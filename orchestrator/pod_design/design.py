@@ -150,7 +150,6 @@ class PodDesign:
 
     @property
     def unbounded_gain(self) -> float:
-        """The gain before the bounds [pu]."""
         return self.gain_compensated if self.request.compensated_gain else self.gain_non_compensated
 
     @property
@@ -181,7 +180,6 @@ class PodDesign:
 
     @property
     def worst_other(self) -> Mode | None:
-        """The least damped mode with the final setting, leaving out the mode that counts as the target."""
         return self.after.worst_beside(self.final.eigenvalue)
 
     @property
@@ -265,8 +263,6 @@ def _with_stability(stability: Stability) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Start:
-    """The scenario, the operating point and the modes before the design begins."""
-
     case: str
     request: DesignRequest
     target: Target

@@ -187,7 +187,6 @@ def _crossing(loop: PodLoop, low: Placed, high: Placed, required: float) -> Plac
 
 
 def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
-    """The best damping around the best of some gains."""
     if len(points) == 1:
         return points[0]
     k = max(range(len(points)), key=lambda i: points[i].damping_ratio)

@@ -14,7 +14,6 @@ from orchestrator.errors import InputError
 
 
 def require_controllers(controllers: Sequence[str]) -> None:
-    """Refuse a controller that there is not, and none."""
     known = ", ".join(DAMPING_CONTROLLERS)
     if not controllers:
         raise InputError(f"controllers is empty; name one or both of {known}")

@@ -69,7 +69,6 @@ class Study(Generic[Asks, Shown]):
 
     @property
     def asks(self) -> type:
-        """The class of the request."""
         return cast("type", self.request)
 
     @property

@@ -62,7 +62,6 @@ class Kept:
 
     @property
     def error(self) -> str | None:
-        """The message of the failure."""
         return None if self.failure is None else self.failure.text
 
     @property

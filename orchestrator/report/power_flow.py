@@ -21,7 +21,6 @@ _DIGITS = {"v_pu": 4, "angle_deg": 2, "rating_mva": None, "losses_mw": 3}
 
 
 def totals(found: dict[str, Any]) -> list[tuple[str, str]]:
-    """Generation, losses, the slack's share and the range of voltages, in words."""
     slack, voltages = found["slack"], [bus["v_pu"] for bus in found["buses"]]
     share = "" if slack["share_percent"] is None else f", {slack['share_percent']:.0f} % of the generation"
     return [

@@ -49,12 +49,10 @@ class ScreeningPlan(OperatingPoints):
 
     @property
     def number_of_items(self) -> int:
-        """Operating points times outages."""
         return len(self.items)
 
 
 def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
-    """Check a screening, and build the FMUs that it needs."""
     region, sharing = request.region, cast("SharingRule | None", request.sharing)
     read = read_operating_points(case, request, request.points, request.outages, request.scenario)
     study = StudyCase.of(read.prepared, read.layers, request.step_size)

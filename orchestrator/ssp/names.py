@@ -37,7 +37,6 @@ def tag(name: str) -> str:
 
 
 def children(element: Element, path: str) -> list[Element]:
-    """Elements at a path such as ``ssd:Elements/ssd:Component``."""
     return element.findall(path, NAMESPACES)
 
 

@@ -60,7 +60,6 @@ def platform_of(fmi_version: str) -> str:
 
 
 def _run(description: FmuDescription) -> tuple[bytes, bytes, bytes]:
-    """Stimuli and references as CSV, and the serialised state after initialisation."""
     variables = description.variables.values()
     inputs = {v.name: float(v.start or 0) for v in variables if v.causality == "input" and v.type == "Real"}
     outputs = [v.name for v in variables if v.causality == "output" and v.type == "Real"]
@@ -96,7 +95,6 @@ def as_csv(rows: Iterable[Sequence[str]]) -> bytes:
 
 
 def parameter_set(name: str, values: Mapping[str, float | bool | str], description: FmuDescription) -> bytes:
-    """Values of variables in the form of SSP."""
     root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name=name)
     listed = SubElement(root, tag("ssv:Parameters"))
     for variable, value in values.items():
@@ -150,7 +148,6 @@ def manifest(files: Mapping[str, tuple[str, str, str, bytes]]) -> bytes:
 
 
 def _purpose(name: str) -> tuple[str, str, str]:
-    """Type, role and description of a file."""
     match name.rpartition(".")[2]:
         case "ssv":
             return PARAMETER_SET_TYPE, "parameter", "Parameters of the smoke test"

@@ -27,8 +27,6 @@ KINDS = {
 
 @dataclass(frozen=True)
 class ScenarioAnswer:
-    """One line of the first table."""
-
     subject: str
     good: bool | None  # whether that is good; None where it is not known
     verdict: str

@@ -34,8 +34,6 @@ _WEAKEST = 1e-3
 
 @dataclass(frozen=True)
 class Comparison:
-    """One signal of two runs over the time that both have."""
-
     expression: str
     unit: str
     deviations: tuple[float, float]  # largest deviation of each run from its own start [unit of the signal]
@@ -140,7 +138,6 @@ def strongest_modes(curve: xr.DataArray, start: float, stop: float | None = None
 
 
 def _part(window: xr.DataArray) -> WindowPart:
-    """A part of a signal with its own modes, none where they cannot be identified."""
     try:
         modes = _modes_of(window)
     except AnalysisError:

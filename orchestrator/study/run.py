@@ -63,14 +63,11 @@ class ModeShift:
 
     @property
     def shift(self) -> float:
-        """How far the communication step moves the eigenvalue [rad/s]."""
         return abs(self.eigenvalue - self.continuous)
 
 
 @dataclass
 class RunResult:
-    """A scenario's modes and its simulated response."""
-
     modes: ModesResult
     dataset: xr.Dataset
     statistics: StepStatistics | None = None

@@ -83,7 +83,6 @@ class StepChoice:
         return [trial for trial in self.trials if trial.schedule == schedule]
 
     def largest(self, schedule: ScheduleName) -> TriedStep | None:
-        """The largest step that is within the error with all shorter ones that were tried; None without one."""
         found = None
         for trial in self.of(schedule):
             if not trial.is_within(self.allowed):
@@ -242,7 +241,6 @@ def _doubts(blocks: Blocks, schedule: Schedule, model: LinearModel) -> tuple[str
 
 
 def step_choice_json(choice: StepChoice) -> dict[str, Any]:
-    """The machine-readable form of one scenario."""
     return {
         "scenario": choice.prepared.name,
         "allowed": {"hertz": choice.allowed.hertz, "points": choice.allowed.points},

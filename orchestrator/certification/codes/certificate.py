@@ -22,8 +22,6 @@ from orchestrator.points.task import StudyCase
 
 @dataclass
 class CodeCertificate(Certificate[RowVerdict]):
-    """A code's rows on the test bench."""
-
     code: GridCode
     f_n: float
     results: Mapping[str, BenchResult]

@@ -52,7 +52,6 @@ def chosen_rows(content: dict[str, Any], wanted: Sequence[str] = (), *, every: b
 def verify_rows(
     folder: Path, content: dict[str, Any], names: Sequence[str], executor: Executor, report: CountReport = nobody
 ) -> Verification:
-    """Compute rows anew, from the code's table and the FMU in the folder, and compare them with what was certified."""
     found = Verification()
     code = code_for(content["code"], content["declared"])
     rows = {row.name: row for row in code.rows}
@@ -83,7 +82,6 @@ def _as_the_table(folder: Path, content: dict[str, Any], code: GridCode, row: Co
 
 
 def _compared(row: CodeRow, content: dict[str, Any], data: xr.Dataset, again: BenchResult) -> tuple[str, str]:
-    """A fault, or otherwise words on what agrees."""
     if again.failure:
         return f"it cannot be computed again: {again.failure}", ""
     stated = next(entry for entry in content["rows"] if entry["row"] == row.name)

@@ -45,7 +45,6 @@ Content = Mapping[str, Any]
 
 
 def chapters_of(place: Path) -> list[Chapter]:
-    """The chapters of a folder, or of one JSON file, of any study but runs and sweeps."""
     files = [place] if place.is_file() else sorted(place.glob("*.json"))
     if place.is_dir() and (manifest := read_manifest(place)) is not None:
         manifest.check(file.name for file in files)
@@ -219,7 +218,6 @@ _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
 
 
 def sections(chapter: Chapter, number: int) -> str:
-    """The chapter's figures: its own, or the sections of the result's own page."""
     place = chapter.source if chapter.source.is_dir() else chapter.source.parent
     if not chapter.page or not (place / chapter.page).is_file():
         return chapter.content
@@ -231,7 +229,6 @@ def sections(chapter: Chapter, number: int) -> str:
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
-    """Question and where its results lie, answer, how sure, and what was not judged, of all chapters."""
     rows = []
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
@@ -260,7 +257,6 @@ def made(place: Path) -> list[str]:
 
 
 def changes(old: Path, chapters: Sequence[Chapter]) -> str:
-    """What changed since an older page of the same studies."""
     try:
         found = re.search(r'id="answers">(.*?)</script>', old.read_text(encoding="utf-8"), re.DOTALL)
         before = {(x["question"], x["source"]): x["answer"] for x in json.loads(found[1])} if found else None
@@ -287,7 +283,6 @@ def kept_answers(chapters: Sequence[Chapter]) -> str:
 
 
 def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
-    """Of a sweep's trajectories; its section is `studies.sweep`."""
     named = sweep["damping"].where(sweep["named"] == 1)
     least = named if bool(named.notnull().any()) else sweep["damping"]
     at = least.where(least == least.min(), drop=True)

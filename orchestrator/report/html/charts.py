@@ -56,7 +56,6 @@ class Frame:
         return _LEFT + across * (_WIDTH - _LEFT - _RIGHT), self.height - _BOTTOM - up * (self.height - _TOP - _BOTTOM)
 
     def svg(self, name: str, extra: str = "") -> str:
-        """The finished picture; ``name`` is read out by a screen reader."""
         right, bottom = _WIDTH - _RIGHT, self.height - _BOTTOM
         grid: list[str] = []
         named = [(float(k), escape(text)) for k, text in enumerate(self.x_names)]

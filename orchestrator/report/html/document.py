@@ -34,7 +34,6 @@ def document(
 
 
 def _footer(title: str) -> str:
-    """The title at the foot of every printed page, beside its number."""
     safe = "".join(c if c.isalnum() or c in " .,:;()_-" else f"\\{ord(c):06x}" for c in title)
     return f'@page {{ @bottom-left {{ content: "{safe}"; }} }}'
 

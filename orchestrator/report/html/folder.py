@@ -20,8 +20,6 @@ SUMMARY = "summary.json"  # what a folder of `gfor run` has, and no other
 
 @dataclass
 class Results:
-    """Contents of result folders, read as far as they are there."""
-
     folder: Path
     case: Case
     scenarios: list[dict[str, Any]]  # one summary a scenario, as in ``summary.json``
