@@ -41,9 +41,7 @@ def factor(unit: str, target: str, name: str) -> float:
 
 
 def amount(text: str | float, unit: str, what: str) -> float:
-    """A number from text with a unit, which is required.
-
-    Raises a `ValueError` if the text is not a quantity of this kind, or the number does not exceed 0."""
+    """A number from text with a unit, which is required."""
     try:
         value = to_unit(text, unit)
     except ValueError as error:
@@ -54,11 +52,7 @@ def amount(text: str | float, unit: str, what: str) -> float:
 
 
 class Bases:
-    """Rating and rated voltage of an FMU, and the factors from its units to per unit.
-
-    ``rating``: s_n [MVA].
-    ``voltage``: v_n, line to line [kV]; None if the binding does not give it.
-    ``frequency``: f_n [Hz]."""
+    """Rating and rated voltage of an FMU, and the factors from its units to per unit."""
 
     def __init__(self, rating: float, voltage: float | None, frequency: float) -> None:
         self.rating, self.voltage, self.frequency = rating, voltage, frequency

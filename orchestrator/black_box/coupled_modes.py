@@ -75,10 +75,7 @@ def linearize_with_box(
 ) -> BoxedSystem:  # fmt: skip
     """Identify one component and linearise the coupled system around where the master is.
 
-    ``master``: initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as
-    well.
-    ``component``: name of the black box. Only its inputs are set and its outputs read.
-    ``excitation``: signals that excite the box; the usual signals where None.
+    ``master``: at the power flow's operating point; nothing is stepped, so an unstable system serves as well.
     ``restore``: whether the bench saves and restores the box's state; None if it does so whenever the FMU can."""
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")
@@ -98,10 +95,7 @@ def modes_with_boxes(
     prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None = None,
     excitation: Excitation | None = None, report: Callable[[str], None] | None = None,
 ) -> ModesResult:  # fmt: skip
-    """Modes as `modes_of` finds them; components that hide their states are identified first.
-
-    ``prepared`` and ``master`` and ``frequency_range`` and ``critical``: as `modes_of`; to identify anything, the
-    master must be at rest at the power flow's operating point."""
+    """Modes as `modes_of` finds them; components that hide their states are identified first."""
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:
         return modes_of(prepared, master, frequency_range, critical)

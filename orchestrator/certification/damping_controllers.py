@@ -41,9 +41,7 @@ class DampingControllers:
 
 
 def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
-    """The damping controllers that a request sets or declares for an FMU.
-
-    Raises `InputError` if ``--pod`` contradicts ``--set`` or the binding."""
+    """The damping controllers that a request sets or declares for an FMU."""
     known = {letter: _state(description, request, letter) for letter in "pq"}
     if request.pod is None:
         active = "".join(letter for letter, value in known.items() if value) or "none"

@@ -111,8 +111,6 @@ def acceptance(c: Certification) -> str:
 
 
 def provenance(c: Certification, hashes: Hashes) -> str:
-    """The environment of the computation, hashes, commands that compute a point again, and the limits of the
-    certificate's proof."""
     machine = table("Computed on", ["", ""], [[escape(k), escape(v)] for k, v in environment().items()], left=2)
     files = table("SHA-256 of the files beside this page", ["File", "SHA-256"],
                   [[escape(name), str(value)] for name, value in hashes.items()], left=2)  # fmt: skip

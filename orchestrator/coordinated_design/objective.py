@@ -109,9 +109,6 @@ _ROUNDING = 1e-7
 
 
 def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, point: int = 0) -> Worth:
-    """The worth of a spectrum.
-
-    ``growing`` and ``growing_before``: as `growth` gives them, with the setting and without it [1/s]."""
     damped = [mode for mode in watched if mode.floor is None]
     worst = min((mode.damping for mode in damped), default=1.0)
     rest = min((mode.damping for mode in damped if not mode.hardly_moved), default=worst)

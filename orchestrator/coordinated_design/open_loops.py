@@ -128,9 +128,7 @@ class OpenLoops:
         return (*self.names, *(f"stage {k + 1}" for k in range(size - len(self.A))))
 
     def whole(self, vector: Complex, *, left: bool = False) -> Complex:
-        """An eigenvector of a closed loop in all n states and the stages.
-
-        ``vector``: as `solve` gives it, shape (r + k,)."""
+        """An eigenvector of a closed loop in all n states and the stages."""
         if self.right is None or self.left is None:
             return vector
         r = len(self.A)

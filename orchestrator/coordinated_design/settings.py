@@ -34,10 +34,7 @@ class PodGroup:
 
 
 class SettingSpace:
-    """Vectors x with three numbers for each group: turn and gain as parts of their ranges, logarithm of the centre.
-
-    ``gain_bounds``: of every gain [pu].
-    ``frequency``: ω of the modes to be damped [rad/s], to which the centres relate."""
+    """Vectors x with three numbers for each group: turn and gain as parts of their ranges, logarithm of the centre."""
 
     def __init__(self, groups: Sequence[PodGroup], gain_bounds: tuple[float, float], frequency: float) -> None:
         self.groups, self.frequency = tuple(groups), frequency

@@ -198,10 +198,7 @@ class PointsDesign:
 def design_over_points(
     plan: PointsDesignPlan, work: Work, stage: Callable[[str], None] = lambda text: None
 ) -> PointsDesign:
-    """Find the settings, and compute all modes anew with them.
-
-    ``plan``: as `plan_points_design` gives it.
-    ``work``: counts the points first without and then with the controllers."""
+    """Find the settings, and compute all modes anew with them."""
     stage("operating points without the controllers")
     before = modes_at(plan, plan.off, plan.candidates, replace(work, report=lambda n, of: work.report(n, 2 * of)))
     usable = [k for k, point in enumerate(before) if point.loops is not None]
@@ -292,10 +289,7 @@ def values_of(groups: Sequence[PodGroup], settings: Sequence[PodSetting]) -> dic
 def modes_at(
     plan: PointsDesignPlan, values: Mapping[str, Value], places: Sequence[PodPlace], work: Work
 ) -> list[PointModes]:
-    """The modes of all operating points and outages with some values, from the power flow on.
-
-    ``values``: by ``component.variable``; they go before all layers.
-    ``places``: loops that are measured as well."""
+    """The modes of all operating points and outages with some values, from the power flow on."""
     study = StudyCase.of(plan.prepared, (*plan.request.layers, OptionValues.of(values)), plan.request.step_size)
     parts = [plan.read.items[k : k + TOGETHER] for k in range(0, len(plan.read.items), TOGETHER)]
     tasks = [PointsTask(study, part, tuple(places)) for part in parts]

@@ -137,11 +137,8 @@ class Recorder:
     def position(self) -> dict[str, Any]:
         """Where the recording stands, with all rows handed to the sink; without one, the rows themselves.
 
-        Returns
-        -------
-        ``rows``, ``index`` (communication step of the last row), and ``block`` (rows of a block); without a sink also
-        ``times`` and ``values``, which need ``keep`` = 1.
-        """
+        Beside ``rows`` and ``block`` (rows of a block) the communication step of the last row; without a sink also
+        ``times`` and ``values``, which need ``keep`` = 1."""
         self._hand_over()
         found: dict[str, Any] = {"rows": self.rows, "index": self._last_index, "block": len(self._times)}
         if self._sink is None:

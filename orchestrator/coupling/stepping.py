@@ -83,10 +83,7 @@ class Stepper(CoupledComponents):
         self.handed_over = False
 
     def advance(self, count: int) -> None:
-        """Do ``count`` communication steps and nothing else.
-
-        Raises a `ComponentError` with the time of the step that failed; ``index`` counts the steps that were completed.
-        """
+        """Do ``count`` communication steps and nothing else."""
         if self.wires:
             for index, part in self.wires.stretches(self.index, count):
                 self._advance(index, part)
@@ -122,10 +119,6 @@ class Stepper(CoupledComponents):
         return self._loop.seconds()
 
     def statistics(self, steps: int, seconds: float, before: Sequence[float]) -> StepStatistics:
-        """Speed of a run.
-
-        ``seconds``: how long it took [s].
-        ``before``: what `seconds` gave when it began."""
         names = [name for group in self.schedule.groups for name in group]
         spent = [after - then for after, then in zip(self.seconds(), before, strict=True)]
         if self.wires:  # the banks' own share is none of a component

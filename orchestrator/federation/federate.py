@@ -35,9 +35,7 @@ from orchestrator.fmi.instance import open_component
 
 
 class OwnFederate:
-    """An FMU that steps when HELICS grants it time.
-
-    ``to_join``: how long a broker is waited for [s]."""
+    """An FMU that steps when HELICS grants it time."""
 
     def __init__(self, name: str, description: FmuDescription, broker: str, to_join: float) -> None:
         self.name, self._description, self._broker, self._to_join = name, description, broker, to_join
@@ -47,10 +45,7 @@ class OwnFederate:
         self._component: Component | None = None
 
     def run(self) -> None:
-        """Join, and step until the federation ends.
-
-        Raises a `ComponentError, InputError` if the FMU gives no instance, the broker does not answer, or the
-        federation ends with an error."""
+        """Join, and step until the federation ends."""
         helics = library()
         with open_component(self.name, self._description, isolated=True) as component:
             self._component = component

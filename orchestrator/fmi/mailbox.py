@@ -110,9 +110,7 @@ def shared_memory(folder: Path) -> int | str:
 
 
 class Mailbox:
-    """Memory that two processes map.
-
-    ``memory``: as `shared_memory` gave it."""
+    """Memory that two processes map."""
 
     def __init__(self, memory: int | str) -> None:
         self.library = mailbox_library()

@@ -106,10 +106,6 @@ def _kept(events: list[EventTable]) -> list[EventTable]:
 
 
 def require_same_flow(wanted: Mapping[str, complex], prepared: PreparedScenario) -> None:
-    """Refuse a system whose power flow is another one.
-
-    ``wanted``: voltages of all buses [pu]; empty for a case without a power flow.
-    Raises an `InputError` if a voltage differs by more than `SAME_FLOW`."""
     found = voltages_of(prepared.power_flow)
     apart = {bus: abs(found.get(bus, 0j) - voltage) for bus, voltage in wanted.items()}
     worst = max(apart, key=lambda bus: apart[bus], default=None)

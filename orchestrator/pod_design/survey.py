@@ -40,11 +40,7 @@ class Survey:
 def survey(
     loop: PodLoop, initial: complex, others: Sequence[complex], stages: int, bounds: tuple[float, float]
 ) -> Survey:
-    """Rate settings over the whole range of gain, angle and centre.
-
-    ``initial`` and ``others``: the target and the other modes without the controller [rad/s].
-    ``stages``: N_S of the lead/lag, at least 1.
-    ``bounds``: of the gain [pu]."""
+    """Rate settings over the whole range of gain, angle and centre."""
     ground = _Ground(loop, initial, np.array(others, dtype=complex), stages, bounds)
     turns = np.linspace(-0.95, 0.95, _TURNS).tolist()
     centres = np.linspace(math.log(CENTRES[0]), math.log(CENTRES[1]), _CENTRES).tolist()

@@ -101,13 +101,7 @@ class ControllerDesign:
 
 
 def parameter_file_path(given: str | Path, argument: str = "path") -> Path:
-    """The path of a parameter file, beside which the design's JSON finds a place of its own.
-
-    Raises
-    ------
-    InputError
-        If it is none, or ends in ``.json``.
-    """
+    """The path of a parameter file, beside which the design's JSON finds a place of its own."""
     path = path_of(given, argument)
     if path.suffix.lower() == ".json":
         raise InputError(

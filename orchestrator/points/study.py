@@ -31,11 +31,6 @@ _WORKER = "orchestrator.points.worker"
 def choose_executor(
     workers: int | None, scheduler: str | None, imports: Sequence[str], tls: str | Path | None = None
 ) -> Executor:
-    """Where the points are computed.
-
-    ``workers``: number of processes on this machine; one for each core where None. ``scheduler``: address of a Dask
-    cluster, such as ``tcp://host:8786``; this machine where None. ``imports``: modules that each
-    worker imports before its first point. ``tls``: as `DaskCluster` takes it."""
     if scheduler is not None:
         if workers not in (None, 1):
             raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
@@ -103,9 +98,6 @@ class PointStudy(Study[Asks, Shown], Generic[Asks, Plan, Result, Shown]):
     def compute(
         self, planned: Plan, executor: Executor, folder: str | Path | None, report: CountReport, *more: Any
     ) -> Shown:
-        """Compute a plan, and close the executor.
-
-        ``folder``: its subfolder ``points`` keeps the points; without a folder they are forgotten. ``more``: further
-        arguments of the study."""
+        """Compute a plan, and close the executor."""
         with TemporaryDirectory() as passing, closing(executor):
             return self.shown(self.run(planned, Work.into(Path(folder or passing), executor, report), *more))

@@ -91,10 +91,7 @@ class ScreeningResult:
 
 
 def run_screening(plan: ScreeningPlan, work: Work, shard: Shard | None = None) -> ScreeningResult:
-    """Compute the stretches that are not stored yet, and follow the modes over all of them.
-
-    ``plan``: as `plan_screening` gives it.
-    ``shard``: the part to compute; all where None."""
+    """Compute the stretches that are not stored yet, and follow the modes over all of them."""
     part = shard or Shard()
     tasks = {k: task for k, task in enumerate(plan.tasks) if part.has(k)}
     sizes = [len(task.items) for task in tasks.values()]

@@ -15,13 +15,7 @@ from orchestrator.ssp.study import SspStudy, write_osp_step, write_study
 
 
 def ssp_members(name: str, title: str, system: System, stop_time: float, study: SspStudy) -> dict[str, bytes]:
-    """Members of the archive by path: the structure, the components' values and their FMUs.
-
-    ``name`` and ``title``: name and title of the system, as tools show them.
-    ``stop_time``: stop time of the default experiment [s].
-    ``study``: the parts of the scenario that SSP cannot express.
-    Raises an `InputError` if a value is of a type that cannot be written, or a connection does more than carry its
-    value."""
+    """Members of the archive by path: the structure, the components' values and their FMUs."""
     if disturbed := described(system.wires):
         raise InputError(
             f"an SSP cannot hold what a connection does to its value ({disturbed[0]}); remove the imperfections from "

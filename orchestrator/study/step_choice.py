@@ -101,14 +101,7 @@ def choose_step(
     prepared: PreparedScenario, allowed: Allowed, steps: Sequence[float] = (), schedules: Sequence[ScheduleName] = (),
     frequency_range: tuple[float, float] = (0.1, 2.0),
 ) -> StepChoice:  # fmt: skip
-    """What schedules do to a scenario's critical modes at several steps, against the continuous system.
-
-    ``steps``: communication steps [s]; by default `MULTIPLES` of the case's own.
-    ``schedules``: by default `TRIED`.
-    ``frequency_range``: of the critical modes [Hz].
-    Raises an `AnalysisError` if a component gives no derivatives, so that there is no continuous system to compare
-    with; if no mode is in range; or if the system is too large for all its eigenvalues.
-    Raises an `InputError` if no step fits the case's events."""
+    """What schedules do to a scenario's critical modes at several steps, against the continuous system."""
     lengths, left_out = _fitting(prepared, steps)
     with running(prepared.rescheduled("gauss-seidel")) as master:
         find_operating_point(master)

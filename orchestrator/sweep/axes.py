@@ -87,9 +87,6 @@ def parse_vary(text: str) -> Vary:
 
 
 def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
-    """Find the variable that is varied, and its values in the variable's unit.
-
-    Raises `InputError` if there is no such variable, or if a value does not fit its type, unit or range."""
     if vary.limits is not None and not vary.count:
         raise InputError(f"--vary {vary.key}: COUNT is missing; write {_FORMS}, or search for a limit with --until")
     if ":" in vary.key:

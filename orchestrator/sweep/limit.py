@@ -85,10 +85,6 @@ def search(
 
 @dataclass(frozen=True)
 class ParameterLimit:
-    """How far a parameter may go in one scenario.
-
-    ``key``, ``unit``, ``title``: The parameter, and the scenario's title."""
-
     key: str
     unit: str
     scenario: str

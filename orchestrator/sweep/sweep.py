@@ -164,9 +164,7 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
 
 def run_sweep(plan: SweepPlan, work: Work) -> SweepResult:
     """Compute the points that are not stored yet, then follow the modes. Further points are added where a mode is not
-    recognised.
-
-    ``plan``: A plan that `plan_sweep` has checked."""
+    recognised."""
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
     wanted: list[tuple[ScenarioSweep, GridPlace]] = [(sweep, place) for sweep in result.scenarios for place in grid]

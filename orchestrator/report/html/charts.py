@@ -87,10 +87,7 @@ class Frame:
 
 
 def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210) -> str:
-    """Curves over one axis; the pointer shows all values at its x.
-
-    ``curves``: at least one, with a point at least.
-    ``height``: of the picture [px]."""
+    """Curves over one axis; the pointer shows all values at its x."""
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
     frame = Frame(_span(x_all, 0.0), _span(y_all, 0.06), x_label, y_label, height)
