@@ -195,13 +195,12 @@ class PodDesign:
 
 
 def design_pod(
-    case: Case, request: DesignRequest, report: StageReport = lambda text: None, store: PointStore | None = None,
-    search: SearchOnLinearModels | None = None,
-) -> PodDesign:  # fmt: skip
+    case: Case, request: DesignRequest, report: StageReport, store: PointStore | None, search: SearchOnLinearModels
+) -> PodDesign:
     """Design a controller and check it on the closed loop.
 
     ``store``: keeps figures on the way as soon as they are there; those that are there already are not computed again.
-    ``search``: gives a refinement settings to try; by default it surveys all itself."""
+    ``search``: gives a refinement settings to try."""
     require_controllers([request.controller])
     if request.damping is not None and request.damping_increment is not None:
         raise InputError("--damping and --damping-increment both say what is required; give one of them")
@@ -272,7 +271,7 @@ class _Start:
     before: Surroundings
     naming: Naming
     examined: Examination
-    search: SearchOnLinearModels | None
+    search: SearchOnLinearModels
 
 
 def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
@@ -295,7 +294,6 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         return judged[placed.setting]
 
     def settings() -> Sequence[tuple[str, PodSetting]]:
-        assert start.search is not None
         return start.search(start.prepared.case, request, start.target, start.mode_name, loop, initial.imag)
 
     report("sensitivity of the mode")
@@ -313,9 +311,8 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     if request.refine:
         report("refinement")
         refinement = refine(
-            loop, off, filters, required, request.gain_bounds, judge, [m.eigenvalue for m in before.others],
-            settings if start.search else None, evenly=request.mode is None,
-        )  # fmt: skip
+            loop, off, filters, required, request.gain_bounds, judge, settings, evenly=request.mode is None
+        )
         final = refinement.chosen or designed
     after, examined = around(final), loop.examine(final.setting)
     margins = None
