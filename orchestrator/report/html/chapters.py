@@ -205,6 +205,12 @@ def _identified(file: Path, modes: Any) -> Chapter:
                    table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0))  # fmt: skip
 
 
+def _limits(file: Path, found: Any) -> Chapter:
+    answer = "; ".join(f"{x['scenario']}: {x['sentence']}" for x in found)
+    sure = f"{sum(len(x['tried']) for x in found)} values tried, then bisected"
+    return Chapter(file, f"How far may {found[0]['parameter']} go?", answer, None, sure)
+
+
 _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"device", "buses", "confirmed", "answer"}, _site),
     ({"counted_at_all_frequencies", "failures", "modes"}, _screening),
@@ -212,7 +218,7 @@ _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"settings", "verdict", "met", "ranking"}, _coordinated), ({"cells", "codes", "sentence"}, _matrix),
     ({"sentence", "verdict", "files", "seal"}, _certificate), ({"trusted", "checks", "faults"}, _check),
     ({"scenarios", "facts", "step_size_s"}, _modes), ({"expression", "deviations", "rms"}, _comparison),
-    ({"amplitude", "doubts"}, _identified),
+    ({"amplitude", "doubts"}, _identified), ({"holds_at", "beyond", "sentence"}, _limits),
 )  # fmt: skip
 """What the JSON of each study has, the first that fits."""
 
