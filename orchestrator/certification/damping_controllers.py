@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from orchestrator.cases.schema import Value
-from orchestrator.certification.request import CertificationRequest, shown
+from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.values import as_text
 
 SET = "set in the FMU"
 READ = "as the FMU's variables say"
@@ -111,6 +112,6 @@ def _refuse_contradiction(description: FmuDescription, request: CertificationReq
     for source, value in said.items():
         if value is not None and value is not on:
             raise InputError(
-                f"--pod {request.pod} needs {name} = {shown(on)}, but {source} has {name} = {shown(value)}; "
+                f"--pod {request.pod} needs {name} = {as_text(on)}, but {source} has {name} = {as_text(value)}; "
                 "leave one of them away, or make them agree"
             )

@@ -11,11 +11,10 @@ from orchestrator.certification.environment import environment
 from orchestrator.certification.figures import commands
 from orchestrator.certification.parameters import parameter_rows
 from orchestrator.certification.point import FREQUENCY
-from orchestrator.certification.request import shown
 from orchestrator.certification.study import Certification
 from orchestrator.fmi.origin import read_origin
 from orchestrator.fmi.port import BoundDescription
-from orchestrator.fmi.values import Scalar
+from orchestrator.fmi.values import Scalar, as_text
 from orchestrator.report.html.elements import table
 from orchestrator.report.linearised import exceptions_in_words
 
@@ -44,7 +43,7 @@ def converter(c: Certification, hashes: Hashes) -> str:
         "FMI": f"{origin.fmi_version}, co-simulation", "Guid": c.description.guid, "SHA-256": hashes[FMU],
         "Rating": _rating(c), "Voltage": _voltage(c),
         "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
-        "Values set": ", ".join(f"{k} = {shown(v)}" for k, v in values.items()) or "none",
+        "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",
         "Damping controllers": f"{texts.PODS[c.pod]}: {c.controllers.source}",
         "Watched in time": signal_name(c.signal),
         "In the modes": texts.converter_model(c.points[WITH, v.X_L] for v in c.verdicts),
@@ -86,7 +85,7 @@ def parameters(c: Certification) -> str:
 def _text(value: Scalar | None) -> str:
     if value is None:
         return "–"
-    return escape(shown(value) if not isinstance(value, float) else f"{value:.12g}")
+    return escape(as_text(value) if not isinstance(value, float) else f"{value:.12g}")
 
 
 def binding(c: Certification, hashes: Hashes) -> str:
