@@ -75,7 +75,7 @@ def _criteria(found: CodeCertificate) -> PlainTable:
     table = make_table("Criteria", "Row", "Criterion", "Found", "Margin", "", left=99)
     for v in found.verdicts:
         for f in v.findings:
-            table.add_row(v.row.name, f.criterion, f.text[:160], margin_of(f), v.word(f))
+            table.add_row(v.row.name, f.criterion, short(f.text, 160), margin_of(f), v.word(f))
     return table
 
 
