@@ -44,7 +44,6 @@ def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
 
 
 def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
-    """Read a report of ``gfor fmu check --json``."""
     remedy = "write it with `gfor fmu check FILE.fmu --json`, or leave --check away to have the tests run"
     try:
         report = json.loads(path.read_text(encoding="utf-8"))

@@ -76,7 +76,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _take_from_table(options: argparse.Namespace) -> None:
-    """Choose kind, version, platforms and ports, and say so."""
     given = {"--native": options.native, "--fmi": options.fmi, "--platform": options.platform}
     if said := [name for name, value in given.items() if value]:
         raise InputError(f"--for {options.host} chooses that by itself: leave out {', '.join(said)}, or --for")

@@ -68,7 +68,6 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
 
 
 def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
-    """Refuse what only the norm's damping test has."""
     reactances = options.reactances != REACTANCES
     asked = {"--pod": options.pod, "--black-box": options.black_box, "--reactances": reactances}
     if other := [name for name, value in asked.items() if value]:

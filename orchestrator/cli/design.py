@@ -88,7 +88,6 @@ def _given(out: Path) -> Path:
 
 
 def _check_for_one_point(options: argparse.Namespace) -> None:
-    """Refuse what only a design over operating points takes."""
     for name in ("controller", "component", "mode"):
         if len(getattr(options, name)) > 1:
             times = len(getattr(options, name))

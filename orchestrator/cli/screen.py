@@ -39,7 +39,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _merge(folders: Sequence[Path], store: Path) -> None:
-    """Copy the points that parts kept elsewhere."""
     made_folder(store, "--out")
     for folder in folders:
         kept = sorted((folder / POINTS).glob("*.npz"))

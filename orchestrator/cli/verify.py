@@ -103,7 +103,6 @@ def _show(found: Verified, console: Console, *, norm: bool) -> None:
 
 
 def _refused(content: Mapping[str, Any]) -> bool:
-    """Whether an acceptance test of the FMU failed."""
     return content["acceptance"] is not None and not content["acceptance"]["trusted"]
 
 

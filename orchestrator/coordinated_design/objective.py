@@ -38,8 +38,6 @@ class Aim:
 
 @dataclass(frozen=True)
 class Watched:
-    """A mode at one operating point."""
-
     value: complex  # λ [rad/s]
     place: int  # its column among the eigenvectors
     floor: float | None  # damping ratio that it may not fall below; None for a mode that the design damps
@@ -101,7 +99,6 @@ class Worth:
 
     @property
     def allowed(self) -> bool:
-        """Whether no other mode is harmed."""
         return self.breach <= _ROUNDING
 
 

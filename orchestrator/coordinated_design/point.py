@@ -107,7 +107,6 @@ def _points(task: PointsTask, case: Case, preparation: ItemPreparation, bench: P
 def _at(
     case: Case, bench: PointBench, master: Master, places: Sequence[PodPlace], warnings: tuple[str, ...]
 ) -> PointModes:
-    """The modes of a running system, and its loops."""
     find_operating_point(master, accept=ACCEPT)
     silent = [name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)]
     if silent:

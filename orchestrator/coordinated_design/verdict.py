@@ -72,7 +72,6 @@ class JudgedPoint:
 
     @property
     def unmoved(self) -> bool:
-        """Whether the controllers hardly move the least damped mode."""
         before, after = self.target_before, self.target
         return bool(before and after and abs(after.value - before.value) < UNMOVED * abs(before.value))
 
@@ -171,13 +170,11 @@ class PointsVerdict:
 
     @property
     def worst(self) -> float | None:
-        """Least damping ratio of all points with the controllers."""
         limiting = self.limiting
         return None if limiting is None else _damping(limiting.target)
 
     @property
     def worst_before(self) -> float | None:
-        """Least damping ratio of all points without the controllers."""
         return min((_damping(point.target_before) for point in self.known if point.target_before), default=None)
 
     @property

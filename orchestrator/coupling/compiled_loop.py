@@ -190,7 +190,6 @@ class CompiledLoop:
                 self._share_group(group, entry, members)
 
     def _share_group(self, group: range, entry: _Group, members: int) -> None:
-        """Write down who does the calls of a group."""
         found = shares(group, self._bound, self._costs, members)
         own, shared = (np.array(part, dtype=np.int64) for part in (found.own, sum(found.of, ())))
         begin = np.cumsum([0, *map(len, found.of)])

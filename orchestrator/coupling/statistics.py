@@ -41,7 +41,6 @@ class StepStatistics:
 
     @property
     def steps_per_second(self) -> float:
-        """Steps that count in a second of wall-clock time."""
         return self.steps / self.seconds if self.seconds > 0 else 0.0
 
     @property

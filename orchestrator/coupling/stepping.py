@@ -83,7 +83,6 @@ class Stepper(CoupledComponents):
         self.handed_over = False
 
     def advance(self, count: int) -> None:
-        """Do ``count`` communication steps and nothing else."""
         if self.wires:
             for index, part in self.wires.stretches(self.index, count):
                 self._advance(index, part)

@@ -135,7 +135,6 @@ class System:
         return Endpoint(component, variable), info
 
     def unconnected_inputs(self) -> Iterator[Endpoint]:
-        """Inputs that neither a connection nor a constant feeds."""
         fed = {c.target for c in self.connections}
         for name, plan in self.components.items():
             for variable in plan.description.inputs:

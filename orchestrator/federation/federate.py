@@ -45,7 +45,6 @@ class OwnFederate:
         self._component: Component | None = None
 
     def run(self) -> None:
-        """Join, and step until the federation ends."""
         helics = library()
         with open_component(self.name, self._description, isolated=True) as component:
             self._component = component
@@ -153,7 +152,6 @@ class OwnFederate:
         self._configured.set()
 
     def do_end(self) -> None:
-        """Leave at the next time that is granted."""
         self._ended = True
 
     def do_replay(self, calls: list[list[Any]]) -> None:

@@ -54,7 +54,6 @@ def _joined(helics: ModuleType, name: str, broker: str, seconds: float) -> Any:
 
 
 def text_of(error: Exception) -> str:
-    """What HELICS says, without the number in front."""
     return str(error).partition("] ")[2] or str(error)
 
 

@@ -57,7 +57,6 @@ def table(answer: Any) -> dict[str, float | bool]:
 
 
 def table_of(answer: Any, wanted: list[str]) -> dict[str, float | bool]:
-    """Numbers for exactly these names."""
     found = table(answer)
     if set(found) != set(wanted):
         raise _not(f"values of {', '.join(wanted)[:100]}", answer)

@@ -110,7 +110,6 @@ class PortMap:
 
     @property
     def taken(self) -> frozenset[str]:
-        """The FMU's variables that the port stands for."""
         starts = {m.variable for maps in self.start.values() for m in maps}
         signals = {m.variable for m in self.signals.values()}
         return frozenset({*self.voltage.variables, *self.current.variables, *starts, *signals, *self.settings})

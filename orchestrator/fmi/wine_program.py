@@ -75,8 +75,6 @@ def proxy() -> Any:
 
 
 class WineProgram:
-    """The program under Wine, with one library loaded."""
-
     def __init__(self, library: Path, patience: float = 1e300, note: Note | None = None) -> None:
         self._folder: Path | None = None
         if wine.in_process:

@@ -74,7 +74,6 @@ class SystemTask(Task):
 
 
 def compute_system(task: SystemTask) -> SystemRecord:
-    """Prepare, compare the power flow, find the modes."""
     return computed(task, lambda task, case: _record(_modes(case, task)))
 
 

@@ -94,7 +94,6 @@ class DesignRequest(OfCase):
 
     @property
     def increment(self) -> float:
-        """Required where no damping is."""
         return 0.10 if self.damping_increment is None else self.damping_increment
 
 

@@ -19,7 +19,6 @@ from orchestrator.points.code import code_hash, numbers_hash
 
 
 def digest(content: Mapping[str, Any]) -> str:
-    """Hash of JSON's types."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 

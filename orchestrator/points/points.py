@@ -63,6 +63,5 @@ class Work:
     def all(
         self, compute: Callable[[AnyTask], Point], tasks: Sequence[AnyTask], sizes: Sequence[int] | None = None
     ) -> list[Point]:
-        """The records in the order of their tasks."""
         found = dict(self.each(compute, tasks, sizes))
         return [found[index] for index in range(len(tasks))]

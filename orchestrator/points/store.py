@@ -52,5 +52,4 @@ class PointStore:
 
 
 def any_kept(folder: Path) -> bool:
-    """Whether a `PointStore` kept a point in a folder."""
     return any(not path.name.startswith(PARTIAL) for path in folder.glob(f"*{_KEPT}"))

@@ -68,7 +68,6 @@ class Study(Generic[Asks, Shown]):
 
     @property
     def of_several(self) -> bool:
-        """Whether it is of several scenarios, or of one."""
         return hasattr(self.request, "scenarios")
 
 
@@ -98,6 +97,5 @@ class PointStudy(Study[Asks, Shown], Generic[Asks, Plan, Result, Shown]):
     def compute(
         self, planned: Plan, executor: Executor, folder: str | Path | None, report: CountReport, *more: Any
     ) -> Shown:
-        """Compute a plan, and close the executor."""
         with TemporaryDirectory() as passing, closing(executor):
             return self.shown(self.run(planned, Work.into(Path(folder or passing), executor, report), *more))

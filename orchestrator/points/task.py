@@ -70,7 +70,6 @@ class Kept:
         return self.failure is None or (self.keeps_failures and self.failure.lasting)
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
         return packed(self)
 
     @classmethod

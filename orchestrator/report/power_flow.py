@@ -32,7 +32,6 @@ def totals(found: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def cells(rows: Sequence[dict[str, Any]], kind: str) -> list[list[str]]:
-    """Rows as text, in the order of `COLUMNS`."""
     return [[_cell(column, row[column]) for column in COLUMNS[kind]] for row in rows]
 
 

@@ -259,8 +259,6 @@ def _answer(master: Master, name: str) -> Numbers:
 
 
 def _in_running(master: Master, blocks: Blocks, at: _Mode, parameter: Parameter) -> Callable[[float], Shift]:
-    """Shifts by linearising the parameter's own component again."""
-
     def shift(value: float) -> Shift:
         with changed(master, {parameter.name: value}, {parameter.name: parameter.value}):
             return at.shift(blocks.with_component(master, parameter.component), master)
@@ -269,8 +267,6 @@ def _in_running(master: Master, blocks: Blocks, at: _Mode, parameter: Parameter)
 
 
 def _started_anew(again: Again, at: _Mode, parameter: Parameter, *, directional: bool) -> Callable[[float], Shift]:
-    """Shifts by starting the whole case with another value."""
-
     def shift(value: float) -> Shift:
         with running(again({parameter.name: value})) as master:
             try:

@@ -113,7 +113,6 @@ def _with_misfits(result: ModesResult, remark: str) -> str:
 
 
 def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[float, float]) -> Table:
-    """The first thing that a command prints."""
     low, high = frequency_range
     table = make_table("", "Scenario", "Verdict", "f [Hz]", "Damping [%]", left=2)
     table.title = None

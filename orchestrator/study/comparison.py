@@ -89,7 +89,6 @@ def _hint(path: Path) -> str:
 
 
 def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
-    """Refuse a signal that is not all numbers."""
     bad = np.flatnonzero(~np.isfinite(curve.values))
     if len(bad):
         times = curve["time"].values

@@ -314,7 +314,6 @@ class _Others:
 
 
 def _as(other: PreparedScenario | None, prepared: PreparedScenario) -> PreparedScenario:
-    """A scenario with the schedule of another."""
     assert other is not None
     for schedule in SCHEDULES:
         if schedule == prepared.schedule.name != other.schedule.name:

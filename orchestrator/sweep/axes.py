@@ -116,7 +116,6 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
 
 
 def _joint_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
-    """Several parameters with one value."""
     keys: dict[str, None] = {}
     for part in (part.strip() for part in vary.key.split(",")):
         pattern, _, variable = part.partition(".")

@@ -111,7 +111,6 @@ class ParameterLimit:
 
     @property
     def sentence(self) -> str:
-        """The answer, with the figures of both sides."""
         start, stop = (self._value(self.tried[k]["value"]) for k in (0, -1))
         mode, why = (
             f": {self._mode(self.mode)}" if self.mode else "",

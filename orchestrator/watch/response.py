@@ -247,7 +247,6 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
 
 
 def _regular(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding | None:
-    """A finding, unless the oscillation decays."""
     grown = change(swing, oscillation.rate)
     if grown < -STEADY:
         return None

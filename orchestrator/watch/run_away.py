@@ -82,7 +82,6 @@ class _Drift:
 
     @property
     def straight(self) -> bool:
-        """Whether it does not slow down."""
         return abs(self.fourth) >= STRAIGHT * abs(self.third)
 
     @property
@@ -104,7 +103,6 @@ class _Drift:
 
 
 def speed_signals(system: System) -> list[str]:
-    """Signals that show every unit's speed."""
     return [f"{name}.{SPEED}" for name, plan in system.components.items() if SPEED in plan.description.outputs]
 
 
