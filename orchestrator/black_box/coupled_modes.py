@@ -95,7 +95,10 @@ def modes_with_boxes(
     prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None = None,
     excitation: Excitation | None = None, report: Callable[[str], None] | None = None,
 ) -> ModesResult:  # fmt: skip
-    """Modes as `modes_of` finds them; components that hide their states are identified first."""
+    """Modes as `modes_of` finds them; components that hide their states are identified first.
+
+    ``prepared`` and ``master`` and ``frequency_range`` and ``critical``: as `modes_of`; to identify anything, the
+    master must be at rest at the power flow's operating point."""
     boxes = [name for name, component in master.components.items() if is_black_box(component)]
     if not boxes:
         return modes_of(prepared, master, frequency_range, critical)

@@ -31,7 +31,9 @@ def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> 
 
 
 def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0, *, radians: bool = False) -> None:
-    """Eigenvalue map with rays of equal damping; other people's figures as open circles."""
+    """Eigenvalue map with rays of equal damping; other people's figures as open circles.
+
+    ``radians``: the imaginary part [rad/s] instead of the frequency."""
     turn = 2 * np.pi if radians else 1.0
     named = [m.frequency_hz for r in results for m in r.named.values()]
     highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)

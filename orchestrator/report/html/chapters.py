@@ -185,6 +185,12 @@ def _check(file: Path, c: Content) -> Chapter:
     )  # fmt: skip
 
 
+def _limits(file: Path, found: Any) -> Chapter:
+    answer = "; ".join(f"{x['scenario']}: {x['sentence']}" for x in found)
+    sure = f"{sum(len(x['tried']) for x in found)} values tried, then bisected"
+    return Chapter(file, f"How far may {found[0]['parameter']} go?", answer, None, sure)
+
+
 def _comparison(file: Path, signals: Any) -> Chapter:
     rows = [[escape(s["expression"]), escape(s["unit"]), f"{s['largest']:.4g}", f"{s['at']:.3f}", f"{s['rms']:.4g}"]
             for s in signals]  # fmt: skip
@@ -205,20 +211,14 @@ def _identified(file: Path, modes: Any) -> Chapter:
                    table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0))  # fmt: skip
 
 
-def _limits(file: Path, found: Any) -> Chapter:
-    answer = "; ".join(f"{x['scenario']}: {x['sentence']}" for x in found)
-    sure = f"{sum(len(x['tried']) for x in found)} values tried, then bisected"
-    return Chapter(file, f"How far may {found[0]['parameter']} go?", answer, None, sure)
-
-
 _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
-    ({"device", "buses", "confirmed", "answer"}, _site),
+    ({"device", "buses", "confirmed", "answer"}, _site), ({"holds_at", "beyond", "sentence"}, _limits),
     ({"counted_at_all_frequencies", "failures", "modes"}, _screening),
     ({"controller", "target_mode", "T_S1", "verdict"}, _design),
     ({"settings", "verdict", "met", "ranking"}, _coordinated), ({"cells", "codes", "sentence"}, _matrix),
     ({"sentence", "verdict", "files", "seal"}, _certificate), ({"trusted", "checks", "faults"}, _check),
     ({"scenarios", "facts", "step_size_s"}, _modes), ({"expression", "deviations", "rms"}, _comparison),
-    ({"amplitude", "doubts"}, _identified), ({"holds_at", "beyond", "sentence"}, _limits),
+    ({"amplitude", "doubts"}, _identified),
 )  # fmt: skip
 """What the JSON of each study has, the first that fits."""
 
