@@ -26,9 +26,7 @@ class ForeignAnswerError(ValueError):
 
 
 def read_plain_file(path: Path, most: int = _MOST_BYTES) -> bytes:
-    """The content of a file that foreign code may have put there.
-
-    Raises `ForeignAnswerError` if it is a link, a pipe or a device, or larger than ``most`` bytes."""
+    """The content of a file that foreign code may have put there."""
     try:
         number = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
     except OSError as error:

@@ -36,9 +36,7 @@ def note_beside(answer: Path) -> Path:
 def ask(path: Path, reader: str, longest: float, *more: str) -> Answer:
     """Read a DLL in a process of its own.
 
-    ``reader``: Module that is run for it.
-    ``longest``: Time for the DLL's own code, counted from when it is loaded [s].
-    ``more``: Further words of the command."""
+    ``longest``: Time for the DLL's own code, counted from when it is loaded [s]."""
     folder = own_folder("dll")
     try:
         answer = folder / "answer.json"

@@ -29,12 +29,7 @@ def dll_description(
     """The file's text.
 
     States are declared as our extension of FMI, which has no discrete states in co-simulation: ``DiscreteStates`` names
-    the variables that the next sample depends on and that a master may set.
-
-    ``interface``, ``trial``: What the DLL declares, and how it keeps its state.
-    ``variables``: All of the FMU, in the order of their value references.
-    ``guid``, ``identifier``: As in the standard; the identifier also names the binaries.
-    ``tool``: Name and version for ``generationTool``."""
+    the variables that the next sample depends on and that a master may set."""
     attributes = {
         "fmiVersion": "2.0", "modelName": interface.texts["ModelName"] or identifier, "guid": guid,
         "description": interface.texts["ModelDescription"], "author": interface.texts["ModelCreator"],

@@ -61,13 +61,7 @@ def read_dll(
     path: Path | str, reader: str = READER, also: Sequence[str] = (), texts: Mapping[str, str] | None = None,
     folder: Path = Path(),
 ) -> VendorDll:  # fmt: skip
-    """Read a DLL in a process of its own, and try how it keeps its state.
-
-    ``path``, ``reader``, ``also``: The DLL, the module whose process reads it, and further platforms that this machine
-    runs.
-    ``texts``, ``folder``: Values of text parameters, and where the files lie that they name.
-
-    Raises `DllError` if it is no such DLL, is not for this machine, or declares what no host can run."""
+    """Read a DLL in a process of its own, and try how it keeps its state."""
     path = Path(path).absolute()
     platform = platform_of(path, also)
     given, files = {name: value for name, value in (texts or {}).items() if isinstance(value, str)}, dict[str, Path]()
@@ -133,10 +127,7 @@ def _is_32_bit(path: Path) -> bool:
 def dll_fmu(
     dll: VendorDll, destination: Path, texts: Mapping[str, str] | None = None, device: Device | None = None
 ) -> Path:
-    """Write the FMU of a DLL into a folder; it holds the DLL itself.
-
-    ``texts``: Value of parameters that are text; by default the DLL's own.
-    ``device``: The circuit around the controller; by default there is none."""
+    """Write the FMU of a DLL into a folder; it holds the DLL itself."""
     return write_archive(destination / f"{dll.identifier}.fmu", dll_members(dll, texts, device))
 
 

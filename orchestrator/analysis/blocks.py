@@ -196,10 +196,7 @@ def linearize_within(
     master: Master, name: str, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (), *,
     derivatives: bool = False, without_step: bool = False, directional: bool = False, idle: Collection[str] = (),
 ) -> ComponentLinearization:  # fmt: skip
-    """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step.
-
-    ``master``: at the operating point; it is left as it was.
-    ``step_size``: communication step to linearise over [s]."""
+    """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step."""
     exchange, time = master.exchanges[name], master.time
     with other_step(master, name, 0.0 if without_step else step_size):
         if directional:

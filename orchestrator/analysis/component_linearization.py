@@ -72,9 +72,6 @@ def linearize_component(
 
     Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
 
-    ``time``: of the operating point [s].
-    ``step_size``: communication step to linearise over [s].
-    ``inputs`` and ``observed``: tunable parameters or open inputs, and outputs, in addition to the connected ones.
     ``derivatives``: also difference the FMU's own derivatives, if it declares them; it costs a third more.
     ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0."""
     component = exchange.component

@@ -89,8 +89,6 @@ def follow_along(
 ) -> Eigenpair:  # fmt: skip
     """Follow a mode along a path from ``begin`` to ``end``, in strides short enough to recognise it.
 
-    ``start``: the mode at ``begin``.
-    ``begin`` and ``end``: ends of the path; the end may be the smaller one.
     ``common``: states by which modes are recognised, where not all models have the same; the start's vectors hold these
     alone."""
     shortest = abs(end - begin) * strides.shortest

@@ -49,8 +49,6 @@ which is rounding. It should move if its declared derivatives, times the step, e
 
 @dataclass(frozen=True)
 class Disagreement:
-    """The largest difference of the FMUs' response from that of the linear model."""
-
     state: str  # name ``component.state``
     time: float  # after the disturbance [s]
     error: float  # relative to the response's size at that time
@@ -69,11 +67,7 @@ def foreign_components(master: Master) -> list[str]:
 
 def confirmed(master: Master, blocks: Blocks, model: LinearModel, stability: Stability) -> Stability:
     """The verdict on a system, or "not known" if the linear model calls it stable and the response of a foreign FMU
-    differs.
-
-    ``master``: the running system at the model's operating point; it is restored.
-    ``model``: the step map composed of the blocks.
-    ``stability``: the verdict on ``model``."""
+    differs."""
     if not stability.stable:
         return stability
     foreign = [name for name in foreign_components(master) if blocks.how[name] != IDENTIFIED]

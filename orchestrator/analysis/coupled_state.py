@@ -19,7 +19,6 @@ class CoupledState:
         self._access = {name: StateAccess(component) for name, component in master.components.items()}
 
     def read(self) -> Matrix:
-        """All states, shape (n,), in the order of the components."""
         return np.concatenate([access.read() for access in self._access.values()])
 
     def write(self, x: Matrix) -> None:

@@ -39,7 +39,6 @@ class WireLink:
 
     @property
     def is_ideal(self) -> bool:
-        """Whether deviations arrive as they are sent."""
         return not (self.delay or self.is_cut)
 
 

@@ -27,12 +27,7 @@ size of the difference."""
 
 
 def check_derivatives(component: Component, given: Matrix, unknowns: Sequence[str], knowns: Sequence[str]) -> None:
-    """Compare partial derivatives that an FMU gives with differences of its variables, and put the FMU back.
-
-    ``component``: lets its states be set, and saves and restores its state.
-    ``given``: shape (unknowns, knowns).
-    ``unknowns``: variables whose derivatives are given, one for each row: rates and outputs.
-    ``knowns``: variables by which the unknowns are differentiated, one for each column: states and inputs."""
+    """Compare partial derivatives that an FMU gives with differences of its variables, and put the FMU back."""
     one, two = _central_differences(component, unknowns, knowns)
     allowed = AGREES * np.abs(one) + 3 * np.abs(one - two) + _ROUNDING * np.abs(one).max(axis=1, initial=0.0)[:, None]
     differs = np.abs(given - one)
@@ -73,7 +68,6 @@ def _right_nearby(
 def _central_differences(
     component: Component, unknowns: Sequence[str], knowns: Sequence[str], sizes: Sequence[float] = SIZES
 ) -> list[Matrix]:
-    """Central differences with each size, shape (unknowns, knowns)."""
     before = RealBatch(component, knowns).read().copy()
     perturbed, follows = [RealBatch(component, [name]) for name in knowns], RealBatch(component, unknowns)
     found = [np.zeros((len(unknowns), len(knowns))) for _ in sizes]

@@ -43,9 +43,7 @@ class PerturbedStep:
     def differences(self, varied: Sequence[int], size: float, rates: Sequence[str] = ()) -> Differences:
         """Central differences, one column for each perturbed state or input; the component is put back.
 
-        ``varied``: places in ``names``.
-        ``size``: of the perturbation, relative to max(1, |value|).
-        ``rates``: names of the states' time derivatives, which are read before the step."""
+        ``size``: of the perturbation, relative to max(1, |value|); ``rates`` are read before the step."""
         component, names = self.component, self.names
         z_0 = RealBatch(component, names).read().copy()
         after, outputs, slopes = (RealBatch(component, group) for group in (self.states, self.exits, rates))

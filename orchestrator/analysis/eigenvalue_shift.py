@@ -10,11 +10,7 @@ from orchestrator.arrays import Vector
 def eigenvalue_shift(
     model: LinearModel, varied: LinearModel, eigenvalue: complex, left: Vector, right: Vector
 ) -> complex:
-    """Δλ = lᴴ·(A' − A)·r [rad/s]; of a step map divided by μ·H, as λ = ln μ / H.
-
-    ``model`` and ``varied``: with the same states, in the same order: that with the eigenvalue, and the changed one.
-    ``eigenvalue``: λ of ``model`` [rad/s].
-    ``left`` and ``right``: its eigenvectors, shape (n,), with lᴴ·r = 1."""
+    """Δλ = lᴴ·(A' − A)·r [rad/s]; of a step map divided by μ·H, as λ = ln μ / H."""
     change = complex(np.vdot(left, _apply(varied, right) - _apply(model, right)))
     if model.step_size is not None:
         change /= complex(np.exp(eigenvalue * model.step_size)) * model.step_size
@@ -22,13 +18,10 @@ def eigenvalue_shift(
 
 
 def shift_of_slowest(model: LinearModel, varied: LinearModel, radius: float) -> float:
-    """|Δ| of the sum of all eigenvalues near zero [rad/s], to first order.
+    """|Δ| of the sum of all eigenvalues nearer to zero than a radius [rad/s], to first order.
 
     A slow eigenvalue beside the free angle's zero is nearly double: each one alone moves by the root of an error, in
-    opposite directions, and their sum by the error itself.
-
-    ``model`` and ``varied``: with the same states, in the same order.
-    ``radius``: largest |λ| that counts [rad/s]."""
+    opposite directions, and their sum by the error itself."""
     step, A, changed = model.step_size, model.A, varied.A
 
     def is_near(real: float, imaginary: float = 0.0) -> bool:

@@ -20,17 +20,13 @@ class Equations:
         self._parts: dict[str, list[tuple[Indices, Indices, Matrix]]] = {name: [] for name in self._shapes}
 
     def next_state(self, rows: slice, states: slice, A: Matrix, w: Indices, B: Matrix) -> None:
-        """Add z⁺[rows] = A·z[states] + B·w[w].
-
-        ``states`` and ``A``: on which states they depend, and how; shape (rows, states)."""
+        """Add z⁺[rows] = A·z[states] + B·w[w]."""
         n = self._shapes["F"][0]
         self._add("F", np.arange(n)[rows], np.arange(n)[states], A)
         self._add("G", np.arange(n)[rows], w, B)
 
     def output(self, rows: Indices, states: slice, C: Matrix, w: Indices, D: Matrix) -> None:
-        """Add w[rows] = C·z[states] + D·w[w].
-
-        ``states`` and ``C``: on which states they depend, and how; shape (rows, states)."""
+        """Add w[rows] = C·z[states] + D·w[w]."""
         self._add("H", rows, np.arange(self._shapes["F"][0])[states], C)
         self._add("K", rows, w, D)
 

@@ -32,15 +32,10 @@ def examine(
 ) -> Examination:  # fmt: skip
     """Judge a step map, and look for what would make the verdict wrong; say what it leaves out of the connections.
 
-    ``master``: at the operating point at which the blocks were linearised; it is left as it was.
-    ``model`` and ``system``: the step map composed of the blocks, and the continuous model; None where a component
-    gives no derivatives.
-    ``spectrum``: all eigenvalues of the step map, where they are known already.
-    ``of_system``: all eigenvalues of the continuous model, where they are known already.
+    ``spectrum`` and ``of_system``: all eigenvalues of both models, where they are known already.
     ``modes``: oscillations that must not depend on the perturbation; by default those of the range. If a component is
     doubtful, all oscillations from 0.1 to 2 Hz are added.
-    ``shown``: modes that must not depend on the communication step; by default the same.
-    ``frequency_range``: [Hz]"""
+    ``shown``: modes that must not depend on the communication step; by default the same."""
     if spectrum is None:
         small = len(model.names) <= WHOLE
         spectrum = find_spectrum(model, *frequency_range) if small and modes is None else whole_spectrum(model)

@@ -50,7 +50,6 @@ class _Sector:
 
     @property
     def edge(self) -> NDArray[np.complex128]:
-        """Points along the whole edge."""
         angles, radii = np.linspace(self.low, self.high, 9), np.linspace(self.inner, self.outer, 9)
         arcs = [r * np.exp(1j * angles) for r in (self.inner, self.outer)]
         rays = [radii * np.exp(1j * a) for a in (self.low, self.high)]
@@ -63,7 +62,6 @@ class _Sector:
         return self.inner <= abs(value) < self.outer and self.low <= angle < self.high
 
     def parts(self) -> tuple["_Sector", ...]:
-        """The four parts of a sector that is cut in both directions."""
         radius, angle = float(np.sqrt(self.inner * self.outer)), (self.low + self.high) / 2
         return tuple(
             _Sector(inner, outer, low, high)

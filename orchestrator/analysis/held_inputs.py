@@ -24,9 +24,7 @@ class LineMap(NamedTuple):
 
 
 def over_parts(A: Matrix, B: Matrix, parts: int) -> LineMap:
-    """The map over a step that is done in equal parts, each with the inputs of its middle.
-
-    ``A`` and ``B``: over one part with held inputs, shapes (n, n), (n, m)."""
+    """The map over a step that is done in equal parts, each with the inputs of its middle."""
     mean, slope = np.zeros_like(B), np.zeros_like(B)
     for j in range(parts):
         mean = A @ mean + B

@@ -58,12 +58,7 @@ class LinearModel:
 
     @classmethod
     def from_matrix(cls, A: Matrix, names: tuple[str, ...], step_size: float | None, disagreement: float = 0.0) -> Self:
-        """The model of one matrix, without outputs that travel between components.
-
-        ``A``: shape (n, n); in 1/s for a continuous model.
-        ``names``: of the states, length n.
-        ``step_size``: communication step [s]; None for a continuous model.
-        ``disagreement``: as in `LinearModel`."""
+        """The model of one matrix, without outputs that travel between components."""
         n = len(A)
         G, H, K = (sp.csr_array(shape) for shape in ((n, 0), (0, n), (0, 0)))
         return cls(sp.csr_array(A), G, H, K, names, step_size, disagreement)

@@ -23,11 +23,7 @@ __all__ = ["Blocks", "compose", "continuous", "continuous_model", "linearize", "
 
 
 def linearize(master: Master, step_size: float | None = None, schedule: Schedule | None = None) -> LinearModel:
-    """Linearise the coupled step map around the master's present state.
-
-    ``master``: at an operating point; it is left as it was.
-    ``step_size`` and ``schedule``: by default the master's own; other values show the coupling's effect with another
-    step or schedule."""
+    """Linearise the coupled step map around the master's present state."""
     return compose(Blocks(master, step_size), schedule or master.schedule)
 
 

@@ -105,10 +105,7 @@ def _energy(mode: IdentifiedMode, length: float) -> float:
 
 
 def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> str:
-    """A sentence on a window that is too short for the strongest oscillation; else empty.
-
-    ``modes``: the strongest first.
-    ``start`` and ``stop``: of the window [s]."""
+    """A sentence on a window that is too short for the strongest oscillation; else empty."""
     length = stop - start
     strongest = next((mode for mode in modes if mode.frequency_hz > 0 and not is_trend(mode, length)), None)
     if strongest is None or strongest.frequency_hz * length >= FEWEST_PERIODS:
@@ -121,9 +118,7 @@ def short_window(modes: Sequence[IdentifiedMode], start: float, stop: float) -> 
 
 
 def told_apart(modes: Sequence[IdentifiedMode], length: float) -> str:
-    """How far apart two modes must lie to be told from each other, and which of those found lie closer.
-
-    ``length``: of the window [s]."""
+    """How far apart two modes must lie to be told from each other, and which of those found lie closer."""
     apart = TOLD_APART / length
     swings = sorted(mode.frequency_hz for mode in modes if _swings(mode, length))
     close = [pair for pair in pairwise(swings) if 0 < pair[1] - pair[0] < apart]
@@ -133,9 +128,7 @@ def told_apart(modes: Sequence[IdentifiedMode], length: float) -> str:
 
 
 def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:
-    """A sentence where no oscillation was found in a window of this length [s]; else empty.
-
-    ``length``: of the window [s]."""
+    """A sentence where no oscillation was found in a window of this length [s]; else empty."""
     if not modes:
         return "Nothing above the noise: the window shows no mode."
     if any(mode.frequency_hz > 0 and not is_trend(mode, length) for mode in modes):
@@ -144,19 +137,13 @@ def nothing_swings(modes: Sequence[IdentifiedMode], length: float) -> str:
 
 
 def straight_line(times: NDArray[np.float64], signal: NDArray[np.float64]) -> float:
-    """By how much the straight line through a signal changes from its first to its last sample [unit of the signal].
-
-    ``times`` and ``signal``: shape (n,); [s] and any unit."""
+    """By how much the straight line through a signal changes from its first to its last sample [unit of the signal]."""
     centred = times - times.mean()
     return float(centred @ (signal - signal.mean()) / (centred @ centred) * (times[-1] - times[0]))
 
 
 def over_a_trend(modes: Sequence[IdentifiedMode], length: float, line: float) -> str:
-    """A sentence on a trend that is large beside the strongest oscillation, or that is all there is; else empty.
-
-    ``modes``: the strongest first.
-    ``length``: of the window [s].
-    ``line``: change of the straight line through the signal, as `straight_line`."""
+    """A sentence on a trend that is large beside the strongest oscillation, or that is all there is; else empty."""
     swing = max((2 * mode.amplitude for mode in modes if _swings(mode, length)), default=0.0)
     trends = any(is_trend(mode, length) for mode in modes)
     if not trends or abs(line) <= STEEP * swing:

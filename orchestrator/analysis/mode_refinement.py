@@ -34,9 +34,7 @@ class RefinedModes:
 def refine(
     model: LinearModel, equations: ShiftedEquations, values: NDArray[np.complex128], left: Vector, right: Vector
 ) -> RefinedModes:
-    """Modes of a continuous model, from values and vectors that are nearly so.
-
-    ``values`` and ``left`` and ``right``: as in `RefinedModes`, of a similar model with the same states."""
+    """Modes of a continuous model, from values and vectors that are nearly so."""
     settled = False
     for _ in range(_ROUNDS):
         new_left, new_right = left.copy(), right.copy()

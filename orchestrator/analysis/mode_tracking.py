@@ -45,7 +45,6 @@ class ModeSet:
 
     @property
     def frequencies(self) -> NDArray[np.float64]:
-        """Im λ/2π [Hz]."""
         return np.asarray(self.eigenvalues.imag / (2 * np.pi), dtype=float)
 
     def participation(self) -> NDArray[np.float64]:
@@ -56,8 +55,6 @@ class ModeSet:
 
 @dataclass(frozen=True)
 class Link:
-    """Mode ``source`` of one point is mode ``target`` of another."""
-
     source: int
     target: int
     similarity: float
@@ -105,10 +102,7 @@ def near_an_end(frequency: float, frequency_range: tuple[float, float]) -> bool:
 
 
 def is_ambiguous(a: ModeSet, b: ModeSet, frequency_range: tuple[float, float], threshold: float = THRESHOLD) -> bool:
-    """Whether a mode of one point has no partner in the other without being near an end of the range [Hz].
-
-    ``frequency_range``: in which modes were looked for [Hz].
-    ``threshold``: least similarity of partners, from 0 to 1."""
+    """Whether a mode of one point has no partner in the other without being near an end of the range [Hz]."""
     links = match(a, b, threshold)
     paired = ({link.source for link in links}, {link.target for link in links})
     return any(

@@ -52,7 +52,6 @@ class PeriodicPoint:
 
     @property
     def residual(self) -> float:
-        """The largest change over a period."""
         return _largest(self.change)
 
 

@@ -27,8 +27,6 @@ it is at most 0.05."""
 
 @dataclass(frozen=True)
 class PerturbationResult:
-    """Differences by every state and input, each with a size that fits."""
-
     # small, large: with one size for each column, and with twice that size; only ``small`` has the time derivatives
     small: Differences
     large: Differences

@@ -66,19 +66,11 @@ def check_resolution(
 ) -> tuple[str, ...]:  # fmt: skip
     """Warn of an unstable coupling, and compare the modes of a step map with those of the continuous system.
 
-    ``master``: At the operating point; it is left as it was.
-    ``model``, ``system``: The step map, and the continuous model. If this is None, because a component gives no
-    derivatives, nothing is compared.
-    ``frequency_range``: Range of the modes [Hz].
-    ``stability``: The verdict. Where the coupling is unstable, a step at which it is stable is looked for even if the
-    modes are resolved.
+    The warnings name a step that is short enough; it is computed, not estimated. Without a continuous model nothing is
+    compared. Raises `InputError` if a slow mode is lost, because the mode in its place would give a wrong verdict.
 
-    Returns
-    -------
-    Warnings, with a step that is short enough; it is computed, not estimated.
-
-    Raises `InputError` if a slow mode is lost, because the mode in its place would give a wrong verdict.
-    """
+    ``stability``: Where the coupling is unstable, a step at which it is stable is looked for even if the modes are
+    resolved."""
     said = verdict_warnings(stability)
     if model.step_size is None or system is None:
         return said

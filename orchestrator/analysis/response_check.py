@@ -114,12 +114,7 @@ _AGREED: WeakKeyDictionary[Component, set[bytes]] = WeakKeyDictionary()
 def check_response(component: Component, model: ContinuousModel, what: str, time: float, step_size: float) -> None:
     """Compare a linear model with its FMU, and restore the FMU's state.
 
-    ``component``: at the model's operating point; it can save and restore its state.
-    ``what``: what the model is, for the error: ``the linear model inside its FMU``.
-    ``time``: of the operating point [s].
-    ``step_size``: communication step [s].
-    Raises an `AnalysisError` if the responses differ, with the signal, time and size of the largest difference; or if
-    the FMU is not linear there."""
+    ``what``: what the model is, for the error: ``the linear model inside its FMU``."""
     values = RealBatch(component, (*model.states, *model.inputs, *model.outputs)).read().copy()
     key = _digest(model, values, step_size)
     agreed = _AGREED.setdefault(component, set())

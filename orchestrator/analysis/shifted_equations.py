@@ -11,15 +11,11 @@ from orchestrator.errors import AnalysisError
 
 
 class Factors:
-    """A − σI at one point σ."""
-
     def __init__(self, lu: spla.SuperLU, states: int) -> None:
         self._lu, self._n = lu, states
 
     def solve(self, right: Vector, *, adjoint: bool = False) -> Vector:
-        """X with (A − σI)·X = right, or (A − σI)ᴴ·X = right.
-
-        ``right``: shape (n, k)."""
+        """X with (A − σI)·X = right, or (A − σI)ᴴ·X = right."""
         whole = np.zeros((self._lu.shape[0], right.shape[1]), dtype=complex)
         whole[: self._n] = right
         solution: Vector = self._lu.solve(whole, "H" if adjoint else "N")[: self._n]

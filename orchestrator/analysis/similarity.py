@@ -10,9 +10,7 @@ from orchestrator.arrays import Vector
 
 
 def similarity(left_a: Vector, right_a: Vector, left_b: Vector, right_b: Vector) -> NDArray[np.float64]:
-    """|l_aᴴ·r_b|·|l_bᴴ·r_a| of every mode a with every mode b, shape (m_a, m_b).
-
-    ``left_a`` and ``right_a`` and ``left_b`` and ``right_b``: eigenvectors as rows, shapes (m_a, n) and (m_b, n)."""
+    """|l_aᴴ·r_b|·|l_bᴴ·r_a| of every mode a with every mode b, shape (m_a, m_b)."""
     forth = left_a.conj() @ right_b.T
     back = (left_b.conj() @ right_a.T).T
     return np.asarray(np.abs(forth * back), dtype=float)

@@ -36,9 +36,6 @@ def linearize_slopes(
 ) -> ComponentLinearization:  # fmt: skip
     """ẋ = A_c·x + B_c·u and y = C·x + D·u of one component; it has no step map.
 
-    ``exchange``: the component, at its operating point, with its connected inputs and outputs.
-    ``time`` and ``step_size``: of the operating point, and of a step, should one be needed [s].
-    ``inputs`` and ``observed``: tunable parameters or open inputs, and outputs, in addition to the connected ones.
     ``like``: the same FMU at another operating point. Variables that had no common effect there are perturbed together;
     a perturbation in all directions then shows whether that holds here, too. It serves where it has all states, inputs
     and outputs that are asked for."""

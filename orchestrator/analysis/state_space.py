@@ -33,15 +33,9 @@ class StateSpace:
     sources: Mapping[str, str] = field(default_factory=dict)  # how the linear model of every component was found
 
     def step_response(self, change: Matrix, times: Matrix) -> Matrix:
-        """Outputs after a step of the inputs at t = 0.
+        """Deviations of the outputs, shape (k, p), after a step of the inputs at t = 0.
 
-        ``change``: Size of the step of every input, shape (m,).
-        ``times``: [s], shape (k,), not before 0 and in equal distances; of a step map, multiples of its step.
-
-        Returns
-        -------
-        Deviations of the outputs, shape (k, p).
-        """
+        ``times``: [s], not before 0 and in equal distances; of a step map, multiples of its step."""
         u = np.asarray(change, dtype=float)
         distance = times[1] - times[0] if len(times) > 1 else 0.0
         A, B = self._over(distance)

@@ -37,12 +37,10 @@ def find_operating_point(
 ) -> OperatingPoint:
     """Verify that the initialised system stands still, or move it to a steady state.
 
-    ``master``: initialised; it is left at the operating point.
     ``tolerance``: largest accepted change of a state over one communication step of 100 µs or more; proportionally less
     over a shorter step.
     ``accept``: below this change, the power flow's point is taken as it is. Between ``accept`` and ``tolerance`` a
-    better point is searched for, and kept if it is better.
-    ``max_iterations``: largest number of iterations of Newton's method on the step map."""
+    better point is searched for, and kept if it is better."""
     if (steps := steps_of_period(master, master.clock.step_size)) > 1:
         return _periodic_point(master, steps, tolerance, accept, max_iterations)
     state = CoupledState(master)

@@ -69,9 +69,7 @@ def near(modes: Sequence[IdentifiedMode] | None, mode: IdentifiedMode) -> Identi
 
 
 def part_of(times: NDArray[np.float64], signal: NDArray[np.float64], modes: Sequence[IdentifiedMode]) -> WindowPart:
-    """What the modes of a part of a signal leave of it.
-
-    ``times`` and ``signal``: shape (n,); the part of the signal, [s] and any unit."""
+    """What the modes of a part of a signal leave of it."""
     thin = -(-len(times) // _MOST_SAMPLES)
     t, y = times[::thin] - times[0], signal[::thin]
     length = float(t[-1])

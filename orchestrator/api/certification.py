@@ -166,31 +166,15 @@ def verify(
     ...     print(type(error).__name__)
     InputError
     """
+    from orchestrator.certification.anew import verified  # noqa: PLC0415 - as above
     from orchestrator.certification.inside import laid_out  # noqa: PLC0415 - as above
     from orchestrator.certification.verification import Verification  # noqa: PLC0415 - as above
 
-    found = Verification()
+    found, wanted = Verification(), None if anew is None else tuple(anew)
     with laid_out(path_of(certificate, "certificate")) as places:
         for place in places:
-            one = _verify_one(place, anew, every=every, workers=workers)
+            one = verified(place, wanted, lambda imports: choose_executor(workers, None, imports), every=every)
             prefix = f"{place.name}: " if len(places) > 1 else ""
             found.faults += [prefix + text for text in one.faults]
             found.agreed += [prefix + text for text in one.agreed]
-    return found
-
-
-def _verify_one(
-    certificate: Path, anew: Iterable[float | str] | None, *, every: bool, workers: int | None
-) -> "Verification":
-    from orchestrator.certification.anew import parts_of  # noqa: PLC0415 - as above
-    from orchestrator.certification.verification import read_certificate, verify_files  # noqa: PLC0415 - as above
-
-    folder, content = read_certificate(certificate)
-    wanted, parts = None if anew is None else tuple(anew), parts_of(content)
-    chosen = [] if wanted == () and not every else parts.chosen(folder, content, wanted or (), every=every)
-    found = verify_files(folder, content)
-    if chosen and found.holds:
-        with closing(choose_executor(workers, None, [parts.task.__module__])) as executor:
-            again = parts.verify(folder, content, chosen, executor)
-        found.faults, found.agreed = found.faults + again.faults, found.agreed + again.agreed
     return found

@@ -52,8 +52,6 @@ def _problem(detail: Any) -> Problem:
 
 
 class _Reader:
-    """Works out one table for one FMU, and collects its mistakes."""
-
     def __init__(self, fmu: FmuDescription, table: BindingTable, source: str) -> None:
         self._fmu, self._table, self._source = fmu, table, source
         self._problems: list[Problem] = []

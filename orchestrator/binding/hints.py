@@ -21,7 +21,6 @@ _DRAWN = re.compile(r"\b(consum|drawn|draws|absorb|taken|demand)|into the (conve
 
 
 def undeclared(info: VariableInfo) -> bool:
-    """Whether a variable declares no unit."""
     return info.unit in ("", "1", "-")
 
 

@@ -34,7 +34,6 @@ def unit_of(info: VariableInfo, given: str | None) -> str:
 
 
 def factor(unit: str, target: str, name: str) -> float:
-    """The number of ``target`` in one ``unit``."""
     try:
         return to_unit(f"1 {unit}", target)
     except ValueError as error:
@@ -42,9 +41,7 @@ def factor(unit: str, target: str, name: str) -> float:
 
 
 def amount(text: str | float, unit: str, what: str) -> float:
-    """A number from text with a unit, which is required.
-
-    Raises a `ValueError` if the text is not a quantity of this kind, or the number does not exceed 0."""
+    """A number from text with a unit, which is required."""
     try:
         value = to_unit(text, unit)
     except ValueError as error:
@@ -55,11 +52,7 @@ def amount(text: str | float, unit: str, what: str) -> float:
 
 
 class Bases:
-    """Rating and rated voltage of an FMU, and the factors from its units to per unit.
-
-    ``rating``: s_n [MVA].
-    ``voltage``: v_n, line to line [kV]; None if the binding does not give it.
-    ``frequency``: f_n [Hz]."""
+    """Rating and rated voltage of an FMU, and the factors from its units to per unit."""
 
     def __init__(self, rating: float, voltage: float | None, frequency: float) -> None:
         self.rating, self.voltage, self.frequency = rating, voltage, frequency
@@ -96,7 +89,6 @@ class Bases:
         return kiloampere * peak[value] * factor("kA", unit, name)
 
     def power_unit(self, unit: str, base: str | None, name: str) -> float:
-        """Number of the FMU's units in 1 pu of power on the rating."""
         if unit == PER_UNIT:
             return self.rating / self._power_base(base, name)
         for mega in ("MW", "Mvar", "MVA"):
@@ -105,7 +97,6 @@ class Bases:
         raise ValueError(f"{name}: {unit!r} is not a unit of power; use pu, W, var or VA with their prefixes")
 
     def frequency_unit(self, unit: str, name: str) -> float:
-        """Number of the FMU's units in 1 pu of frequency."""
         if unit == PER_UNIT:
             return 1.0
         if "Hz" in unit:

@@ -28,8 +28,6 @@ class DraftedTable(Table):
 
 
 class FileTable(DraftedTable):
-    """The FMU that the binding is for."""
-
     file: str | None = None
     guid: str | None = None
 
@@ -51,8 +49,6 @@ class QuantityTable(DraftedTable):
 
 
 class PhasorTable(QuantityTable):
-    """Voltage or current."""
-
     form: Literal["rectangular", "dq", "qd", "polar", "abc", "power"]
     variables: list[str]
     value: Literal["line-to-line rms", "line-to-line peak", "phase rms", "phase peak", "rms", "peak"] | None = None

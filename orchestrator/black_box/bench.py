@@ -58,7 +58,6 @@ class Bench:
 
     @contextmanager
     def runs(self) -> Iterator["Runs"]:
-        """Runs that all begin at the same operating point."""
         runs = Runs(self)
         try:
             yield runs

@@ -48,7 +48,6 @@ class BoxedSystem:
     def modes(
         self, lowest_hz: float = ELECTROMECHANICAL_HZ[0], highest_hz: float = ELECTROMECHANICAL_HZ[1]
     ) -> list[Mode]:
-        """Modes of a range of frequencies, least damped first."""
         return find_spectrum(self.model, lowest_hz, highest_hz).modes
 
     def participation(self, mode: Mode) -> float:
@@ -76,10 +75,7 @@ def linearize_with_box(
 ) -> BoxedSystem:  # fmt: skip
     """Identify one component and linearise the coupled system around where the master is.
 
-    ``master``: initialised at the power flow's operating point; nothing is stepped, so an unstable system serves as
-    well.
-    ``component``: name of the black box. Only its inputs are set and its outputs read.
-    ``excitation``: signals that excite the box; the usual signals where None.
+    ``master``: at the power flow's operating point; nothing is stepped, so an unstable system serves as well.
     ``restore``: whether the bench saves and restores the box's state; None if it does so whenever the FMU can."""
     if component not in master.components:
         raise InputError(f"there is no component {component!r}; there are: {', '.join(master.components)}")

@@ -23,13 +23,7 @@ def odd_lines(lowest_hz: float, highest_hz: float, count: int) -> NDArray[np.int
 def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Numbers:
     """One period of a sum of cosines of equal size. Schroeder's phases keep its peak low.
 
-    ``lines``: Multiples of the base frequency, shape (f,).
-    ``amplitude``: Largest magnitude of the sum.
-
-    Returns
-    -------
-    Shape (period,).
-    """
+    ``lines``: multiples of the base frequency; ``amplitude``: largest magnitude of the sum."""
     n = np.arange(len(lines))
     spectrum = np.zeros(period // 2 + 1, dtype=complex)
     spectrum[lines] = np.exp(-1j * np.pi * n * (n + 1) / len(lines))
@@ -38,18 +32,13 @@ def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Number
 
 
 def line_response(u: Numbers, y: Numbers, lines: NDArray[np.int64]) -> Complex:
-    """M at the excited lines from whole periods, shape (f, p).
-
-    ``u``: one period, shape (n,).
-    ``y``: the same period of the outputs, shape (n, p)."""
+    """M at the excited lines from whole periods, shape (f, p)."""
     delay = np.exp(-2j * np.pi * lines / len(u))  # y[k] is read one step after u[k] begins
     return np.asarray(np.fft.rfft(y, axis=0)[lines] / np.fft.rfft(u)[lines][:, None] * delay[:, None])
 
 
 def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Complex:
-    """M at any frequencies [Hz] from the response to a pulse of one step, shape (f, p).
-
-    ``m``: response, shape (n, p), long enough to have died out."""
+    """M at any frequencies [Hz] from the response to a pulse of one step, shape (f, p)."""
     total = np.zeros((len(frequencies), m.shape[1]), dtype=complex)
     turn = -2j * np.pi * np.asarray(frequencies)[:, None] * step_size
     within = np.exp(turn * (np.arange(_CHUNK) + 1)[None, :])

@@ -61,9 +61,7 @@ class IdentifiedModel:
 
 
 def fit(response: FrequencyResponse, largest_error: float = 0.01) -> IdentifiedModel:
-    """Fit the smallest model that is as close as the measurement is certain.
-
-    Raises an `AnalysisError` if none of `ORDERS` comes within ``largest_error``."""
+    """Fit the smallest model that is as close as the measurement is certain."""
     wanted = max(_WANTED, response.largest_bound)
     best: IdentifiedModel | None = None
     for real, pairs in ORDERS:

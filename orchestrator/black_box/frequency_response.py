@@ -60,7 +60,6 @@ class FrequencyResponse:
 
     @property
     def z(self) -> Complex:
-        """The points e^{jωH} on the unit circle."""
         return np.asarray(np.exp(2j * np.pi * self.frequencies * self.step_size))
 
     @property
@@ -182,9 +181,7 @@ def _by_pulses(
 
 
 def _check_returned(bench: Bench, column: int, away: float, size: float) -> None:
-    """A device that ran away to another operating point, a limit for instance, answers there as calmly as a stable one.
-
-    Raises an `AnalysisError` if the rest of the response [pu] is too large a part of it."""
+    """A device that ran away to another operating point answers there as calmly as a stable one."""
     if not away <= _AWAY * size:
         raise AnalysisError(
             f"{bench.description.path.name}: excited by a small {bench.inputs[column]} at an ideal bus, its outputs "

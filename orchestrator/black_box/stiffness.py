@@ -22,10 +22,7 @@ class Stiffness:
     p_omega: Complex  # P over the frequency of the voltage [pu/pu], shape (f,)
 
     def least(self, values: Complex, low: float, high: float) -> tuple[float, float]:
-        """Least size of one of them in a band, and its frequency [Hz].
-
-        ``values``: one of its responses, shape (f,).
-        ``low`` and ``high``: band [Hz]."""
+        """Least size of one of them in a band, and its frequency [Hz]."""
         inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
         if not len(inside):
             raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
@@ -37,11 +34,7 @@ def stiffness(response: FrequencyResponse, voltage: complex, omega_b: float) -> 
     """Change the basis of a measured response.
 
     With S = v·i* and i = Y·v in real and imaginary parts, a change dv gives dS = dv·i* + v·(Y·dv)*. A change of the
-    angle is dv = j·v·dθ, one of the magnitude dv = v·dV/V.
-
-    ``response``: from the voltage to the current that the device feeds in, both as real and imaginary part [pu].
-    ``voltage``: at the operating point [pu].
-    ``omega_b``: 2π times the rated frequency [rad/s]."""
+    angle is dv = j·v·dθ, one of the magnitude dv = v·dV/V."""
     Y = response.continuous()
     current = complex(*response.operating_point)
     by_voltage = np.array([[current.real, current.imag], [-current.imag, current.real]])

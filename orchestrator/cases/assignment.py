@@ -15,7 +15,6 @@ _THOUSANDS = (1e-6, 1e-3, 1e3, 1e6)  # between a value and another one of the sa
 
 
 def assign_values(draft: Draft) -> None:
-    """Give every value to its variable; a later source overrides an earlier one."""
     _assign_frequency(draft)
     assign_conventions(draft)
     for name, table in draft.tables.items():

@@ -22,8 +22,6 @@ Place = Callable[[str], str]  # key → where it is written
 
 @dataclass(frozen=True)
 class NativeChoice:
-    """Whether some components run as native FMUs."""
-
     pattern: str  # name of a component, or a pattern such as ``*``
     given: Value
     place: str
@@ -64,7 +62,6 @@ class ShareChoice:
 
     @property
     def share(self) -> float:
-        """From 0 to 1."""
         if isinstance(self.given, bool | str) or not 0 <= self.given <= 1:
             raise ValueError(f"alpha = {self.given!r}; it must be a number from 0 to 1")
         return float(self.given)
@@ -84,10 +81,7 @@ class Layer:
 
 
 def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> Layer:
-    """Part what a source gives into values and choices.
-
-    ``given``: By ``component.variable`` or a choice's key.
-    ``has_units``: Whether the case has a table of units; without one, nothing has a share."""
+    """Part what a source gives into values and choices."""
     values: dict[str, Value] = {}
     natives: list[NativeChoice] = []
     parts: list[PartChoice] = []

@@ -60,13 +60,9 @@ class Case(CaseDefinition):
         step_size: float | None = None, stop_time: float | None = None, parameters: Sequence[ParameterFile] = (),
         dispatch: Dispatch | None = None,
     ) -> list[PreparedScenario]:  # fmt: skip
-        """Check everything and make the chosen scenarios ready to run.
+        """Check everything and make the chosen scenarios, or all, ready to run.
 
-        ``scenarios``: Names; all of them where empty.
-        ``overrides``: Values by ``component.variable`` that override the file's and the scenario's.
-        ``step_size``, ``stop_time``: [s]; the file's where None.
-        ``parameters``: Parameter files. Their values have priority over the scenario's, and ``overrides`` have priority
-        over theirs.
+        ``parameters``: Their values have priority over the scenario's, and ``overrides`` have priority over theirs.
         ``dispatch``: What the units fed before an outage that they share; None where each feeds its own ``P_0``."""
         if (other := self._of_kind(overrides, parameters)) is not self:
             return other.prepare(scenarios, overrides, step_size, stop_time, parameters, dispatch)
@@ -255,10 +251,7 @@ def _case(
     table: CaseTable, text: str, path: Path, problems: Sequence[Problem], directory: Path, *, numbered: bool = True,
     trust_fmus: bool,
 ) -> Case:  # fmt: skip
-    """The case, with what its scenarios' parameter files say now and paths that outlast a change of the folder.
-
-    ``table``, ``text``, ``path``, ``problems``, ``numbered``, ``trust_fmus``: As in `CaseDefinition`.
-    ``directory``: Folder to which paths in the tables are relative."""
+    """The case, with what its scenarios' parameter files say now and paths that outlast a change of the folder."""
     files: dict[str, ParameterFile | str] = {}
     for name in (name for scenario in table.scenarios.values() for name in scenario.parameters):
         try:

@@ -15,7 +15,6 @@ Tables = Mapping[str, ComponentTable]
 
 
 def takes_network(table: ComponentTable) -> bool:
-    """Whether a component's model is built for the case's network table."""
     return table.model in model_names() and needs_arguments(table.model or "")
 
 

@@ -68,5 +68,4 @@ def number(row: Row, column: str) -> float:
 
 
 def optional_number(row: Row, column: str) -> float | None:
-    """The number in a column; None where the column or the entry is missing."""
     return number(row, column) if (row.get(column) or "").strip() else None

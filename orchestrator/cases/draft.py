@@ -28,8 +28,6 @@ class UnitOrigin:
 
 @dataclass
 class DraftInput:
-    """What a scenario is prepared from."""
-
     source: str  # the case file, as errors name it
     case: CaseTable
     name: str
@@ -52,8 +50,6 @@ class DraftInput:
 
 @dataclass
 class Findings:
-    """Mistakes and questions."""
-
     problems: list[Problem] = field(default_factory=list)
     questions: list[Problem] = field(default_factory=list)
     # what is asked about values, by ``component.variable``, of the digits that the files have, in another unit.

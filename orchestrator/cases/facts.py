@@ -73,7 +73,6 @@ def rated_frequency(prepared: PreparedScenario) -> float | None:
 
 
 def files_of(table: NetworkTable) -> tuple[str, ...]:
-    """Another program's data that a network comes from."""
     return tuple(file for key in SOURCES if (file := getattr(table, key)) is not None)
 
 

@@ -34,11 +34,7 @@ _BREAKER = "connected"
 
 
 def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, where: str) -> list[Event]:
-    """What an imperfection that begins at a time, and may end, does to every connection that is meant.
-
-    ``clock``: Whose communication points the times must be.
-    ``stop``: End of the run [s]; a delay that lasts beyond it is noted.
-    ``where``: Place of the table in the file."""
+    """What an imperfection that begins at a time, and may end, does to every connection that is meant."""
     end = table.end
     if end is not None:
         if end <= table.time:

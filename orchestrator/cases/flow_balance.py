@@ -48,8 +48,6 @@ class FlowLine:
 
 @dataclass(frozen=True, slots=True)
 class FlowLoad:
-    """A load [MW, Mvar]."""
-
     bus: str
     p_mw: float
     q_mvar: float
@@ -68,11 +66,7 @@ class FlowShunt:
 def nodal_powers(
     voltages: Mapping[str, complex], lines: Sequence[FlowLine], loads: Sequence[FlowLoad], shunts: Sequence[FlowShunt]
 ) -> dict[str, complex]:
-    """P + jQ [pu, 100 MVA] that units must feed into every bus to give these voltages.
-
-    ``voltages``: complex voltage of every bus [pu].
-    ``lines`` and ``loads`` and ``shunts``: elements that draw power; an open line draws only the power of its charging.
-    """
+    """P + jQ [pu, 100 MVA] that units must feed into every bus to give these voltages."""
     needed = dict.fromkeys(voltages, 0j)
     for line in lines:
         into, out = line.powers(voltages[line.from_bus], voltages[line.to_bus])

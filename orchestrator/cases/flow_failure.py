@@ -14,9 +14,7 @@ _SHOWN = 6  # iterations whose mismatch is told
 
 
 def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable[[float], FlowEquations] | None) -> str:
-    """Sentences about a power flow without a solution.
-
-    ``with_stray``: the same power flow with a share of its stray capacitances; None where it has none."""
+    """Sentences about a power flow without a solution."""
     mismatch, bus = failed.history[-1]
     told = [f"{size * SYSTEM_BASE_MVA:.3g}" for size, _ in failed.history]
     left_out = [] if len(told) <= _SHOWN else ["…"]

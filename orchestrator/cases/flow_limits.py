@@ -21,8 +21,6 @@ _RETURNS = 2  # so many times a bus may get its voltage back; then it stays at i
 
 @dataclass(frozen=True, slots=True)
 class Excess:
-    """A bus whose units reach a limit of reactive power."""
-
     bus: str
     q: float  # reactive power that holding the voltage takes [pu, 100 MVA]; the limit itself where it is kept
     limit: float  # the limit [pu, 100 MVA]

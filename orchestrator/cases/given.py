@@ -28,15 +28,7 @@ _CASE_VALUE = re.compile(r"[^.\s]+\.\S+")
 
 
 def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[str, Value]:
-    """Values by name, with NumPy's numbers as Python's own; a mapping in a mapping is read as a name with a point.
-
-    Parameters
-    ----------
-    values
-        ``{"grid.X_L": 0.3}``, or the same nested: ``{"grid": {"X_L": 0.3}}``.
-    argument
-        Name of the caller's argument, for the error.
-    """
+    """Values by name, with NumPy's numbers as Python's own; a mapping in a mapping is read as a name with a point."""
     if values is None:
         return {}
     from orchestrator.cases.values import flatten, given_twice  # noqa: PLC0415 - a record needs no case
@@ -129,15 +121,7 @@ def moment(time: Any, argument: str) -> float:
 
 
 def in_megabytes(given: Any, argument: str, least: float) -> float:
-    """An amount of memory [MB], as a number or as text such as ``"4 GB"``.
-
-    Parameters
-    ----------
-    given, argument
-        What the caller gave, and the name of the argument.
-    least
-        The least that is of use [MB].
-    """
+    """An amount of memory [MB], as a number or as text such as ``"4 GB"``."""
     rule = "an amount of memory in MB, such as 4096, or '4 GB'"
     number = number_in(given, "MB", argument, rule)
     if not number < float("inf") or not number > 0:

@@ -41,9 +41,7 @@ def sets_imperfection(key: str) -> bool:
 
 
 def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, float | bool]:
-    """Give the connections what the case and the scenario say of them; the numbers that were given, by key.
-
-    ``stop``: end of the run [s]; a delay that lasts beyond it is noted."""
+    """Give the connections what the case and the scenario say of them; the numbers that were given, by key."""
     given: dict[str, float | bool] = {}
     tables = {name: (table, draft.given.place(KEY, name)) for name, table in draft.given.case.imperfections.items()}
     for name, table in draft.given.scenario.imperfections.items():
@@ -66,10 +64,7 @@ def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, fl
 
 
 def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None:
-    """A delay after which nothing arrives before the run ends: a mistake, or worth a word if the run was cut short.
-
-    ``delay`` and ``stop``: how late a value is, and the end of the run [s].
-    ``where``: place in the file."""
+    """A delay after which nothing arrives before the run ends: a mistake, or worth a word if the run was cut short."""
     if delay < stop:
         return
     text = f"delay = {delay:g} s, but the run ends at {stop:g} s: nothing that is sent in it arrives"

@@ -14,8 +14,6 @@ from orchestrator.errors import InputError, Problem
 
 @dataclass
 class Named:
-    """Names that exist in the examined scenarios."""
-
     components: set[str] = field(default_factory=set)
     states: set[str] = field(default_factory=set)
     # components that are FMU files. Such an FMU may lack outputs and states of the catalogue's model that it replaces,

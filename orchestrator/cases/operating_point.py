@@ -58,7 +58,6 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
 
 
 def _returning(draft: Draft) -> set[str]:
-    """Units that an event of the scenario connects."""
     events = draft.given.case.events if draft.given.scenario.events is None else draft.given.scenario.events
     return {event.unit for event in events if isinstance(event, UnitReconnectionTable)}
 

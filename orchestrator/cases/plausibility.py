@@ -29,7 +29,6 @@ _SHOWN = 3  # largest number of components that a question names; the others are
 
 
 def check_plausibility(draft: Draft) -> None:
-    """Note impossible data, and collect the draft's questions."""
     for name, plan in draft.system.components.items():
         for rule in RULES:
             _check_rule(draft, name, plan, rule)

@@ -13,8 +13,6 @@ _FAR = 3
 
 @dataclass(frozen=True, slots=True)
 class UnusualValue:
-    """A most unusual value: its ``component.variable``, its place, and the question's text."""
-
     name: str
     place: str
     text: str
@@ -29,7 +27,6 @@ def place_of(draft: Draft, name: str, *variables: str) -> str:
 
 
 def value_of(plan: ComponentPlan, variable: str) -> float | None:
-    """The effective number: the set value, or otherwise the FMU's default; None without both."""
     value = plan.value(variable) if variable in plan.description.variables else None
     return None if value is None or isinstance(value, bool | str) else float(value)
 

@@ -57,12 +57,8 @@ def solve_power_flow(
     slack bus they share the remaining active power in the same way. Units with a given reactive power feed it and their
     active power, at any bus.
 
-    ``lines`` and ``loads`` and ``shunts``: elements of the network [pu, 100 MVA; loads in MW and Mvar].
-    ``slack_bus``: the bus whose units feed the remaining power; its angle is zero.
     ``keep_limits``: whether a bus gives its voltage up at a limit; otherwise the limits that are exceeded are only
-    named.
-    Raises an `InputError` if the units at a bus disagree about its voltage, no unit is connected at the slack bus,
-    buses have no way to it, or no solution is found."""
+    named."""
     at_bus: dict[str, list[FlowUnit]] = {}
     fixed: dict[str, complex] = {}
     for unit in (unit for unit in units if unit.connected):

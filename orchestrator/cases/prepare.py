@@ -78,7 +78,6 @@ class PreparedScenario:
 
     @property
     def grid(self) -> str:
-        """The component that is the network; "" without one."""
         return self.case.table.power_flow.grid if self.case.table.power_flow else ""
 
     def rescheduled(self, name: ScheduleName) -> "PreparedScenario":
@@ -96,8 +95,6 @@ class PreparedScenario:
 
 
 class Preparer:
-    """Prepares one scenario; ``problems`` collects the mistakes."""
-
     def __init__(
         self, case: CaseDefinition, name: str, overrides: dict[str, Value], parameters: Sequence[ParameterFile] = ()
     ) -> None:

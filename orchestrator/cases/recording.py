@@ -15,9 +15,7 @@ _EQUAL = 1e-6  # an interval is a multiple of the step if it is one to this part
 
 
 def record_every(draft: Draft, clock: Clock, stop_time: float) -> tuple[int, tuple[Problem, ...]]:
-    """Communication steps between two rows, and the questions that a run asks about the interval that the case states.
-
-    ``stop_time``: Of the run [s]."""
+    """Communication steps between two rows, and what a run asks about the interval that the case states."""
     solver = draft.given.case.solver
     steps = solver.record_interval / clock.step_size
     every = max(1, round(steps))

@@ -167,13 +167,7 @@ def shared_flow(
     solve: Callable[[Sequence[FlowUnit]], PowerFlow], units: Sequence[FlowUnit], plans: Mapping[str, ComponentPlan],
     slack_bus: str, dispatch: Dispatch, active: Mapping[str, tuple[float, float]],
 ) -> PowerFlow:  # fmt: skip
-    """The power flow in which the units share what the dispatch before lacks now, with the change of the losses.
-
-    ``solve``: Solves the power flow of units that feed their ``P_0``; those at the slack bus feed what is left.
-    ``units``, ``plans``: As they are after the outage, and their values.
-    ``slack_bus``: As in `orchestrator.cases.power_flow.solve_power_flow`.
-    ``dispatch``: What they fed before.
-    ``active``: Least and most active power that data give units [MW], by name."""
+    """The power flow in which the units share what the dispatch before lacks now, with the change of the losses."""
     left = [replace(one, P_0=dispatch.powers[one.name].real) if one.connected else one for one in units]
     if dispatch.rule is SharingRule.SLACK:
         return solve(left)

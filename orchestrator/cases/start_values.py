@@ -30,14 +30,9 @@ def start_from_power_flow(
     Lines, loads and units have the values that are set in the system. Every override therefore moves the operating
     point as well. A unit whose ``Q_0`` is set feeds it; every other holds its ``v_0``.
 
-    ``system``: the coupled system. The plans of its grid and units get ``v_0``, ``theta_0``, ``P_0``, ``Q_0``.
-    ``grid``: the component that is the network.
-    ``slack``: the bus whose units feed the remaining power.
     ``limits``: least and most reactive power of all units of a bus together [Mvar], by bus. Where some of them are
     disconnected, the limits shrink with the rating.
-    ``keep_limits``: whether a bus gives its voltage up at a limit.
     ``returning``: units that an event connects; a limit of theirs must stay.
-    ``dispatch``: what the units fed before an outage that they share; None where each feeds its own ``P_0``.
     ``active``: least and most active power of units that share [MW], beside their models' own limits."""
     feeding = [_unit(name, bus, system.components[name], system.components[grid]) for name, bus in units.items()]
 

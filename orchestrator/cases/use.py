@@ -15,11 +15,7 @@ _START = {"P_0": 0.0, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0}
 def use_in_case(
     case: str, component: str | None, fmu: Path, step_size: float | None, scenario: str | None = None
 ) -> tuple[Use, Path | None]:
-    """Step, operating point and values that a case gives an FMU, and the file of its binding.
-
-    ``component``: name of the component; None for the component that has this file.
-    ``step_size``: communication step [s]; the case's where None.
-    ``scenario``: name of the scenario; None for the first one with the component."""
+    """Step, operating point and values that a case gives an FMU, and the file of its binding."""
     loaded = load_case(case, trust_fmus=True)  # of which nothing runs here
     name = _component(loaded, component, fmu)
     table = loaded.table.components[name]

@@ -16,9 +16,7 @@ _CHOICES = re.compile(r"\b0: .*\b1: ")  # in the description of a variable that 
 
 
 def convert(info: VariableInfo, value: Value) -> float | bool:
-    """Return the value in the variable's own unit.
-
-    Raises a `ValueError` if type, unit or range do not fit; the message names the variable, the value and the rule."""
+    """Return the value in the variable's own unit."""
     if info.type == "Boolean":
         if isinstance(value, bool):
             return value

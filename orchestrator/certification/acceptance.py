@@ -24,7 +24,6 @@ class Acceptance:
         return list(self.report["checks"])
 
     def keep(self, folder: Path) -> None:
-        """Write the report into a certificate's folder."""
         text = json.dumps(self.report, indent=1, ensure_ascii=False)
         write_text(folder / KEPT, text + "\n")
 
@@ -45,10 +44,6 @@ def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
 
 
 def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
-    """Read a report of ``gfor fmu check --json``.
-
-    Raises `InputError` if the file is not a report, belongs to another FMU, binding or version, or does not hold all
-    checks."""
     remedy = "write it with `gfor fmu check FILE.fmu --json`, or leave --check away to have the tests run"
     try:
         report = json.loads(path.read_text(encoding="utf-8"))

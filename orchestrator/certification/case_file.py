@@ -53,7 +53,6 @@ def _in_comment(file: Path) -> str:
 
 
 def lay_files(request: CertificationRequest, folder: Path) -> None:
-    """Copy the FMU and its binding into a certificate's folder."""
     for file, name in ((request.fmu, FMU), (request.binding, BINDING)):
         target = folder / name
         if file is not None and not (target.exists() and target.samefile(file)):

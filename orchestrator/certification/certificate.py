@@ -32,8 +32,6 @@ Row_co = TypeVar("Row_co", bound=Judged, covariant=True)
 
 @dataclass
 class Certificate(ABC, Generic[Row_co]):
-    """The rows of a code for one converter, judged."""
-
     request: CertificationRequest
     description: FmuDescription
     verdicts: Sequence[Row_co]
@@ -57,7 +55,6 @@ class Certificate(ABC, Generic[Row_co]):
 
     @property
     def verdict(self) -> str:
-        """In one word: ``passes``, ``fails`` or ``incomplete``."""
         accepted = [bool(row.accepted) for row in self.verdicts if row.judged]
         return verdict_of(accepted, len(self.missing) + len(self.departures))
 

@@ -36,12 +36,10 @@ class ModeVerdict:
 
     @property
     def frequency_hz(self) -> float:
-        """Frequency of the oscillation [Hz]."""
         return self.eigenvalue.imag / (2 * np.pi)
 
     @property
     def damping_percent(self) -> float:
-        """Damping ratio [%]."""
         return 100 * damping_ratio(self.eigenvalue)
 
     @property
@@ -52,8 +50,6 @@ class ModeVerdict:
 
 @dataclass(frozen=True)
 class ModalTest:
-    """Modes from 0.1 to 1.5 Hz found in a signal, largest first."""
-
     modes: tuple[IdentifiedMode, ...]
     accepted: bool
     reason: str
@@ -70,7 +66,6 @@ def is_near(frequency_hz: float) -> bool:
 
 
 def critical_mode(modes: ModeSet) -> complex | None:
-    """The least damped oscillation of the judged range [rad/s]; None where there is none."""
     judged = [value for value in modes.eigenvalues.tolist() if is_judged(value.imag / (2 * np.pi))]
     return min(judged, key=damping_ratio, default=None)
 
@@ -134,7 +129,6 @@ def _partners(alike: NDArray[np.float64]) -> dict[int, int]:
 
 
 def judge_mode(value: complex, before: complex | None) -> tuple[bool, str]:
-    """Whether a mode with the converter is accepted, judged by the same mode without it, and the reason."""
     percent = 100 * damping_ratio(value)
     limit = 100 * LEAST_DAMPING
     if damping_ratio(value) >= LEAST_DAMPING:
@@ -167,7 +161,6 @@ def stability_fault(
 
 
 def modal_test(times: NDArray[np.float64], signal: NDArray[np.float64], start: float) -> ModalTest:
-    """Judge the modes that the matrix pencil finds in a signal after ``start`` [s]."""
     if not np.isfinite(signal).all():
         return ModalTest((), False, "the signal is not finite")
     window = times >= start

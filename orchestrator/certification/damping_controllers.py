@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from orchestrator.cases.schema import Value
-from orchestrator.certification.request import CertificationRequest, shown
+from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.values import as_text
 
 SET = "set in the FMU"
 READ = "as the FMU's variables say"
@@ -21,8 +22,6 @@ _AS_DECLARED = " as declared by the applicant"
 
 @dataclass(frozen=True)
 class DampingControllers:
-    """Active damping controllers of the converter."""
-
     pod: str
     source: str
     # values to be set for these controllers, by the FMU's variable.
@@ -43,9 +42,7 @@ class DampingControllers:
 
 
 def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
-    """The damping controllers that a request sets or declares for an FMU.
-
-    Raises `InputError` if ``--pod`` contradicts ``--set`` or the binding."""
+    """The damping controllers that a request sets or declares for an FMU."""
     known = {letter: _state(description, request, letter) for letter in "pq"}
     if request.pod is None:
         active = "".join(letter for letter, value in known.items() if value) or "none"
@@ -70,7 +67,6 @@ def variable(letter: str) -> str:
 
 
 def _unseen(description: FmuDescription, known: Mapping[str, bool | None], pod: str) -> str:
-    """Letters of active controllers with a switch whose effect cannot be seen."""
     switched = [letter for letter in pod.removeprefix("none") if known[letter] is not None]
     return "".join(letter for letter in switched if f"delta_{letter}_pod" not in description.variables)
 
@@ -81,7 +77,6 @@ def _with_unseen(source: str, unseen: str) -> str:
 
 
 def _partly(known: Mapping[str, bool | None], pod: str) -> str:
-    """The source of ``pod`` if the FMU does not show both controllers."""
     hidden = [f"POD-{letter.upper()}" for letter, value in known.items() if value is None]
     if len(hidden) == len(known):
         return DECLARED
@@ -89,7 +84,6 @@ def _partly(known: Mapping[str, bool | None], pod: str) -> str:
 
 
 def _state(description: FmuDescription, request: CertificationRequest, letter: str) -> bool | None:
-    """Whether a controller is on; None where the FMU does not show it."""
     name = variable(letter)
     bound = _bound(description, name)
     if bound is not None:
@@ -118,6 +112,6 @@ def _refuse_contradiction(description: FmuDescription, request: CertificationReq
     for source, value in said.items():
         if value is not None and value is not on:
             raise InputError(
-                f"--pod {request.pod} needs {name} = {shown(on)}, but {source} has {name} = {shown(value)}; "
+                f"--pod {request.pod} needs {name} = {as_text(on)}, but {source} has {name} = {as_text(value)}; "
                 "leave one of them away, or make them agree"
             )

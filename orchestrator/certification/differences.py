@@ -44,7 +44,6 @@ def _name(row: Mapping[str, Any]) -> str:
 
 
 def differences(stated: Any, again: Any, tolerance: float = _SAME) -> Iterator[tuple[str, str]]:
-    """Places, and what stands there and comes out, of two values from JSON."""
     if isinstance(stated, dict) and isinstance(again, dict):
         keys = [k for k in (*again, *stated) if not (k in TAKEN and k in again)]
         pairs = {k: (stated.get(k, _NOTHING), again.get(k, _NOTHING)) for k in keys}

@@ -19,8 +19,7 @@ def environment() -> dict[str, str]:
 
 
 def commit() -> str:
-    """The commit of the checkout that this program runs from, with a note on uncommitted changes; otherwise a note that
-    there is no checkout."""
+    """The commit of the checkout that this program runs from, and whether anything in it is not committed."""
     if not (_ROOT / ".git").exists():
         return "none: installed from a package"
     try:

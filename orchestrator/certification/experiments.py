@@ -10,11 +10,11 @@ import numpy as np
 from orchestrator.arrays import Numbers
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.certification.anew import chosen_points
 from orchestrator.certification.case_file import CASE, WITH
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.form import NORM
 from orchestrator.certification.point import CONVERTER
-from orchestrator.certification.points_anew import chosen_points
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.errors import CosimError

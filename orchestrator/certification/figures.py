@@ -95,7 +95,6 @@ def _model_json(point: PointResult) -> dict[str, Any]:
 
 
 def mode_json(m: ModeVerdict) -> dict[str, Any]:
-    """A mode with the converter, and what it was without."""
     without = None if m.before is None else _figures(m.before)
     return _figures(m.eigenvalue) | {
         "without": without, "likeness": m.similarity, "components": m.components, "accepted": m.accepted,

@@ -47,13 +47,11 @@ def figures_of(certificate: Certificate[Judged]) -> dict[str, Any]:
 
 
 def names_of(certificate: Certificate[Judged]) -> list[str]:
-    """Names of the files that a certificate states hashes of, beside its page."""
     names = [FMU, *([BINDING] if certificate.request.binding else []), *_form_of(certificate).cases(certificate)]
     return [*names, RESPONSES, *([KEPT] if certificate.acceptance else [])]
 
 
 def save(certificate: Certificate[Judged], folder: Path, *, pdf: bool = False) -> list[Path]:
-    """Write ``certificate.html``, ``certificate.json`` and ``responses.nc``, on request ``certificate.pdf``."""
     html, target, form = folder / HTML, folder / JSON, _form_of(certificate)
     made = datetime.now(UTC).replace(microsecond=0)
     save_netcdf(form.responses(certificate), folder / RESPONSES)

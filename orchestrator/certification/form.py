@@ -109,7 +109,6 @@ _FORMS: dict[object, type[_Table]] = {NORM: _Certificate, CODE: _CodeCertificate
 
 
 def check_form(file: Path, content: Any) -> None:
-    """Refuse a certificate with a missing entry, or with an entry of another type."""
     remedy = "the certificate is damaged: take the file that `gfor certify` wrote, or make it anew"
     kind = content.get("format") if isinstance(content, dict) else None
     form = _FORMS.get(kind) if isinstance(kind, int | str) else None

@@ -40,10 +40,7 @@ _SIGNATURE = ("application/json", "signature", "SHA-256 of the FMU that was test
 
 
 def put_inside(folder: Path, fmu: Path, target: Path) -> Path:
-    """Write an FMU with a certificate in it; where ``target`` holds others of the same FMU, this one joins them.
-
-    ``folder``: The certificate's.
-    ``fmu``: The FMU that was tested."""
+    """Write an FMU with a certificate in it; where ``target`` holds others of the same FMU, this one joins them."""
     tested, members = check_target(fmu, target)
     content = read_record(folder / JSON)
     own = f"{FOLDER}/{content.get('code', NTS631)}"

@@ -33,7 +33,6 @@ def issue_of(
     key: str, fmu: Path, binding: Path | None, values: Mapping[str, Value], *, declared: Mapping[str, object],
     pod: str | None = None, reactances: Sequence[float] = REACTANCES, black_box: bool = False,
 ) -> Issue:  # fmt: skip
-    """Check a request for a certificate, before anything is computed."""
     if key != NTS631:
         code, bench = code_for(key, declared), bench_request(fmu, binding, values)
         return Issue(

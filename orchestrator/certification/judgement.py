@@ -78,7 +78,6 @@ class PointVerdict:
 
     @property
     def eigenvalues_accepted(self) -> bool:
-        """Whether there are judged modes, and all of them have enough damping."""
         return bool(self.modes) and all(m.accepted for m in self.modes)
 
     @property
@@ -158,7 +157,6 @@ def judge(
 
 
 def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
-    """Why a converter that ran does not fit the norm's study, lost synchronism, or did not come to rest."""
     wrong = []
     power = float("nan") if having.power is None else having.power
     if not abs(power - RATED_POWER) <= _SAME_POWER * RATED_POWER:
@@ -175,7 +173,6 @@ def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
 
 
 def _idle(having: PointResult, pod: str, letter: str) -> str | None:
-    """Why an output contradicts the stated damping controllers; None if the outputs do not show them or agree."""
     name = f"{CONVERTER}.delta_{letter}_pod"
     values = having.signals.get(name)
     if values is None:
@@ -201,7 +198,6 @@ def _judge_response(point: PointResult, signal: str, event_time: float) -> TimeV
 
 
 def judge_response(times: Numbers, y: Numbers, signal: str, event_time: float) -> TimeVerdict:
-    """Both ways of the time-domain criterion on a recorded signal."""
     y = slow_part(times, y)
     return TimeVerdict(
         signal,

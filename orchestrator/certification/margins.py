@@ -25,7 +25,6 @@ Margin = TypeVar("Margin", CriterionMargin, RowFinding)
 
 
 def narrowest(margins: Sequence[Margin]) -> Margin | None:
-    """The criterion with the least margin; None where none has a figure."""
     known = [m for m in margins if m.margin is not None]
     return min(known, key=lambda m: m.margin or 0.0, default=None)
 

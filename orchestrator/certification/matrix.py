@@ -40,7 +40,6 @@ class MatrixCell:
 
     @property
     def without_figure(self) -> list[CriterionMargin]:
-        """Criteria that are not met and have no figure, such as a loss of synchronism."""
         return [m for m in self.margins if not m.accepted and m.margin is None]
 
     @property

@@ -15,8 +15,8 @@ from orchestrator.certification.environment import environment
 from orchestrator.certification.files import HTML, JSON
 from orchestrator.certification.margins import CriterionMargin, margin_text
 from orchestrator.certification.matrix import CertificateMatrix, MatrixCell
-from orchestrator.certification.request import shown
 from orchestrator.certification.verdict import FAILS, PASSES
+from orchestrator.fmi.values import as_text
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import table
 from orchestrator.results.storage import save_json
@@ -100,7 +100,7 @@ def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: date
 
 
 def _given(device: Device) -> list[str]:
-    values = ", ".join(f"{name} = {shown(value)}" for name, value in device.values.items())
+    values = ", ".join(f"{name} = {as_text(value)}" for name, value in device.values.items())
     return [device.name, device.file.name, device.binding.name if device.binding else "none", values or "none"]
 
 

@@ -23,7 +23,6 @@ A mode of 0.1 Hz with 5 % of damping, the slowest and least damped that the norm
 def motion_faults(
     times: Numbers, signals: Mapping[str, Numbers], event_time: float, findings: Sequence[Mapping[str, Any]] = ()
 ) -> Iterator[str]:
-    """Why a response with the converter is not accepted: lost synchronism, growth, or swings that last."""
     yield from (str(finding["message"]) for finding in findings if finding["kind"] in UNSTABLE)
     frequency = signals.get(FREQUENCY)
     if frequency is not None and len(times) > 1:

@@ -61,8 +61,6 @@ class PointResult(Kept):
 
 @dataclass(frozen=True)
 class CertificatePointTask(Task):
-    """A scenario of the study's case file at one reactance."""
-
     record = PointResult
     X_L: float
     black_box: bool = False
@@ -72,7 +70,6 @@ class CertificatePointTask(Task):
 
 
 def compute_point(task: CertificatePointTask) -> PointResult:
-    """Steady state, modes and response of one point; a failure leaves what was found before it."""
     return computed(task, _result)
 
 

@@ -9,8 +9,9 @@ from tempfile import TemporaryDirectory
 from orchestrator.cases.schema import Value
 from orchestrator.certification.case_file import BINDING, FMU
 from orchestrator.certification.point import CONVERTER
-from orchestrator.certification.request import CertificationRequest, shown
+from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import CaseError, Problem
+from orchestrator.fmi.values import as_text
 
 _OWN = re.compile(rf'^(?:components\.{CONVERTER}\.parameters\.|--set {CONVERTER}\.)"?(?P<name>[^"]*)"?$')
 """Place of a value of the converter, in a case file or among changes."""
@@ -52,4 +53,4 @@ def _refused(request: CertificationRequest, error: CaseError, trial: str, where:
 
 
 def _shown(value: Value) -> str:
-    return f"{value:.15g}" if isinstance(value, float) else shown(value)
+    return f"{value:.15g}" if isinstance(value, float) else as_text(value)

@@ -18,7 +18,6 @@ _SHOWN = 30.0  # length of the drawn part of the response, from the event on [s]
 
 
 def before(value: complex | None) -> str:
-    """The same mode without the converter."""
     if value is None:
         return "no such mode"
     return f"{value.imag / (2 * np.pi):.3f} Hz, {damping(100 * damping_ratio(value))} %"
@@ -119,7 +118,6 @@ def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[s
 
 
 def _construction(time: TimeVerdict, last: float) -> Iterator[ChartCurve]:
-    """The parts of the norm's construction lines that lie in the picture."""
     red = "#a11d1d"
     for s in time.swings.swings:
         if s.after.time <= last and s.number <= 6:

@@ -11,11 +11,10 @@ from orchestrator.certification.environment import environment
 from orchestrator.certification.figures import commands
 from orchestrator.certification.parameters import parameter_rows
 from orchestrator.certification.point import FREQUENCY
-from orchestrator.certification.request import shown
 from orchestrator.certification.study import Certification
 from orchestrator.fmi.origin import read_origin
 from orchestrator.fmi.port import BoundDescription
-from orchestrator.fmi.values import Scalar
+from orchestrator.fmi.values import Scalar, as_text
 from orchestrator.report.html.elements import table
 from orchestrator.report.linearised import exceptions_in_words
 
@@ -25,19 +24,16 @@ Hashes = Mapping[str, str | None]
 
 
 def details(c: Certification) -> str:
-    """Names, number, date, and lines to sign."""
     rows = [[label, escape(text).replace("\n", "<br>") or _LINE] for label, text in c.details.rows()]
     rows += [[f"Signature of the {who}", _LINE] for who in ("tester", "applicant")]
     return table("Filled in from the file of --details, or by hand", ["", ""], rows, left=2)
 
 
 def signal_name(signal: str) -> str:
-    """The signal of the time-domain criterion, in words."""
     return "the frequency at bus 2" if signal == FREQUENCY else "SG1's active power"
 
 
 def converter(c: Certification, hashes: Hashes) -> str:
-    """The FMU, its changed values, and how its modes were found."""
     origin = read_origin(c.description.path)
     values = {**c.request.values, **c.controllers.settings, **c.request.study_values}
     given = {
@@ -47,7 +43,7 @@ def converter(c: Certification, hashes: Hashes) -> str:
         "FMI": f"{origin.fmi_version}, co-simulation", "Guid": c.description.guid, "SHA-256": hashes[FMU],
         "Rating": _rating(c), "Voltage": _voltage(c),
         "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
-        "Values set": ", ".join(f"{k} = {shown(v)}" for k, v in values.items()) or "none",
+        "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",
         "Damping controllers": f"{texts.PODS[c.pod]}: {c.controllers.source}",
         "Watched in time": signal_name(c.signal),
         "In the modes": texts.converter_model(c.points[WITH, v.X_L] for v in c.verdicts),
@@ -89,7 +85,7 @@ def parameters(c: Certification) -> str:
 def _text(value: Scalar | None) -> str:
     if value is None:
         return "–"
-    return escape(shown(value) if not isinstance(value, float) else f"{value:.12g}")
+    return escape(as_text(value) if not isinstance(value, float) else f"{value:.12g}")
 
 
 def binding(c: Certification, hashes: Hashes) -> str:
@@ -100,7 +96,6 @@ def binding(c: Certification, hashes: Hashes) -> str:
 
 
 def acceptance(c: Certification) -> str:
-    """The results of `gfor fmu check`."""
     if c.acceptance is None:
         return "<p>They were not run (--no-check).</p>"
     marks = {"fail": "bad", "pass": "good"}
@@ -115,8 +110,6 @@ def acceptance(c: Certification) -> str:
 
 
 def provenance(c: Certification, hashes: Hashes) -> str:
-    """The environment of the computation, hashes, commands that compute a point again, and the limits of the
-    certificate's proof."""
     machine = table("Computed on", ["", ""], [[escape(k), escape(v)] for k, v in environment().items()], left=2)
     files = table("SHA-256 of the files beside this page", ["File", "SHA-256"],
                   [[escape(name), str(value)] for name, value in hashes.items()], left=2)  # fmt: skip

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
+from orchestrator.fmi.values import as_text
 
 REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))  # values of X_L in the norm [pu, 100 MVA]
 PODS = ("none", "p", "q", "pq")
@@ -43,20 +44,14 @@ class CertificationRequest:
 
     @property
     def departures(self) -> tuple[str, ...]:
-        """Changes of the study itself, by which it departs from the norm."""
         changed = {f"converter.{name}": self.values[name] for name in GIVEN if name in self.values}
-        return tuple(f"{name} = {shown(value)}" for name, value in {**self.study_values, **changed}.items())
+        return tuple(f"{name} = {as_text(value)}" for name, value in {**self.study_values, **changed}.items())
 
 
 def same_reactance(one: float, other: float) -> bool:
-    """Whether two reactances [pu] are equal."""
     return math.isclose(one, other, rel_tol=1e-9)
 
 
 def missing_reactances(done: Iterable[float]) -> tuple[float, ...]:
     values = list(done)
     return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in values))
-
-
-def shown(value: Value) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -22,8 +22,6 @@ from orchestrator.points.task import StudyCase
 
 @dataclass
 class Certification(Certificate[PointVerdict]):
-    """The damping test of NTS 631, whose rows are line reactances."""
-
     controllers: DampingControllers
     event_time: float
     case: Path
@@ -37,13 +35,11 @@ class Certification(Certificate[PointVerdict]):
 
     @property
     def linearised(self) -> dict[str, str]:
-        """How the linear model of every component was found at the points with the converter."""
         having = [point for (name, _), point in self.points.items() if name == WITH]
         return {component: how for point in having for component, how in point.linearised.items()}
 
     @property
     def fit_errors(self) -> dict[str, float]:
-        """Largest fit error over all points, for each identified component."""
         found: dict[str, float] = {}
         for point in self.points.values():
             for component, error in point.fit_errors.items():
@@ -52,7 +48,6 @@ class Certification(Certificate[PointVerdict]):
 
     @property
     def signal(self) -> str:
-        """The signal that the time-domain criterion judges."""
         return watched(self.pod)
 
     @property

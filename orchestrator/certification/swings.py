@@ -51,7 +51,6 @@ class RecordedSwing:
 
     @property
     def depth(self) -> float:
-        """How far the minimum lies below the line."""
         return self.line - self.minimum.value
 
 

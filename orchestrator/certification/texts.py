@@ -69,12 +69,10 @@ and that its points come out again from the FMU.</p>"""
 
 
 def count(missing: Sequence[float]) -> str:
-    """A phrase with the number of the norm's reactances that were judged."""
     return f"{len(REACTANCES) - len(missing)} of {len(REACTANCES)}"
 
 
 def converter_model(points: Iterable[PointResult]) -> str:
-    """The converter's model in the modes: its own states, a model inside its FMU, or a fitted model."""
     known = [p for p in points if p.modes is not None]
     boxes = [p for p in known if p.identified is not None]
     if boxes:

@@ -12,7 +12,6 @@ DOES_NOT_HOLD = 5  # exit code for a certificate with a contradiction, whose ver
 
 
 def verdict_of(accepted: Sequence[bool], missing: int) -> str:
-    """The verdict from the judged rows and the number of parts that are missing."""
     if not all(accepted):
         return FAILS
     return INCOMPLETE if missing or not accepted else PASSES
@@ -24,7 +23,6 @@ def exit_code(verdict: str, *, refused: bool) -> int:
 
 
 def incomplete_because(missing: Sequence[float], departures: Sequence[str]) -> str:
-    """The parts of the norm's test that were not done; empty if the test is complete."""
     reasons = []
     if missing:
         done = len(REACTANCES) - len(missing)

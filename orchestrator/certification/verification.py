@@ -45,7 +45,6 @@ def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
 
 
 def verify_files(folder: Path, content: dict[str, Any]) -> Verification:
-    """Compare all hashes, and judge the certificate's kept responses again."""
     found = Verification()
     if content.get("seal") != seal_of(content):
         found.faults.append(f"{JSON}: its figures or words are not those that were written: its own hash differs")
@@ -63,7 +62,6 @@ def verify_files(folder: Path, content: dict[str, Any]) -> Verification:
 
 
 def _compare_page(page: Path, content: dict[str, Any], found: Verification) -> None:
-    """Check that the page states the hash of its figures and the unchanged sentence of the verdict."""
     if not page.is_file():
         return
     text = page.read_text(encoding="utf-8", errors="replace")

@@ -34,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Measure, fit, write, and say what was found."""
     if options.scan and not options.voltage:
         raise InputError("--scan: a scan is in siemens; give the rated voltage as well, as in --voltage '230 kV'")
     console, how = make_console(stderr=options.json), excitation_of(options)

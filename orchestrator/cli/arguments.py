@@ -108,7 +108,6 @@ def quantity(unit: str) -> Callable[[str], float]:
 
 
 def tolerance(text: str) -> float:
-    """A largest error of a step, such as 1e-4."""
     value = as_number(text)
     check_tolerance(value)
     return value

@@ -18,7 +18,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a draft and say what is left to fill in."""
     description = read_description(options.file)
     out = options.out or Path(f"{options.file.stem}.toml")
     if out.exists() and not options.force:

@@ -44,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Build every model and print the files' paths."""
     if options.from_dll is not None:
         return _from_dll(options)
     if options.host is not None:
@@ -77,7 +76,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _take_from_table(options: argparse.Namespace) -> None:
-    """Choose kind, version, platforms and ports, and say so."""
     given = {"--native": options.native, "--fmi": options.fmi, "--platform": options.platform}
     if said := [name for name, value in given.items() if value]:
         raise InputError(f"--for {options.host} chooses that by itself: leave out {', '.join(said)}, or --for")

@@ -94,7 +94,6 @@ def asked_of_case(options: argparse.Namespace, request: type, study: str) -> dic
 
 
 def prepare(options: argparse.Namespace) -> list[PreparedScenario]:
-    """The same, ready to run."""
     return [scenario.prepared for scenario in chosen(options)]
 
 

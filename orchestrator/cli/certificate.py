@@ -46,7 +46,6 @@ def codes_of(asked: str) -> tuple[str, ...]:
 
 
 def run_one(options: argparse.Namespace, device: Device) -> int:
-    """Test one device by one code, write the certificate and print it."""
     key = options.code
     if key != NTS631:
         check_code_options(options, [device])
@@ -69,7 +68,6 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
 
 
 def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
-    """Refuse what only the norm's damping test has."""
     reactances = options.reactances != REACTANCES
     asked = {"--pod": options.pod, "--black-box": options.black_box, "--reactances": reactances}
     if other := [name for name, value in asked.items() if value]:
@@ -109,7 +107,6 @@ def certified(
 
 
 def run_stiffness(options: argparse.Namespace, device: Device) -> int:
-    """Measure a converter by ``--code gb``; there is no verdict, so that it neither passes nor fails."""
     asked = {"--pdf": options.pdf, "--details": options.details, "--check": options.check}
     if other := [name for name, value in asked.items() if value]:
         raise InputError(f"{', '.join(other)}: --code {GB} gives figures and no certificate; leave it out")
@@ -131,7 +128,6 @@ def run_stiffness(options: argparse.Namespace, device: Device) -> int:
 
 
 def measured_figures(device: Device, folder: Path) -> tuple[dict[str, Any], list[Path]]:
-    """Measure a converter and write its files; says on standard error what is being done."""
     request = bench_request(device.file, device.binding, device.values)
     made_folder(folder, "--out")
     with said_stages() as report:

@@ -25,6 +25,8 @@ _LONGEST = 100  # of a remark in the first table [characters]
 
 
 def show(found: Certificate[Judged], files: Sequence[Path], folder: Path, console: Console) -> None:
+    colour = {INCOMPLETE: "yellow"}.get(found.verdict, "green" if found.passed and not found.refused else "red")
+    console.print(f"[bold {colour}]{escape(found.sentence())}[/]", soft_wrap=True)
     if isinstance(found, Certification):
         _show_damping_test(found, console)
     elif isinstance(found, CodeCertificate):
@@ -36,7 +38,6 @@ def show(found: Certificate[Judged], files: Sequence[Path], folder: Path, consol
 
 
 def _verdicts(found: CodeCertificate) -> PlainTable:
-    """The verdict on the whole, and on each row with its narrowest margin."""
     table = make_table(f"{found.code.title}: {found.description.model_name}", "Row", "Verdict", "Criteria met",
                        "Least margin", "Remark", left=99)  # fmt: skip
     judged = [v for v in found.verdicts if v.judged]
@@ -57,13 +58,12 @@ def _verdicts(found: CodeCertificate) -> PlainTable:
 
 def _remarks(found: CodeCertificate) -> list[str]:
     """Remarks on the device, its acceptance tests and parts not tested, each once."""
-    said = _misfits(r.findings for r in found.results.values())
+    said = [f"Not as the code has it: {', '.join(found.departures)}."] if found.departures else []
+    said += _misfits(r.findings for r in found.results.values())
     if isinstance(found.description, BoundDescription):
         said += [f"the binding has {text}" for text in found.description.unlike_delivered().values()]
-    if found.acceptance is not None and not found.acceptance.trusted:
-        said.append(f"Acceptance tests failed: {', '.join(found.acceptance.faults)}; do not rely on the FMU as it is.")
-    if found.missing:
-        said.append(f"Not tested: {'; '.join(found.missing)}")
+    if left := [part for part in found.missing if part not in found.departures]:
+        said.append(f"Not tested: {'; '.join(left)}")
     return list(dict.fromkeys(said))
 
 
@@ -75,13 +75,11 @@ def _criteria(found: CodeCertificate) -> PlainTable:
     table = make_table("Criteria", "Row", "Criterion", "Found", "Margin", "", left=99)
     for v in found.verdicts:
         for f in v.findings:
-            table.add_row(v.row.name, f.criterion, f.text[:160], margin_of(f), v.word(f))
+            table.add_row(v.row.name, f.criterion, short(f.text, 160), margin_of(f), v.word(f))
     return table
 
 
 def _show_damping_test(found: Certification, console: Console) -> None:
-    colour = "green" if found.passed and not found.refused else "red"
-    console.print(f"[bold {colour}]{escape(found.sentence())}[/]", soft_wrap=True)
     for text in _misfits(p.findings for p in found.points.values()):
         console.print(escape(text), soft_wrap=True, highlight=False)
     table = make_table(f"Damping test, {found.signal} watched", "X_L [pu]", "least damped [Hz]", "ξ [%]",

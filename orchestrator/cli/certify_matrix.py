@@ -29,7 +29,6 @@ from orchestrator.safe_files import made_folder
 
 
 def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
-    """Test every device by every code that is asked for, and write and print the matrix."""
     codes, left_out = codes_of(options.code), tuple[str, ...]()
     if options.code == ALL and not options.declare:
         left_out = tuple(BY_DECLARATION)
@@ -133,7 +132,6 @@ def _check_any(matrix: CertificateMatrix) -> None:
 
 
 def matrix_table(matrix: CertificateMatrix) -> PlainTable:
-    """The matrix for a terminal: a row for each code, a column for each device."""
     table = make_table("Codes and devices: verdict, and narrowest margin", "", *matrix.devices, left=99)
     for code in matrix.codes:
         table.add_row(code, *("\n".join(in_words(matrix.cells[name, code])) for name in matrix.devices))

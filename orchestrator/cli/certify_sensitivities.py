@@ -44,7 +44,6 @@ def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str], norm: str) -> None:
-    """Refuse options that would do nothing."""
     others = {"--parameter": options.parameter, "--fixed": options.fixed, "--change": options.change,
               "--confirm": options.confirm}  # fmt: skip
     if not options.sensitivities:

@@ -19,8 +19,6 @@ from orchestrator.study.checkpoints import CASE, Checkpoints, not_kept
 
 
 class StudyCheckpoints:
-    """The checkpoints of all scenarios of a command, whose options are as `with_request` gave them."""
-
     def __init__(self, scenarios: Sequence[PreparedScenario], folder: Path, options: argparse.Namespace) -> None:
         self._results, self._folder, self._every = folder, folder / CHECKPOINTS, options.checkpoint
         self._of: dict[str, Checkpoints] = {}

@@ -1,7 +1,6 @@
 """``gfor design``: a POD controller by eigenvalue sensitivity."""
 
 import argparse
-import shlex
 from contextlib import suppress
 from pathlib import Path
 from shutil import rmtree
@@ -21,6 +20,7 @@ from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.sheet import first_screen, sheet
 from orchestrator.pod_design.view import parameter_file_path
 from orchestrator.points.store import PointStore, any_kept
+from orchestrator.results.origin import as_typed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Design, print, and write the parameter file."""
     if options.points is not None:
         _check_over_points(options)
         out = options.out and _writable(_given(options.out))
@@ -67,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
         design = controller.result
         print_questions([design.prepared], as_json=options.json)
         warn(design.prepared.name, design.warnings)
-        controller.save(path, _command_line(options, request))
+        controller.save(path, as_typed())
         rmtree(folder, ignore_errors=True)
     ends = exit_code(options, [design.stability]) or (0 if design.met else NOT_MET)
     if options.json:
@@ -89,7 +88,6 @@ def _given(out: Path) -> Path:
 
 
 def _check_for_one_point(options: argparse.Namespace) -> None:
-    """Refuse what only a design over operating points takes."""
     for name in ("controller", "component", "mode"):
         if len(getattr(options, name)) > 1:
             times = len(getattr(options, name))
@@ -123,25 +121,6 @@ def _request(options: argparse.Namespace) -> DesignRequest:
     return DesignRequest(**asked_of_case(options, DesignRequest, "design") | first | how)
 
 
-def _command_line(options: argparse.Namespace, request: DesignRequest) -> str:
-    words = ["gfor", "design", str(options.case), "--controller", *options.controller]
-    single = {"--component": request.component, "--mode": request.mode, "--damping": _in_percent(request.damping),
-              "--damping-increment": _in_percent(options.damping_increment), "--stages": request.stages,
-              "--step": request.step_size}  # fmt: skip
-    words += [word for key, value in single.items() if value is not None for word in (key, str(value))]
-    low, high = request.gain_bounds
-    words += ["--delta-gain", f"{request.delta_gain:g}", "--gain-bounds", f"{low:g}:{high:g}"]
-    words += ["--gain-from", options.gain_from, "--min-damping", f"{100 * request.least_damping:g}%"]
-    for name in options.scenario:
-        words += ["--scenario", name]
-    for key, value in options.set:
-        words += ["--set", f"{key}={str(value).lower() if isinstance(value, bool) else value}"]
-    for file in options.parameters:
-        words += ["--parameters", str(file)]
-    words += ["--refine"] if options.refine else []
-    return " ".join(shlex.quote(word) for word in words)
-
-
 def _writable(path: Path) -> Path:
     """The parameter file's path, tried before anything is computed."""
     try:
@@ -155,7 +134,3 @@ def _writable(path: Path) -> Path:
             f"--out {path}: the parameter file cannot be written there: {error.strerror}; choose another place"
         ) from error
     return path
-
-
-def _in_percent(ratio: float | None) -> str | None:
-    return None if ratio is None else f"{100 * ratio:g}%"

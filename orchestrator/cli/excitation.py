@@ -11,7 +11,6 @@ _DEFAULTS = Excitation()
 
 
 def add_excitation_arguments(parser: argparse.ArgumentParser) -> None:
-    """Method, size and range; whether the state may be saved."""
     parser.add_argument("--method", choices=METHODS, default=_DEFAULTS.method, help="excitation (default: multisine)")
     parser.add_argument("--amplitude", type=read_positive, default=_DEFAULTS.amplitude, metavar="A",
                         help=f"largest deviation of the voltage [pu] ({_DEFAULTS.amplitude:g})")  # fmt: skip

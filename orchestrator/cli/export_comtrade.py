@@ -19,7 +19,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the recording and print the paths of its files."""
     with saying_warnings():
         files = export_comtrade(options.run, options.signal or (), options.out, options.form, options.frequency)
     for file in files:

@@ -22,7 +22,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the libraries and the data sheet, and print their paths."""
     with said_stages() as report:
         written = export_dll(
             options.name, options.dest, platforms=options.platform, sample_time=options.sample_time,

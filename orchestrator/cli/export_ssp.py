@@ -17,7 +17,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write every scenario to an archive of its own and print their paths."""
     out: Path | None = options.out
     scenarios = prepare(options)
     single = out is not None and out.suffix.lower() == ".ssp"

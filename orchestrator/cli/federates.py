@@ -35,7 +35,6 @@ def names(text: str) -> tuple[str, ...]:
 
 
 def choice(options: argparse.Namespace, number_of_scenarios: int) -> Federates | None:
-    """The choice of federates; None for the local master."""
     given = {
         "names": options.federate, "external": options.external, "broker": options.broker, "port": options.broker_port,
         "patience": options.patience, "to_join": options.to_join,

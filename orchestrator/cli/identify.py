@@ -25,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write a recorded signal as a sum of modes."""
     with saying_warnings():
         found = identify(options.run, options.signal, options.start, options.stop)
     if options.json:

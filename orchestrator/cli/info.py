@@ -21,7 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what the FMU is, what it can do, and its variables."""
     found = info(options.file)
     if options.json:
         print_json(found.as_json())

@@ -15,13 +15,11 @@ from orchestrator.study.like import run_like
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``gfor run`` that make it run as another master."""
     option(parser, "--like", "MASTER", f"only trajectories, as another master would give them: {', '.join(MASTERS)}")
     option(parser, "--order", "A,B,…", "with --like: in which order components step, where they take turns")
 
 
 def rules_of(options: argparse.Namespace) -> MasterRules | None:
-    """The master that a run is to follow; None for our own."""
     if options.order and not options.like:
         raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
     if options.like and (options.threads or options.workers):

@@ -13,7 +13,6 @@ OPTION = "--with-linear-model"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Options of ``gfor fmu build``."""
     parser.add_argument(OPTION, dest="linear_case", metavar="CASE", help="pack the model's linear model at the steady "
                         "state of this case into the FMU")  # fmt: skip
     option(parser, "--scenario", "NAME", "scenario of that case (default: its only one)")

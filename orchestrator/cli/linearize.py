@@ -26,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Linearise every scenario and write its model."""
     scenarios = chosen(options)
     folder = made_folder(options.out or Path("results") / f"{scenarios[0].prepared.case.name}_linear", "--out")
     verdicts: dict[str, Stability] = {}

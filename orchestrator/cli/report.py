@@ -16,7 +16,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the page and print its path."""
     with saying_warnings():
         page = write_report(options.folder, options.others, options.out, options.against)
     print(page)

@@ -25,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Plan, compute, write and print."""
     with working_in(options, "screen", STUDY) as (planned, compute, folder):
         _merge(options.merge, folder / POINTS)
         found, shard = compute(options.shard), options.shard
@@ -40,7 +39,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _merge(folders: Sequence[Path], store: Path) -> None:
-    """Copy the points that parts kept elsewhere."""
     made_folder(store, "--out")
     for folder in folders:
         kept = sorted((folder / POINTS).glob("*.npz"))

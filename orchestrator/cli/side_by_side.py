@@ -33,7 +33,6 @@ _PATIENCE = 20.0  # how long a copy that was told to end is waited for [s]
 
 
 def number_of_workers(asked: int | None, scenarios: int) -> int:
-    """How many scenarios run at a time."""
     if sys.platform != "linux" or threading.current_thread() is not threading.main_thread():
         return 1
     return min(scenarios, asked or number_of_cores())

@@ -21,7 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Try, print, and return 1 where no schedule has a step within the error."""
     request = StepsRequest(**asked_by(options, StepsRequest))
     choices = [steps_of(scenario, request) for scenario in chosen(options)]
     if options.json:

@@ -41,7 +41,6 @@ def add_study_arguments(name: str, study: AnyStudy | Simple, parser: argparse.Ar
 
 
 def run_study(name: str, study: AnyStudy | Simple, options: argparse.Namespace) -> int:
-    """Plan, compute, write and print."""
     if isinstance(study, StudyAtOnce):
         return _run_at_once(name, study, options)
     with working_in(options, name, study) as (_, compute, folder):

@@ -38,7 +38,6 @@ def print_json(content: Any) -> None:
 
 
 def print_parts(console: Console, parts: Iterable[RenderableType]) -> None:
-    """Tables, and lines as rich markup."""
     for part in parts:
         console.print(part, soft_wrap=isinstance(part, str), highlight=False)
 

@@ -52,7 +52,6 @@ def add_details_argument(parser: argparse.ArgumentParser) -> None:
 
 
 def print_answers(console: Console, answers: Sequence[ScenarioAnswer], results: Sequence[ModesResult]) -> None:
-    """The first table, and what its range leaves out."""
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
     console.print(answers_table(answers, ranges[0] if ranges else ELECTROMECHANICAL_HZ))
     if rest := outside(results):
@@ -61,14 +60,12 @@ def print_answers(console: Console, answers: Sequence[ScenarioAnswer], results: 
 
 
 def print_details(console: Console, results: Sequence[ModesResult]) -> None:
-    """The power flow, and the eigenvalue behind each verdict."""
     for table in tables.power_flows(results):
         console.print(table, "")
     print_verdicts(console, results)
 
 
 def print_verdicts(console: Console, results: Sequence[ModesResult]) -> None:
-    """The stability of a case's scenarios."""
     outside = {r.prepared.title: r.hidden.sentence() for r in results if r.hidden is not None}
     print_stability(console, {r.prepared.title: r.stability for r in results}, outside)
 

@@ -1,18 +1,17 @@
 """``gfor verify``: whether a certificate still holds."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.certification.anew import POINTS, Parts, parts_of
+from orchestrator.certification.anew import POINTS, TOLERANCE, TOLERANCE_IDENTIFIED, Verified, verified
 from orchestrator.certification.inside import laid_out
 from orchestrator.certification.issue import NTS631
-from orchestrator.certification.points_anew import TOLERANCE, TOLERANCE_IDENTIFIED
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
-from orchestrator.certification.verification import Verification, read_certificate, verify_files
 from orchestrator.cli.arguments import option, reactances
 from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.terminal import make_console, print_json
@@ -61,71 +60,53 @@ def run(options: argparse.Namespace) -> int:
 
 def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any], int]:
     """What is said of one certificate as JSON, and its exit code."""
-    folder, content = read_certificate(place)
-    parts = parts_of(content)
-    norm = parts is POINTS
     console = make_console(stderr=options.json)
-    wanted = options.points or options.rows or ()
-    chosen = [] if options.files_only else parts.chosen(folder, content, wanted, every=options.all)
-    found = verify_files(folder, content)
-    computed = bool(chosen) and found.holds
-    if computed:
-        again = _anew(options, folder, content, chosen, console, parts)
-        found = Verification(found.faults + again.faults, found.agreed + again.agreed)
+    with progress_bar(console) as bar:
+        task = bar.add_task("Points", total=None)
+        found = verified(
+            place, () if options.files_only else options.points or options.rows,
+            lambda imports: choose_executor(options, imports),
+            lambda done, total: bar.update(task, completed=done, total=total), every=options.all,
+        )  # fmt: skip
+    content, norm = found.content, found.parts is POINTS
     said = {"holds": found.holds, "verdict": content["verdict"], **({"points": content["judged"]} if norm else {}),
             "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
-            "agreed": found.agreed, "computed": chosen if computed else []}  # fmt: skip
+            "agreed": found.agreed, "computed": found.computed}  # fmt: skip
     if not options.json:
         if place != options.certificate:
             console.print(escape(f"{content['title']}:"), highlight=False)
-        _show(found, content, chosen, console, computed=computed, norm=norm)
+        _show(found, console, norm=norm)
     code = exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
     return said | ({"code": content.get("code", NTS631)} if place != options.certificate else {}), code
 
 
-def _anew(
-    options: argparse.Namespace, folder: Path, content: dict[str, Any], chosen: list[Any], console: Console,
-    parts: Parts,
-) -> Verification:  # fmt: skip
-    executor = choose_executor(options, [parts.task.__module__])
-    with progress_bar(console) as bar:
-        task = bar.add_task(f"{parts.one.capitalize()}s", total=len(chosen) * parts.times)
-        try:
-            return parts.verify(folder, content, chosen, executor, lambda done, _: bar.update(task, completed=done))
-        finally:
-            executor.close()
-
-
-def _show(
-    found: Verification, content: dict[str, Any], chosen: list[Any], console: Console, *, computed: bool, norm: bool
-) -> None:
+def _show(found: Verified, console: Console, *, norm: bool) -> None:
     for text in found.agreed:
         console.print(f"[green]agrees[/]        {escape(text)}")
     for text in found.faults:
         console.print(f"[bold red]does not agree[/] {escape(text)}")
     console.print("")
-    one, every = ("point", content["points"]) if norm else ("row", content["rows"])
-    if chosen and not computed:
+    one, every = found.parts.one, found.content["points" if norm else "rows"]
+    if found.chosen and not found.computed:
         console.print(f"No {one} was computed anew: with other files that would say nothing of this certificate.")
-    if computed and norm:
+    if found.computed and norm:
         console.print(f"Allowed are differences of {TOLERANCE:g} of an eigenvalue and of a signal's range "
                       f"({TOLERANCE_IDENTIFIED:g} of an eigenvalue with an identified converter).")  # fmt: skip
-    if computed and len(chosen) < len(every):
-        console.print(f"{len(chosen)} of {len(every)} {one}s were computed anew; --all takes every one.")
+    if 0 < len(found.computed) < len(every):
+        console.print(f"{len(found.computed)} of {len(every)} {one}s were computed anew; --all takes every one.")
     if found.holds:
         console.print("The certificate holds. That is no proof of who made it: hashes guard against accidents only.")
-        console.print(_verdict(content, norm=norm), soft_wrap=True, highlight=False)
+        console.print(_verdict(found.content, norm=norm), soft_wrap=True, highlight=False)
     else:
         count = f"{len(found.faults)} disagreement{'' if len(found.faults) == 1 else 's'}"
         console.print(f"[bold red]The certificate does not hold: {count}.[/]")
 
 
-def _refused(content: dict[str, Any]) -> bool:
-    """Whether an acceptance test of the FMU failed."""
+def _refused(content: Mapping[str, Any]) -> bool:
     return content["acceptance"] is not None and not content["acceptance"]["trusted"]
 
 
-def _verdict(content: dict[str, Any], *, norm: bool) -> str:
+def _verdict(content: Mapping[str, Any], *, norm: bool) -> str:
     colour = "green" if content["verdict"] == PASSES and not _refused(content) else "red"
     judged = f", {escape(content['judged'])} line reactances of the norm judged" if norm else ""
     tail = "; acceptance tests of the FMU failed" if _refused(content) else ""

@@ -38,8 +38,6 @@ class Aim:
 
 @dataclass(frozen=True)
 class Watched:
-    """A mode at one operating point."""
-
     value: complex  # λ [rad/s]
     place: int  # its column among the eigenvectors
     floor: float | None  # damping ratio that it may not fall below; None for a mode that the design damps
@@ -101,7 +99,6 @@ class Worth:
 
     @property
     def allowed(self) -> bool:
-        """Whether no other mode is harmed."""
         return self.breach <= _ROUNDING
 
 
@@ -109,9 +106,6 @@ _ROUNDING = 1e-7
 
 
 def worth_of(watched: Sequence[Watched], growing: float, growing_before: float, point: int = 0) -> Worth:
-    """The worth of a spectrum.
-
-    ``growing`` and ``growing_before``: as `growth` gives them, with the setting and without it [1/s]."""
     damped = [mode for mode in watched if mode.floor is None]
     worst = min((mode.damping for mode in damped), default=1.0)
     rest = min((mode.damping for mode in damped if not mode.hardly_moved), default=worst)

@@ -42,7 +42,6 @@ class PodPlace:
 
     @classmethod
     def of(cls, name: str) -> "PodPlace":
-        """From ``component.controller``."""
         component, _, controller = name.rpartition(".")
         return cls(component, controller)
 
@@ -115,12 +114,10 @@ class OpenLoops:
         return whole
 
     def solve(self, setting: Setting) -> ClosedLoop:
-        """Eigenvalues and eigenvectors of the closed loop."""
         values, left, right = scipy.linalg.eig(self.closed(setting), left=True, right=True)
         return ClosedLoop(self._with_rest(values), left, right)
 
     def eigenvalues(self, setting: Setting) -> Complex:
-        """Eigenvalues of the closed loop [rad/s]."""
         return self._with_rest(np.linalg.eigvals(self.closed(setting)).astype(complex))
 
     def _with_rest(self, values: Complex) -> Complex:
@@ -131,9 +128,7 @@ class OpenLoops:
         return (*self.names, *(f"stage {k + 1}" for k in range(size - len(self.A))))
 
     def whole(self, vector: Complex, *, left: bool = False) -> Complex:
-        """An eigenvector of a closed loop in all n states and the stages.
-
-        ``vector``: as `solve` gives it, shape (r + k,)."""
+        """An eigenvector of a closed loop in all n states and the stages."""
         if self.right is None or self.left is None:
             return vector
         r = len(self.A)

@@ -58,8 +58,6 @@ class PointModes:
 
 @dataclass(frozen=True)
 class PointsRecord(Kept):
-    """The points of a task, in its order."""
-
     points: tuple[PointModes, ...]
 
     @property
@@ -69,8 +67,6 @@ class PointsRecord(Kept):
 
 @dataclass(frozen=True)
 class PointsTask(Task):
-    """Operating points with outages that are computed together."""
-
     record = PointsRecord
     items: tuple[Item, ...]
     places: tuple[PodPlace, ...]  # loops that are measured; none where only the modes are asked for
@@ -86,7 +82,6 @@ class PointsTask(Task):
 
 
 def compute_points(task: PointsTask) -> PointsRecord:
-    """Compute all points of a task; failures become records as well."""
     return computed(task, _of_task)
 
 
@@ -112,7 +107,6 @@ def _points(task: PointsTask, case: Case, preparation: ItemPreparation, bench: P
 def _at(
     case: Case, bench: PointBench, master: Master, places: Sequence[PodPlace], warnings: tuple[str, ...]
 ) -> PointModes:
-    """The modes of a running system, and its loops."""
     find_operating_point(master, accept=ACCEPT)
     silent = [name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)]
     if silent:

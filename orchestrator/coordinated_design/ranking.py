@@ -28,12 +28,7 @@ def ranked(
     places: Sequence[PodPlace], stages: Mapping[PodPlace, int], points: Sequence[RatedPoint], largest: float,
     frequency: float, most: int, known: tuple[PodPlace, PodSetting] | None = None,
 ) -> tuple[RankedConverter, ...]:  # fmt: skip
-    """The controllers by the size of their residues; for the first a controller alone is designed.
-
-    ``stages``: N_S of each.
-    ``largest``: the largest gain [pu].
-    ``frequency``: ω that the centres relate to [rad/s].
-    ``known``: A controller that was designed alone already, with its setting."""
+    """The controllers by the size of their residues; for the first a controller alone is designed."""
     by_shift = sorted(((_shift(place, points), place) for place in places), key=lambda one: (-one[0], one[1]))
     found = []
     for k, (shift, place) in enumerate(by_shift):

@@ -56,7 +56,6 @@ class SettingSearch:
         self.evaluations = 0
 
     def tried(self, x: Numbers, steps: int = 0) -> Tried:
-        """A vector with its worth over all points."""
         self.evaluations += 1
         setting = self._space.setting(x)
         return Tried(x, together(point.worth(setting) for point in self._points), steps)

@@ -34,10 +34,7 @@ class PodGroup:
 
 
 class SettingSpace:
-    """Vectors x with three numbers for each group: turn and gain as parts of their ranges, logarithm of the centre.
-
-    ``gain_bounds``: of every gain [pu].
-    ``frequency``: ω of the modes to be damped [rad/s], to which the centres relate."""
+    """Vectors x with three numbers for each group: turn and gain as parts of their ranges, logarithm of the centre."""
 
     def __init__(self, groups: Sequence[PodGroup], gain_bounds: tuple[float, float], frequency: float) -> None:
         self.groups, self.frequency = tuple(groups), frequency
@@ -52,7 +49,6 @@ class SettingSpace:
         return SettingSpace([group], self._gain_bounds, self.frequency)
 
     def clipped(self, x: Numbers) -> Numbers:
-        """The nearest vector within the bounds."""
         return np.clip(x, self.lowest, self.highest)
 
     def vector(self, turns_deg: Sequence[float], centres: Sequence[float], gains: Sequence[float]) -> Numbers:

@@ -102,7 +102,6 @@ class PointsDesignPlan:
 
 
 def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesignPlan:
-    """Check a design over operating points, and build the FMUs that it needs."""
     require_controllers(request.controllers)
     groups = _groups(case, request)
     known = [table.name for table in case.table.analysis.modes]
@@ -132,7 +131,6 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
 
 
 def naming_of(case: CaseDefinition, names: Sequence[str], modes: list[Mode]) -> Mapping[str, Mode]:
-    """The modes that a case names, from the names of the states and the candidates."""
     return modes_named(case, names, modes).named
 
 
@@ -200,10 +198,7 @@ class PointsDesign:
 def design_over_points(
     plan: PointsDesignPlan, work: Work, stage: Callable[[str], None] = lambda text: None
 ) -> PointsDesign:
-    """Find the settings, and compute all modes anew with them.
-
-    ``plan``: as `plan_points_design` gives it.
-    ``work``: counts the points first without and then with the controllers."""
+    """Find the settings, and compute all modes anew with them."""
     stage("operating points without the controllers")
     before = modes_at(plan, plan.off, plan.candidates, replace(work, report=lambda n, of: work.report(n, 2 * of)))
     usable = [k for k, point in enumerate(before) if point.loops is not None]
@@ -260,7 +255,6 @@ def _confirmed(
 
 
 def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
-    """N_S of every candidate."""
     own = {place: group.stages for group in plan.groups for place in group.places}
     plans = plan.prepared.system.components
     return {
@@ -270,7 +264,6 @@ def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
 
 
 def _frequency(points: Sequence[PointModes]) -> float:
-    """The mean frequency of the least damped electromechanical modes [rad/s]."""
     found = [point.values[point.swinging[0]].imag for point in points if point.swinging]
     if not found:
         raise AnalysisError("no operating point has a mode from 0.1 to 2 Hz, so there is nothing to damp")
@@ -296,10 +289,7 @@ def values_of(groups: Sequence[PodGroup], settings: Sequence[PodSetting]) -> dic
 def modes_at(
     plan: PointsDesignPlan, values: Mapping[str, Value], places: Sequence[PodPlace], work: Work
 ) -> list[PointModes]:
-    """The modes of all operating points and outages with some values, from the power flow on.
-
-    ``values``: by ``component.variable``; they go before all layers.
-    ``places``: loops that are measured as well."""
+    """The modes of all operating points and outages with some values, from the power flow on."""
     study = StudyCase.of(plan.prepared, (*plan.request.layers, OptionValues.of(values)), plan.request.step_size)
     parts = [plan.read.items[k : k + TOGETHER] for k in range(0, len(plan.read.items), TOGETHER)]
     tasks = [PointsTask(study, part, tuple(places)) for part in parts]

@@ -24,24 +24,19 @@ class PlacedMode:
 
     @property
     def damping_ratio(self) -> float:
-        """−Re λ/|λ|."""
         return damping_ratio(self.value)
 
     @property
     def frequency_hz(self) -> float:
-        """Im λ/2π."""
         return self.value.imag / (2 * np.pi)
 
     @property
     def words(self) -> str:
-        """Frequency, damping and who."""
         return f"{self.frequency_hz:.3f} Hz, {100 * self.damping_ratio:.2f} %" + (f" ({self.who})" if self.who else "")
 
 
 @dataclass(frozen=True)
 class JudgedPoint:
-    """One operating point with one outage, without and with the controllers."""
-
     point: OperatingCase
     outage: Outage
     before: PointModes
@@ -58,7 +53,6 @@ class JudgedPoint:
 
     @property
     def computed(self) -> bool:
-        """Whether the modes are known without and with the controllers."""
         return self.before.computed and self.after.computed
 
     @property
@@ -78,13 +72,11 @@ class JudgedPoint:
 
     @property
     def unmoved(self) -> bool:
-        """Whether the controllers hardly move the least damped mode."""
         before, after = self.target_before, self.target
         return bool(before and after and abs(after.value - before.value) < UNMOVED * abs(before.value))
 
     @property
     def why_not(self) -> str:
-        """Why the modes are not known; "" where they are."""
         failed = self.before if not self.before.computed else self.after
         with_it = "" if not self.before.computed else " with the controllers"
         return "" if self.computed else f"{failed.status}{with_it}: {failed.text}"
@@ -178,13 +170,11 @@ class PointsVerdict:
 
     @property
     def worst(self) -> float | None:
-        """Least damping ratio of all points with the controllers."""
         limiting = self.limiting
         return None if limiting is None else _damping(limiting.target)
 
     @property
     def worst_before(self) -> float | None:
-        """Least damping ratio of all points without the controllers."""
         return min((_damping(point.target_before) for point in self.known if point.target_before), default=None)
 
     @property
@@ -211,7 +201,6 @@ class PointsVerdict:
 
     @property
     def unforeseen(self) -> list[JudgedPoint]:
-        """Points with harm that the search's models did not show."""
         return [point for point in self.known if point.unforeseen]
 
 

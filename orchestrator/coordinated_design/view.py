@@ -92,7 +92,6 @@ class CoordinatedDesign:
 
 
 def as_json(design: PointsDesign) -> dict[str, Any]:
-    """The design as JSON's types."""
     plan, request, verdict = design.plan, design.plan.request, design.verdict
     limiting = verdict.limiting
     return {
@@ -202,7 +201,6 @@ def _two(figure: float | str) -> str:
 
 
 def least_damped_table(verdict: PointsVerdict) -> ColumnTable[JudgedPoint]:
-    """The points with the least damping, the worst first."""
     having = [(point, point.target) for point in verdict.known if point.target is not None]
     ordered = [point for point, _ in sorted(having, key=lambda entry: entry[1].damping_ratio)][:_ROWS]
     title = f"The {len(ordered)} least damped of {len(verdict.points)} points and outages"
@@ -237,7 +235,6 @@ def ranking_table(design: PointsDesign) -> ColumnTable[RankedConverter]:
 
 
 def provenance(design: PointsDesign, command: str) -> list[str]:
-    """The comments of the parameter file."""
     plan = design.plan
     return [
         f"POD controllers for {plan.case.name}, scenario {plan.prepared.name}, designed over {len(design.points)} "

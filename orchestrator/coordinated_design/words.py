@@ -49,7 +49,6 @@ def _cannot_be_had(verdict: PointsVerdict, worst: float) -> str:
 
 
 def _reasons(verdict: PointsVerdict) -> list[str]:
-    """What speaks against a design, or leaves it not known."""
     total, reasons = len(verdict.points), []
     if verdict.unstable:
         first = verdict.unstable[0]
@@ -81,7 +80,6 @@ def what_it_rests_on(design: PointsDesign) -> str:
 
 
 def remarks(verdict: PointsVerdict) -> list[str]:
-    """What was not computed, and what is unusual, counted and named."""
     total, texts = len(verdict.points), []
     if verdict.failed:
         texts.append(f"{len(verdict.failed)} of {total} have no modes:")

@@ -36,12 +36,7 @@ class AdaptiveLoop:
     """Does communication steps in shorter ones, or several in one, as the tolerance has it.
 
     A step ends at every communication point at which the caller stops: at events, and where something is recorded.
-    Between them it has the length of that stretch, halved as often as is needed.
-
-    ``groups``: components that step together, in the order of the schedule.
-    ``y``: all coupled outputs; the loops write them.
-    ``tracks``: where each output went; the loops write them.
-    ``step_size``: the communication step [s]."""
+    Between them it has the length of that stretch, halved as often as is needed."""
 
     def __init__(
         self, inner: Loop, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule,
@@ -138,7 +133,6 @@ class AdaptiveLoop:
             return error_in_tolerances
 
     def _once(self, index: int, length: float, start: "_Start") -> Values:
-        """The outputs after one step [s] from the start."""
         start.go_back(length)
         self._inner.advance(index, 1, length)
         return self._y.copy()

@@ -17,11 +17,9 @@ class Clock:
             raise InputError(f"communication step size {self.step_size!r} s: it must exceed 0 and be finite")
 
     def time(self, index: int) -> float:
-        """Time [s] of a communication point."""
         return index * self.step_size
 
     def index(self, time: float, what: str) -> int:
-        """Communication point at a time [s]."""
         if not math.isfinite(time):
             raise InputError(f"{what} at {time} s is not a time; give a finite number of seconds")
         index = round(time / self.step_size)

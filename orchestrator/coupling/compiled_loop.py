@@ -77,11 +77,7 @@ class CompiledLoop:
     """Steps a system in C.
 
     The first communication steps are done by one thread; by what each call took then, the calls of a group are shared
-    out. Who does a call changes no value.
-
-    ``library``: `loop_library`.
-    ``threads``: how many step; None for as many as make a step shortest, up to one for each core, and only while they
-    are seen to be faster than one."""
+    out. Who does a call changes no value. Without a number of ``threads``, as many step as make a step shortest."""
 
     def __init__(
         self, library: Any, groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks,
@@ -163,10 +159,7 @@ class CompiledLoop:
         return min(count, self._trial.most), self._team if self._trial.together else None
 
     def _note(self, steps: int, seconds: float, team: Team | None) -> None:
-        """Note what calls took, and share them out when it is time.
-
-        ``steps`` and ``seconds``: communication steps that were done just now, and the wall-clock time they took [s].
-        """
+        """Note what calls took, and share them out when it is time."""
         self._done += steps
         self._together += steps if team is not None else 0
         if self._team is not None and self._trial is not None:
@@ -197,7 +190,6 @@ class CompiledLoop:
                 self._share_group(group, entry, members)
 
     def _share_group(self, group: range, entry: _Group, members: int) -> None:
-        """Write down who does the calls of a group."""
         found = shares(group, self._bound, self._costs, members)
         own, shared = (np.array(part, dtype=np.int64) for part in (found.own, sum(found.of, ())))
         begin = np.cumsum([0, *map(len, found.of)])

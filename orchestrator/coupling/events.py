@@ -30,11 +30,9 @@ class Event:
     component: str
 
     def settings(self) -> Mapping[str, float | bool]:
-        """Variables of the component with their new values."""
         raise TypeError(f"{type(self).__name__} is not a kind of event of its own")
 
     def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
-        """Settings of every component that is concerned, in the order in which they are made."""
         return {self.component: self.settings()}
 
     def __str__(self) -> str:
@@ -98,7 +96,6 @@ class UnitSwitching(Event):
         return {f"{self.unit}.connected": self.connected}
 
     def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
-        """The values that the event sets, by component and variable."""
         own: dict[str, Mapping[str, float | bool]] = {self.unit: {"connected": self.connected}}
         return (own if self.has_breaker else {}) | {self.component: self.settings()}
 
@@ -223,7 +220,6 @@ class Forcing(Fault):
     end: float | None = None
 
     def changes(self) -> Mapping[str, Mapping[str, float | bool]]:
-        """The component that is concerned, without a value: it has another one at every moment."""
         return {self.component: {}}
 
     def values(self, step_size: float, stop: float) -> Iterator[ParameterChange]:

@@ -104,7 +104,6 @@ class WirePlan:
 
     @property
     def noises(self) -> list[Noise]:
-        """All noises that it has or may get."""
         return [i for i in (*self.permanent.values(), *self.later) if isinstance(i, Noise)]
 
 

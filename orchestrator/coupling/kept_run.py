@@ -15,10 +15,7 @@ def state_of(
     stepper: Stepper, observers: Iterable[Observer], components: Mapping[str, bytes] | None, applied: bool,
     seconds: float, spent: NDArray[np.float64],
 ) -> RunState:  # fmt: skip
-    """All that another process needs to go on from here.
-
-    ``components``: serialised state of each FMU; by default they are asked for it.
-    ``applied`` and ``seconds`` and ``spent``: see `RunState`."""
+    """All that another process needs to go on from here."""
     if components is None:
         components = {name: state_as_bytes(component) for name, component in stepper.components.items()}
     return RunState(

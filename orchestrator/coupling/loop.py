@@ -17,10 +17,6 @@ from orchestrator.fmi.interrupts import calls
 
 
 class PythonLoop:
-    """Steps a system in Python.
-
-    ``hand_over``: sets all inputs before each step; by default each component takes its own as it steps."""
-
     def __init__(
         self, groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks, schedule: Schedule,
         hand_over: Callable[[], None] | None = None,
@@ -91,12 +87,7 @@ def make_loop(
     groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks, schedule: Schedule,
     hand_over: Callable[[], None] | None = None, threads: int | None = 1,
 ) -> Loop:  # fmt: skip
-    """The compiled loop where there is one and it can do what is asked, else the loop in Python.
-
-    ``groups``: components that step together, in the order of the schedule.
-    ``y``: all coupled outputs; the loop writes them.
-    ``tracks``: where each output went; the loop writes them.
-    ``threads``: as for `CompiledLoop`; the loop in Python has one."""
+    """The compiled loop where there is one and it can do what is asked, else the loop in Python."""
     library = compiled_loop.loop_library() if schedule.is_plain else None
     if library is None:
         return PythonLoop(groups, y, tracks, schedule, hand_over)

@@ -54,17 +54,14 @@ class Recorder:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """Times of the rows that are kept [s]."""
         return self._kept.joined(self._first, self._times[: self._filled], self._block[: self._filled])[0]
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """Recorded values, a row for each time and a column for each name."""
         return self._kept.joined(self._first, self._times[: self._filled], self._block[: self._filled])[1]
 
     @property
     def rows(self) -> int:
-        """Number of rows that were recorded, whether they are kept in memory or not."""
         return self._first + self._filled
 
     def begin(self, run: ObservedRun, stop_index: int) -> None:
@@ -140,11 +137,8 @@ class Recorder:
     def position(self) -> dict[str, Any]:
         """Where the recording stands, with all rows handed to the sink; without one, the rows themselves.
 
-        Returns
-        -------
-        ``rows``, ``index`` (communication step of the last row), and ``block`` (rows of a block); without a sink also
-        ``times`` and ``values``, which need ``keep`` = 1.
-        """
+        Beside ``rows`` and ``block`` (rows of a block) the communication step of the last row; without a sink also
+        ``times`` and ``values``, which need ``keep`` = 1."""
         self._hand_over()
         found: dict[str, Any] = {"rows": self.rows, "index": self._last_index, "block": len(self._times)}
         if self._sink is None:

@@ -42,9 +42,6 @@ TOLERANCES = (1e-8, 0.1)  # smallest and largest tolerance of a step's error
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Refuse a tolerance that is none.
-
-    Raises an `InputError` if it is outside of `TOLERANCES`."""
     least, most = TOLERANCES
     if isinstance(tolerance, bool) or not least <= tolerance <= most:
         raise InputError(f"tolerance = {tolerance!r}: give a number from {least:g} to {most:g}, such as 1e-4")
@@ -96,7 +93,6 @@ class Schedule:
         return max(1, math.ceil(step_size / self.micro_step - 1e-6))
 
     def check(self, components: set[str]) -> None:
-        """Raise unless every component is in exactly one group."""
         listed = [name for group in self.groups for name in group]
         wrong = {
             "not in any group": components - set(listed),

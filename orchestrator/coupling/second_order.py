@@ -103,7 +103,6 @@ class _LineLoop:
         raise self.unsettled()
 
     def unsettled(self) -> CouplingError:
-        """The error of outputs that do not agree."""
         names = ", ".join(name for name, direct in self._direct.items() if direct)
         return CouplingError(
             f"schedule {self._schedule.name!r}: after {_PASSES} exchanges outputs still change with the inputs of the "

@@ -23,7 +23,6 @@ class StepCounts:
     longest: float = 0.0
 
     def accept(self, count: int, step_size: float) -> None:
-        """Count steps [s]."""
         self.accepted += count
         self.shortest, self.longest = min(self.shortest, step_size), max(self.longest, step_size)
 
@@ -42,7 +41,6 @@ class StepStatistics:
 
     @property
     def steps_per_second(self) -> float:
-        """Steps that count in a second of wall-clock time."""
         return self.steps / self.seconds if self.seconds > 0 else 0.0
 
     @property

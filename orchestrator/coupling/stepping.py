@@ -64,7 +64,6 @@ class Stepper(CoupledComponents):
 
     @property
     def time(self) -> float:
-        """Present time [s]."""
         return self.clock.time(self.index)
 
     def exchange(self) -> None:
@@ -84,10 +83,6 @@ class Stepper(CoupledComponents):
         self.handed_over = False
 
     def advance(self, count: int) -> None:
-        """Do ``count`` communication steps and nothing else.
-
-        Raises a `ComponentError` with the time of the step that failed; ``index`` counts the steps that were completed.
-        """
         if self.wires:
             for index, part in self.wires.stretches(self.index, count):
                 self._advance(index, part)
@@ -123,10 +118,6 @@ class Stepper(CoupledComponents):
         return self._loop.seconds()
 
     def statistics(self, steps: int, seconds: float, before: Sequence[float]) -> StepStatistics:
-        """Speed of a run.
-
-        ``seconds``: how long it took [s].
-        ``before``: what `seconds` gave when it began."""
         names = [name for group in self.schedule.groups for name in group]
         spent = [after - then for after, then in zip(self.seconds(), before, strict=True)]
         if self.wires:  # the banks' own share is none of a component

@@ -73,11 +73,8 @@ class System:
         self, name: str, description: FmuDescription, parameters: Mapping[str, float | bool] | None = None,
         inputs: Mapping[str, float] | None = None, *, isolated: bool | None = None,
     ) -> None:  # fmt: skip
-        """Add a component.
+        """Add a component; ``inputs``: constants for inputs that nothing feeds.
 
-        ``name``: by which connections and signals mean it.
-        ``parameters``: values that are set before initialisation, by variable.
-        ``inputs``: constants for inputs that nothing feeds, by variable.
         ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do."""
         if name in self.components:
             raise InputError(f"component {name!r} is added twice; give each instance a name of its own")
@@ -138,7 +135,6 @@ class System:
         return Endpoint(component, variable), info
 
     def unconnected_inputs(self) -> Iterator[Endpoint]:
-        """Inputs that neither a connection nor a constant feeds."""
         fed = {c.target for c in self.connections}
         for name, plan in self.components.items():
             for variable in plan.description.inputs:

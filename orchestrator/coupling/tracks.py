@@ -17,7 +17,6 @@ class Tracks:
 
     @property
     def low(self) -> NDArray[np.float64]:
-        """Smallest values, shape (n,), in the outputs' units."""
         return self._table[:, _LOW]
 
     @property

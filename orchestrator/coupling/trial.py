@@ -18,10 +18,6 @@ class Trial:
         return self._left
 
     def took(self, steps: int, seconds: float) -> None:
-        """Note what communication steps took.
-
-        ``steps``: how many were done, at most `most`.
-        ``seconds``: wall-clock time [s]."""
         self._left -= steps
         if self._block is not None:
             self._seconds[self.together] += seconds

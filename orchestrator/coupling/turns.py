@@ -111,7 +111,4 @@ class Loop(Protocol):
 
 
 def not_finite(outputs: Batch, index: int, time: float) -> NotFiniteError:
-    """The error of an output that is no finite number.
-
-    ``time``: at which it was read [s]."""
     return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)

@@ -16,9 +16,6 @@ from orchestrator.errors import InputError
 class Wires:
     """Banks of such connections, one before each group that they lead into.
 
-    ``system`` and ``schedule``: the system, and the order in which its components step.
-    ``step_size``: communication step [s].
-    ``output_index``: where in y each coupled output stands.
     ``values``: y, and behind it a place for what arrives over each of these connections."""
 
     def __init__(

@@ -73,7 +73,6 @@ class Computing:
             self._end("superseded")
 
     def cancel(self, page: str) -> None:
-        """End the computation of a page, and forget what it waits for."""
         with self._state:
             for asker in [one for one in self._newest if one[0] == page]:
                 del self._newest[asker]
@@ -141,7 +140,6 @@ class Computing:
             return self._process
 
     def _end(self, why: str) -> None:
-        """End the process; whoever reads from it sees its end."""
         self._why = why
         process, self._process = self._process, None
         if process is not None:

@@ -45,9 +45,6 @@ class Federates:
 
 
 def address_of(broker: str) -> tuple[str, int]:
-    """Host and port of a broker's address.
-
-    Raises an `InputError` if it is not of the form ``tcp://host:port``."""
     host, colon, port = broker.removeprefix("tcp://").partition(":")
     if not host or "/" in host or (colon and not (port.isdigit() and 0 < int(port) < 65536)):
         raise InputError(f"broker {broker!r}: an address has the form tcp://host:port, such as tcp://10.0.0.5:23405")

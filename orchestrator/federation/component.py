@@ -138,7 +138,6 @@ class FederatedComponent(Derived):
 
     @property
     def is_foreign(self) -> bool:
-        """Whether there is no FMU of it."""
         return self.inner is None
 
     def hand_over(self) -> None:
@@ -178,7 +177,6 @@ class FederatedComponent(Derived):
             self._touched = len(self._log) > _LONGEST_LOG
 
     def _local(self, call: str, *arguments: Any, kept: bool = True) -> Any:
-        """A call that only the FMU in this process can do."""
         if self.inner is None or self._remote:
             self._refuse(call)
         if kept:

@@ -35,9 +35,7 @@ from orchestrator.fmi.instance import open_component
 
 
 class OwnFederate:
-    """An FMU that steps when HELICS grants it time.
-
-    ``to_join``: how long a broker is waited for [s]."""
+    """An FMU that steps when HELICS grants it time."""
 
     def __init__(self, name: str, description: FmuDescription, broker: str, to_join: float) -> None:
         self.name, self._description, self._broker, self._to_join = name, description, broker, to_join
@@ -47,10 +45,6 @@ class OwnFederate:
         self._component: Component | None = None
 
     def run(self) -> None:
-        """Join, and step until the federation ends.
-
-        Raises a `ComponentError, InputError` if the FMU gives no instance, the broker does not answer, or the
-        federation ends with an error."""
         helics = library()
         with open_component(self.name, self._description, isolated=True) as component:
             self._component = component
@@ -152,14 +146,12 @@ class OwnFederate:
         return {"protocol": PROTOCOL, "version": version("gfor-cosim"), "guid": self._description.guid}
 
     def do_configure(self, setting: dict[str, Any]) -> None:
-        """Take times, and the names of the inputs that are fed."""
         self._setting = setting
 
     def do_begin(self) -> None:
         self._configured.set()
 
     def do_end(self) -> None:
-        """Leave at the next time that is granted."""
         self._ended = True
 
     def do_replay(self, calls: list[list[Any]]) -> None:
@@ -187,7 +179,6 @@ class OwnFederate:
         self._fmu().set(values)
 
     def do_values(self, names: list[str]) -> dict[str, float | bool]:
-        """Read variables of any numeric type."""
         return self._fmu().values(names)
 
     def _real(self, command: str, references: list[int], values: list[float]) -> list[float]:

@@ -345,7 +345,6 @@ def _all_but_the_grid(prepared: PreparedScenario) -> tuple[str, ...]:
 
 
 def _as_published(plan: ComponentPlan, part: Part, published: Sequence[str]) -> FmuDescription:
-    """What remains of an FMU where a foreign federate takes its place."""
     kept = {*part.inputs, *published}
     variables = {n: v for n, v in plan.description.variables.items() if n in kept or v.causality == "parameter"}
     return replace(

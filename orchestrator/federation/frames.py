@@ -53,9 +53,6 @@ class Door:
         self.word = secrets.token_hex(16)
 
     def accept(self, seconds: float) -> Frames:
-        """The hub's call.
-
-        Raises a `TimeoutError` if it does not come within the time [s]."""
         self._server.settimeout(seconds)
         while True:
             frames = Frames(self._server.accept()[0])

@@ -54,7 +54,6 @@ def _joined(helics: ModuleType, name: str, broker: str, seconds: float) -> Any:
 
 
 def text_of(error: Exception) -> str:
-    """What HELICS says, without the number in front."""
     return str(error).partition("] ")[2] or str(error)
 
 
@@ -70,7 +69,6 @@ def ask(federate: Any, target: str, query: str) -> Any:
 
 
 def optional_subscription(federate: Any, name: str, unit: str) -> Any:
-    """An input that may stay without a source."""
     helics = library()
     handle = helics.helicsFederateRegisterSubscription(federate, name, unit)
     helics.helicsInputSetOption(handle, helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, 1)

@@ -43,8 +43,6 @@ class _FederationError(Exception):
 
 
 class Hub:
-    """Does what gfor's frames ask."""
-
     def __init__(self, request: dict[str, Any]) -> None:
         self._request, self._parts = request, request["parts"]
         self._gfor = frames.call(request["port"], request["word"])
@@ -314,7 +312,6 @@ def end_with(parent_is_gone: threading.Event) -> None:
 
 
 def main() -> None:
-    """Serve the request on standard input."""
     request = json.loads(sys.stdin.buffer.readline())
     gone = threading.Event()
     threading.Thread(target=end_with, args=(gone,), daemon=True).start()

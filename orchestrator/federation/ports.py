@@ -40,7 +40,6 @@ def _taken(port: int, host: str) -> int | None:
 
 
 def require_broker(broker: str) -> None:
-    """Try whether anything listens at a broker's address."""
     host, port = address_of(broker)
     try:
         socket.create_connection((host, port), timeout=_TO_CONNECT).close()

@@ -45,7 +45,6 @@ def _not(wanted: str, seen: Any) -> NotAnAnswerError:
 
 
 def number(answer: Any) -> int:
-    """A whole number that is not negative."""
     if type(answer) is not int or not 0 <= answer < 2**63:
         raise _not("a number", answer)
     return answer
@@ -58,7 +57,6 @@ def table(answer: Any) -> dict[str, float | bool]:
 
 
 def table_of(answer: Any, wanted: list[str]) -> dict[str, float | bool]:
-    """Numbers for exactly these names."""
     found = table(answer)
     if set(found) != set(wanted):
         raise _not(f"values of {', '.join(wanted)[:100]}", answer)
@@ -88,7 +86,6 @@ def hexadecimal(answer: Any) -> bytes:
 
 
 def matrix(answer: Any, rows: int, columns: int) -> NDArray[np.float64]:
-    """Numbers, shape (rows, columns)."""
     try:
         found = np.array(answer, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):

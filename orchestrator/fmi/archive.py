@@ -80,7 +80,6 @@ def read_member(path: Path, name: str, kind: str = "FMU") -> bytes | None:
 
 
 def names_in(path: Path, kind: str = "FMU") -> tuple[str, ...]:
-    """Names of all files in an archive, once they were found harmless."""
     with _opened(path, kind) as archive:
         return tuple(entry.filename for entry in archive.infolist())
 

@@ -34,7 +34,6 @@ class FmiClock:
 
 
 def clocks_of(root: ElementTree.Element) -> tuple[FmiClock, ...]:
-    """All clocks of a model description of FMI 3.0."""
     types = {t.get("name"): t for t in root.iterfind("TypeDefinitions/ClockType")}
     return tuple(_clock(e, types.get(e.get("declaredType"))) for e in root.iterfind("ModelVariables/Clock"))
 

@@ -24,12 +24,7 @@ _PATIENCE = 5.0  # time in which a supervisor ends all that it watches over [s];
 
 
 class ConfinedProcess:
-    """A worker, started behind a supervisor (`supervisor`).
-
-    ``worker``: Module whose function ``main`` does what the mailbox asks.
-    ``readable``: Files and folders that it may read.
-    ``limits``: What it may take.
-    ``windows``: Whether the FMU is for Windows, and Wine's server is needed.
+    """A worker, started behind a supervisor (`supervisor`); it is the function ``main`` of a module.
 
     ``protections``: What keeps it from the rest of the machine; empty until the worker has told."""
 
@@ -69,7 +64,6 @@ class ConfinedProcess:
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended."""
         return self._process.poll() is None
 
     @property

@@ -189,9 +189,6 @@ def read_declared(path: Path | str) -> FmuDescription:
 
 
 def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
-    """The description in a modelDescription.xml.
-
-    Raises a `FmuFileError, UnsupportedFmuError`: As `read_description`, but for the platform."""
     root = _root(path, text)
     version = _fmi_version(root)
     if version not in VERSIONS:

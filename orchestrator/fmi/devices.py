@@ -20,10 +20,7 @@ def is_controller_alone(description: FmuDescription) -> bool:
 
 
 def as_device(path: Path, binding: Path | None) -> Path:
-    """The FMU of what is to stand at a bus: of an FMU, of a DLL, or of a device's file.
-
-    Raises an `InputError` if it is a vendor's controller alone, and no binding makes it a device; otherwise as
-    `as_fmu`."""
+    """The FMU of what is to stand at a bus: of an FMU, of a DLL, or of a device's file."""
     found = as_fmu(path)
     if binding is None and is_vendor_file(path) and is_controller_alone(read_declared(found)):
         raise InputError(f"{path}: it has no {', '.join(PORT)}: {NO_BUS}")

@@ -95,12 +95,7 @@ def needed_functions(description: FmuDescription) -> set[str]:
 
 
 def refuse_other_clocks(description: FmuDescription) -> None:
-    """Raise where a clock ticks only with those of other FMUs, which this master does not connect.
-
-    Raises
-    ------
-    UnsupportedFmuError
-    """
+    """Raise where a clock ticks only with those of other FMUs, which this master does not connect."""
     others = [c.name for c in description.clocks if c.needs_another]
     if others:
         raise UnsupportedFmuError(

@@ -51,10 +51,8 @@ def is_isolated(description: FmuDescription, isolated: bool | None) -> bool:
 def open_component(
     name: str, description: FmuDescription, directory: Path | None = None, *, isolated: bool | None = None
 ) -> Component:
-    """Instantiate an FMU.
+    """Instantiate an FMU; behind a `BoundDescription` it speaks our port.
 
-    ``name``: name of the instance, used in errors and results.
-    ``description``: the FMU; a `BoundDescription` gives a component that speaks our port.
     ``directory``: where its archive is extracted; by default a new temporary folder of its own.
     ``isolated``: whether it runs in a process of its own; by default all but our own FMUs do."""
     compile_adapters(description)

@@ -39,9 +39,7 @@ from orchestrator.fmi.remote_calls import RemoteCalls
 
 
 class IsolatedComponent(RemoteCalls, Derived):
-    """An instance of an FMU in a process of its own.
-
-    ``limits``: what it may take."""
+    """An instance of an FMU in a process of its own."""
 
     def __init__(
         self, name: str, description: FmuDescription, directory: Path | None = None, limits: Limits | None = None

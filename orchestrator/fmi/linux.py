@@ -47,9 +47,6 @@ def unshare(flags: int) -> None:
 
 
 def mount(source: str | None, target: str, kind: str | None, flags: int = 0, data: str | None = None) -> None:
-    """Mount a file system.
-
-    ``flags`` and ``data``: as ``mount(2)`` takes them."""
     texts = [None if text is None else os.fsencode(text) for text in (source, target, kind, data)]
     _done(libc().mount(texts[0], texts[1], texts[2], ctypes.c_ulong(flags), texts[3]))
 

@@ -32,10 +32,6 @@ _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # kinds of ``fmi2Get…Status``
 class LoadedComponent(Derived):
     """An instance of an FMU that is loaded into this process; always released, also after an error.
 
-    ``name``: Name of the instance, used in errors and results.
-    ``directory``: Where its archive is extracted; by default a new temporary folder of its own.
-    ``ours``: Whether it is known to be an FMU of this project.
-
     ``lost``: Whether it said ``fmi2Fatal``: no call is allowed any more."""
 
     def __init__(

@@ -25,8 +25,6 @@ DIED, HUNG, NOT_A_NUMBER, INTERRUPTED, TAMPERED = 64, 65, 66, 67, 68
 
 
 class Head(ctypes.Structure):
-    """The first fields of ``struct mailbox``."""
-
     _fields_ = (
         ("request", ctypes.c_int32), ("reply", ctypes.c_int32), ("sleeping", ctypes.c_int32 * 2),
         ("kind", ctypes.c_int32), ("what", ctypes.c_int32), ("status", ctypes.c_int32), ("steps", ctypes.c_int32),
@@ -110,10 +108,6 @@ def shared_memory(folder: Path) -> int | str:
 
 
 class Mailbox:
-    """Memory that two processes map.
-
-    ``memory``: as `shared_memory` gave it."""
-
     def __init__(self, memory: int | str) -> None:
         self.library = mailbox_library()
         size = self.library.mailbox_size()

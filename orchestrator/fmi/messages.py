@@ -25,8 +25,6 @@ except (ImportError, OSError):
 
 
 class Messages(list[tuple[int, str]]):
-    """The newest messages of one component, as (status, text)."""
-
     def __init__(self) -> None:
         super().__init__()
         self.streak, self.step = 0, 0

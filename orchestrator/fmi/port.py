@@ -44,8 +44,6 @@ class Form(IntEnum):
 
 @dataclass(frozen=True)
 class PhasorMap:
-    """Voltage or current as the FMU has it."""
-
     form: Form
     variables: tuple[str, ...]
     # Voltage: network's frame [pu] to the FMU's axes and unit. Current: the other way, to [pu, 100 MVA] for an FMU of
@@ -108,12 +106,10 @@ class PortMap:
 
     @property
     def omega(self) -> float:
-        """Rated angular frequency [rad/s]."""
         return 2 * pi * self.f_n
 
     @property
     def taken(self) -> frozenset[str]:
-        """The FMU's variables that the port stands for."""
         starts = {m.variable for maps in self.start.values() for m in maps}
         signals = {m.variable for m in self.signals.values()}
         return frozenset({*self.voltage.variables, *self.current.variables, *starts, *signals, *self.settings})

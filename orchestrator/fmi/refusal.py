@@ -24,10 +24,7 @@ Said = Callable[[int], list[str]]  # gives the distinct messages of at least a s
 def refusal(component: Component, said_by: Said, status: int, call: str, time: float | None) -> CosimError:
     """The error for a call whose status is neither OK nor Warning.
 
-    ``said_by``: the FMU's log since the call.
-    ``status``: the call's, as FMI 2.0 numbers them.
-    ``call``: by its name in FMI 2.0; the error has the name in the FMU's own version.
-    ``time``: of a step [s]."""
+    ``call``: by its name in FMI 2.0; the error has the name in the FMU's own version."""
     described = component.description
     name = in_its_words(described, STATUS[status] if status < len(STATUS) else f"status {status}")
     said = "; ".join(said_by(1) or said_by(0))

@@ -27,9 +27,7 @@ READER = "orchestrator.fmi.dll_reading"
 
 
 def foreign_platforms(library: Path) -> tuple[str, ...]:
-    """Platforms other than this machine's whose DLLs run here.
-
-    Raises an `InputError` if a DLL for Windows needs Wine, which is not there, or its program cannot be compiled."""
+    """Platforms other than this machine's whose DLLs run here."""
     try:
         with library.open("rb") as file:
             windows = file.read(2) == b"MZ" and sys.platform == "linux"

@@ -57,7 +57,6 @@ def host_path() -> Path:
 
 
 def compile_programs() -> list[Path]:
-    """Compile both, or find them compiled; returns their paths."""
     try:
         wine.find_wine()
         mailbox_library()
@@ -76,10 +75,6 @@ def proxy() -> Any:
 
 
 class WineProgram:
-    """The program under Wine, with one library loaded.
-
-    ``patience``: time for one answer [s]."""
-
     def __init__(self, library: Path, patience: float = 1e300, note: Note | None = None) -> None:
         self._folder: Path | None = None
         if wine.in_process:
@@ -124,9 +119,6 @@ class WineProgram:
         proxy().wine_attach(self.address, self._process.pid)
 
     def ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:
-        """One question to the program.
-
-        ``command``: one of those of `wine_talk.c`."""
         for k, value in enumerate(arguments):
             self._talk.a[k] = value
         self._memory[self._data : self._data + len(data)] = data

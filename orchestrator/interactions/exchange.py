@@ -24,7 +24,6 @@ _OF_PLACE = ("S_n", "P_0", "Q_0", "v_0", "theta_0", "f_n", "connected")
 
 
 def stand_in_at(place: Place, model: str) -> ComponentTable:
-    """A model of the catalogue with its defaults, at a place."""
     return ComponentTable(model=model, bus=place.table.bus, parameters=_of_place(place))
 
 
@@ -107,10 +106,6 @@ def _kept(events: list[EventTable]) -> list[EventTable]:
 
 
 def require_same_flow(wanted: Mapping[str, complex], prepared: PreparedScenario) -> None:
-    """Refuse a system whose power flow is another one.
-
-    ``wanted``: voltages of all buses [pu]; empty for a case without a power flow.
-    Raises an `InputError` if a voltage differs by more than `SAME_FLOW`."""
     found = voltages_of(prepared.power_flow)
     apart = {bus: abs(found.get(bus, 0j) - voltage) for bus, voltage in wanted.items()}
     worst = max(apart, key=lambda bus: apart[bus], default=None)
@@ -123,5 +118,4 @@ def require_same_flow(wanted: Mapping[str, complex], prepared: PreparedScenario)
 
 
 def voltages_of(flow: PowerFlow | None) -> dict[str, complex]:
-    """Voltages of all buses [pu]; empty without a power flow."""
     return {} if flow is None else dict(flow.voltages)

@@ -46,7 +46,6 @@ class JudgedSystem:
 
     @property
     def stable(self) -> bool | None:
-        """The verdict over the whole spectrum; None where it is not known."""
         return self.record.stable
 
     @property
@@ -69,7 +68,6 @@ class JudgedSystem:
 
     @property
     def why_unknown(self) -> str:
-        """Why there is no verdict."""
         return self.record.error or str(self.record.stability.get("reason") or "no verdict")
 
     def _share(self, mode: SharedMode) -> float:
@@ -107,7 +105,6 @@ class JudgedPair:
 
     @property
     def text(self) -> str:
-        """``A + B``."""
         return " + ".join(self.vendors)
 
     def sentence(self) -> str:
@@ -189,7 +186,6 @@ class JudgedInteractions:
 
     @property
     def unknown_pairs(self) -> list[JudgedPair]:
-        """Pairs of which something is not known."""
         return [pair for pair in self.pairs if not pair.is_known]
 
     @property
@@ -205,7 +201,6 @@ class JudgedInteractions:
 
     @property
     def unknown_assignments(self) -> list[JudgedSystem]:
-        """Assignments without a verdict."""
         return [one for one in self.assignments if not one.is_known]
 
     @property
@@ -215,7 +210,6 @@ class JudgedInteractions:
         return False if False in verdicts else None if None in verdicts else True
 
     def participation(self, mode: SharedMode) -> dict[str, float]:
-        """Participation of every group in a mode of any system of the study."""
         return by_group(mode.components, self.result.plan.groups)
 
     def _judged(self, mode: SharedMode) -> JudgedMode:

@@ -45,8 +45,6 @@ def places_of(components: Mapping[str, tuple[ComponentTable, ComponentPlan]], gr
 def groups_of(
     components: Mapping[str, tuple[ComponentTable, ComponentPlan]], places: Mapping[str, Place], grid: str | None
 ) -> dict[str, str]:
-    """The group of every component: its vendor, or what else it is."""
-
     def group(name: str, table: ComponentTable, plan: ComponentPlan) -> str:
         if name in places:
             return places[name].vendor
@@ -70,12 +68,10 @@ def by_group(shares: Mapping[str, float], groups: Mapping[str, str]) -> dict[str
 
 
 def vendors_of(places: Mapping[str, Place]) -> tuple[str, ...]:
-    """The vendors, in the order of their first places."""
     return tuple(dict.fromkeys(place.vendor for place in places.values()))
 
 
 def first_of(places: Mapping[str, Place]) -> dict[str, Place]:
-    """The first place of every vendor."""
     found: dict[str, Place] = {}
     for place in places.values():
         found.setdefault(place.vendor, place)

@@ -29,17 +29,14 @@ class SharedMode:
 
     @property
     def eigenvalue(self) -> complex:
-        """λ [rad/s]."""
         return complex(self.real, self.imag)
 
     @property
     def frequency_hz(self) -> float:
-        """Im λ/2π."""
         return self.imag / (2 * math.pi)
 
     @property
     def damping_percent(self) -> float:
-        """Damping ratio [%]."""
         return damping_percent(self.eigenvalue)
 
 
@@ -60,15 +57,12 @@ class SystemRecord(Kept):
 
     @property
     def stable(self) -> bool | None:
-        """The verdict; None where it is not known."""
         found: bool | None = self.stability.get("stable")
         return found
 
 
 @dataclass(frozen=True)
 class SystemTask(Task):
-    """A scenario with the devices of one system."""
-
     record = SystemRecord
     frequency_range: tuple[float, float]  # of the modes [Hz]
     # tables of the devices that are other than the case's, by component, as their keys and values.
@@ -80,12 +74,10 @@ class SystemTask(Task):
 
 
 def compute_system(task: SystemTask) -> SystemRecord:
-    """Prepare, compare the power flow, find the modes."""
     return computed(task, lambda task, case: _record(_modes(case, task)))
 
 
 def tables_of(exchanged: Mapping[str, Mapping[str, Any]]) -> dict[str, ComponentTable]:
-    """The tables of a task's devices."""
     return {name: ComponentTable.model_validate(values) for name, values in exchanged.items()}
 
 

@@ -39,7 +39,6 @@ class InteractionsPlan:
 
     @property
     def vendors(self) -> tuple[str, ...]:
-        """The vendors, in the order of their first places."""
         return vendors_of(self.places)
 
     def converters(self, name: SystemName) -> frozenset[str]:
@@ -50,7 +49,6 @@ class InteractionsPlan:
 
     @cached_property
     def study(self) -> StudyCase:
-        """What all systems have in common."""
         return StudyCase.of(self.prepared, self.layers, self.step_size)
 
     def task(self, exchanged: Exchanged) -> SystemTask:
@@ -71,10 +69,6 @@ class InteractionsResult:
 
 
 def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsPlan:
-    """Check a study, and build the FMUs that it needs.
-
-    Raises an `InputError` if the scenario, a place or a device is unknown, there are too many systems, or another
-    device gives another power flow."""
     name, layers, step_size = _scenario(case, request.scenario), request.layers, request.step_size
     (prepared,) = case.prepare([name], request.overrides, step_size, None, request.files)
     components = case.placed(name, {}, layers)
@@ -99,9 +93,7 @@ def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsP
 
 
 def run_interactions(plan: InteractionsPlan, work: Work) -> InteractionsResult:
-    """Compute the systems that are not stored yet; systems of the same devices are computed once.
-
-    ``plan``: A plan that `plan_interactions` has checked."""
+    """Compute the systems that are not stored yet; systems of the same devices are computed once."""
     tasks = {name: plan.task(exchanged) for name, exchanged in plan.systems.items()}
     wanted = {task.key: task for task in tasks.values()}
     found = dict(zip(wanted, work.all(compute_system, list(wanted.values())), strict=True))

@@ -141,7 +141,6 @@ class Interactions:
 
 
 def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:
-    """The modes of the system as it is, with the participation of every group."""
     plan = judgement.result.plan
     groups = [*plan.vendors, *(g for g in dict.fromkeys(plan.groups.values()) if g not in plan.vendors)]
 
@@ -172,7 +171,6 @@ def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:
 
 
 def systems_table(judgement: JudgedInteractions) -> ColumnTable[tuple[str, JudgedSystem, str]]:
-    """Nobody, each vendor alone, and each pair, at the same power flow."""
     rows = [("no vendor", judgement.none, "")]
     rows += [(f"{vendor} alone", system, "") for vendor, system in judgement.alone.items()]
     rows += [(pair.text, pair.joint, "–" if pair.fall is None else f"{pair.fall:+.2f}") for pair in judgement.pairs]
@@ -182,7 +180,6 @@ def systems_table(judgement: JudgedInteractions) -> ColumnTable[tuple[str, Judge
 
 
 def assignments_table(judgement: JudgedInteractions) -> ColumnTable[JudgedSystem]:
-    """All assignments, the worst first."""
     swapped = judgement.result.plan.swapped
 
     def at(k: int, place: str) -> Column[JudgedSystem]:
@@ -219,7 +216,6 @@ def _pair(pair: JudgedPair) -> dict[str, Any]:
 
 
 def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
-    """All of it as JSON's types."""
     plan, worst, swap = judgement.result.plan, judgement.worst_pair, judgement.worst_assignment
     groups = plan.groups
     found: dict[str, Any] = {
@@ -276,7 +272,6 @@ def _mode(mode: SharedMode, groups: dict[str, str]) -> dict[str, Any]:
 
 
 def _page(found: Interactions) -> str:
-    """One file that needs no other: shared modes, the pairs as a picture, and each device at each place."""
     judgement, plan, figures = found.judgement, found.result.plan, Figures()
     content = [("Modes and who takes part", modes_table(judgement).html())]
     if len(plan.vendors) > 1:

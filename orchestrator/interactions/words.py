@@ -7,7 +7,6 @@ _SHOWN = 3
 
 
 def verdict_word(system: JudgedSystem) -> str:
-    """``stable``, ``UNSTABLE`` or ``not known``."""
     return {True: "stable", False: "UNSTABLE", None: "not known"}[system.stable]
 
 
@@ -19,7 +18,6 @@ def damping_text(system: JudgedSystem) -> str:
 
 
 def frequency_text(system: JudgedSystem) -> str:
-    """The frequency of the least damped mode."""
     return "" if system.critical is None else place_of(system.critical)
 
 
@@ -42,7 +40,6 @@ def modes_sentence(judgement: JudgedInteractions) -> str:
 
 
 def alone_sentence(judgement: JudgedInteractions) -> str:
-    """Which vendors' converters grow without those of the others; empty where none does."""
     found = [(vendor, system) for vendor, system in judgement.alone.items() if system.stable is False]
     if not found:
         return ""
@@ -51,7 +48,6 @@ def alone_sentence(judgement: JudgedInteractions) -> str:
 
 
 def pairs_sentence(judgement: JudgedInteractions) -> str:
-    """Which pair is the worst, which grow, and which is damped least."""
     plan = judgement.result.plan
     if len(plan.vendors) < 2:
         return f"one vendor, {plan.vendors[0]}: there is no pair"
@@ -73,7 +69,6 @@ def pairs_sentence(judgement: JudgedInteractions) -> str:
 
 
 def swap_sentence(judgement: JudgedInteractions) -> str:
-    """Which assignment is the worst; empty without a swap."""
     swapped, found = judgement.result.plan.swapped, judgement.assignments
     if not swapped:
         return ""
@@ -96,7 +91,6 @@ def stand_in_sentence(judgement: JudgedInteractions) -> str:
 
 
 def sentences(judgement: JudgedInteractions) -> list[str]:
-    """All of them, the verdict on the system as it is first."""
     every = [
         str(verdict_of(judgement)), modes_sentence(judgement), alone_sentence(judgement), pairs_sentence(judgement),
         swap_sentence(judgement), stand_in_sentence(judgement),

@@ -58,7 +58,6 @@ class MasterRules:
         return chosen
 
     def rows(self, step_size: float, stop_time: float) -> int:
-        """Number of rows that the master records: one for each step, beginning with label 0."""
         if not self.last_label.startswith("sum"):
             return round(stop_time / step_size) + (self.last_label == "stop")
         time, steps, ahead = 0.0, 0, step_size if self.last_label == "sum up to stop" else 0.0

@@ -47,7 +47,6 @@ class PointBench:
         self.perturbed = self.reused = 0
 
     def master(self, prepared: PreparedScenario) -> Master:
-        """The scenario's FMUs, initialised."""
         if self._master is not None and _same_fmus(self._master, prepared):
             try:
                 self._master.restart(prepared.system)
@@ -92,7 +91,6 @@ class PointBench:
         return self._models[key]
 
     def linear_model(self) -> PointModel:
-        """That of the running system."""
         assert self._master is not None
         whole = {name: self.linearized(name) for name in self._master.components}
         blocks = Blocks(self._master, known={n: without_references(c) for n, c in whole.items()}, without_step=True)

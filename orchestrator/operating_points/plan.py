@@ -40,12 +40,7 @@ def read_operating_points(
     case: Case, request: OfCase, points: str | Path | None, outages: Names | None, scenario: str | None,
     off: Mapping[str, Value] | None = None,
 ) -> OperatingPoints:  # fmt: skip
-    """Prepare the scenario, which builds the FMUs that it needs, and read its points and outages.
-
-    ``points``: CSV file with the operating points; None for the case's own.
-    ``outages``: as `read_outages` takes them.
-    ``scenario``: its name; the first one where None.
-    ``off``: values that hold at every point, before those of the request."""
+    """Prepare the scenario, which builds the FMUs that it needs, and read its points and outages."""
     name = scenario or next(iter(case.scenarios))
     overrides = {key: value for key, value in request.overrides.items() if key not in (off or {})} | dict(off or {})
     (prepared,) = case.prepare([name], overrides, request.step_size, None, request.files)

@@ -154,7 +154,6 @@ def _hours(row: Row, place: str) -> float:
 
 
 def _check_switches(settings: Mapping[str, Setting], elements: Elements, place: str) -> None:
-    """An element has one switch in a row."""
     switched = {column.partition(".")[0]: column for column in settings if column.endswith(f".{IN_SERVICE}")}
     for column in settings:
         component, _, variable = column.partition(".")

@@ -45,11 +45,6 @@ class PreparedItem:
 
 
 class ItemPreparation:
-    """Prepares a scenario with the values of an operating point and an outage.
-
-    ``step_size``: Communication step [s]; the case's where None.
-    ``sharing``: How units share an outage; as the case says where None."""
-
     def __init__(
         self, case: Case, scenario: str, layers: Sequence[ParameterFile], step_size: float | None = None,
         sharing: SharingRule | None = None,
@@ -63,9 +58,7 @@ class ItemPreparation:
         self._before: tuple[int, PreparedScenario] | None = None
 
     def prepared(self, item: Item) -> PreparedItem:
-        """The scenario at an item, without the units that are out of service.
-
-        Raises `CosimError` if it cannot be prepared; `failure` says what that means."""
+        """The scenario at an item, without the units that are out of service."""
         valued = self._valued(item)
         remains = what_remains(valued, self.elements, item.out)
         if remains.none:
@@ -129,7 +122,6 @@ class ItemPreparation:
 
 
 def _power_of(units: Collection[str], before: PreparedScenario) -> float:
-    """Active power of units [MW]."""
     flow, plans = before.power_flow, before.system.components
     return sum(flow.powers[name].real * plans[name].number("S_n") for name in units) if flow is not None else 0.0
 

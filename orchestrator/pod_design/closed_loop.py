@@ -41,7 +41,6 @@ class Placed:
 
     @property
     def eigenvalue(self) -> complex:
-        """[rad/s]"""
         return self.pair.eigenvalue
 
     @property
@@ -74,7 +73,6 @@ class PodLoop:
         return self._model(setting)
 
     def block(self, name: str) -> ComponentLinearization:
-        """One component as it was linearised last."""
         return self._blocks.components[name]
 
     def examine(self, setting: PodSetting) -> Examination:

@@ -104,7 +104,6 @@ class DesignRequest(OfCase):
 
     @property
     def increment(self) -> float:
-        """Required where no damping is."""
         return 0.10 if self.damping_increment is None else self.damping_increment
 
 
@@ -163,7 +162,6 @@ class PodDesign:
 
     @property
     def unbounded_gain(self) -> float:
-        """The gain before the bounds [pu]."""
         return self.gain_compensated if self.request.compensated_gain else self.gain_non_compensated
 
     @property
@@ -194,7 +192,6 @@ class PodDesign:
 
     @property
     def worst_other(self) -> Mode | None:
-        """The least damped mode with the final setting, leaving out the mode that counts as the target."""
         return self.after.worst_beside(self.final.eigenvalue)
 
     @property
@@ -210,13 +207,12 @@ class PodDesign:
 
 
 def design_pod(
-    case: Case, request: DesignRequest, report: StageReport = lambda text: None, store: PointStore | None = None,
-    search: SearchOnLinearModels | None = None,
-) -> PodDesign:  # fmt: skip
+    case: Case, request: DesignRequest, report: StageReport, store: PointStore | None, search: SearchOnLinearModels
+) -> PodDesign:
     """Design a controller and check it on the closed loop.
 
     ``store``: keeps figures on the way as soon as they are there; those that are there already are not computed again.
-    ``search``: gives a refinement settings to try; by default it surveys all itself."""
+    ``search``: gives a refinement settings to try."""
     require_controllers([request.controller])
     if request.damping is not None and request.damping_increment is not None:
         raise InputError("--damping and --damping-increment both say what is required; give one of them")
@@ -282,8 +278,6 @@ def _with_stability(stability: Stability) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class _Start:
-    """The scenario, the operating point and the modes before the design begins."""
-
     case: str
     request: DesignRequest
     target: Target
@@ -293,7 +287,7 @@ class _Start:
     before: Surroundings
     naming: Naming
     examined: Examination
-    search: SearchOnLinearModels | None
+    search: SearchOnLinearModels
 
 
 def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
@@ -316,7 +310,6 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         return judged[placed.setting]
 
     def settings() -> Sequence[tuple[str, PodSetting]]:
-        assert start.search is not None
         return start.search(start.prepared.case, request, start.target, start.mode_name, loop, initial.imag)
 
     report("sensitivity of the mode")
@@ -334,9 +327,8 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     if request.refine:
         report("refinement")
         refinement = refine(
-            loop, off, filters, required, request.gain_bounds, judge, [m.eigenvalue for m in before.others],
-            settings if start.search else None, evenly=request.mode is None,
-        )  # fmt: skip
+            loop, off, filters, required, request.gain_bounds, judge, settings, evenly=request.mode is None
+        )
         final = refinement.chosen or designed
     after, examined = around(final), loop.examine(final.setting)
     other_gain = None

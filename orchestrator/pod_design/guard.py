@@ -22,8 +22,6 @@ their size."""
 
 @dataclass(frozen=True)
 class Surroundings:
-    """All modes but the target."""
-
     others: tuple[Mode, ...]  # those from 0.1 to 2 Hz, least damped first
     # real part [1/s] of the eigenvalue that grows most, at any frequency, the target's included; 0 where none grows
     growth: float
@@ -46,7 +44,6 @@ class Surroundings:
         return self.growth > 0
 
     def without(self, mode: Mode) -> "Surroundings":
-        """The same surroundings without one of the other modes."""
         return replace(self, others=tuple(m for m in self.others if m is not mode))
 
     def counting(self, target: complex) -> complex:
@@ -105,7 +102,6 @@ def extremes(model: LinearModel) -> tuple[complex, complex | None]:
 
 
 def guarded(values: Vector) -> Vector:
-    """The eigenvalues [rad/s] in the guarded range of frequencies."""
     hertz = values.imag / (2 * np.pi)
     low, high = ELECTROMECHANICAL_HZ
     return np.asarray(values[(hertz >= low) & (hertz <= high)])

@@ -15,7 +15,6 @@ class KeptFigures:
         self._store, self._mark = store, mark
 
     def get(self, what: Mapping[str, Any], compute: Callable[[], Arrays]) -> Arrays:
-        """The arrays of something, computed where they are not there yet."""
         if self._store is None:
             return compute()
         key = key_of({"design": self._mark, **what}, "orchestrator.pod_design.design")
@@ -33,7 +32,6 @@ def figures_of(prepared: PreparedScenario, store: PointStore | None) -> KeptFigu
 
 
 def digest(*arrays: Any) -> str:
-    """Hash of numbers."""
     hasher = hashlib.sha256()
     for array in arrays:
         hasher.update(array.tobytes())

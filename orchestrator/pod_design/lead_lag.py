@@ -39,7 +39,6 @@ class LeadLag:
         return math.degrees(math.asin((1 - self.filtering_ratio) / (1 + self.filtering_ratio)))
 
     def response(self, s: complex) -> complex:
-        """Of all stages together at s [rad/s]."""
         return ((1 + s * self.T_S1) / (1 + s * self.T_S2)) ** self.N_S
 
 
@@ -63,7 +62,6 @@ def sensitivity(with_gain: complex, without: complex, gain: float) -> complex:
 
 
 def angle_deg(value: complex) -> float:
-    """∠ of a complex number in (−180°, 180°]."""
     degrees = math.degrees(cmath.phase(value))
     return 180.0 if degrees == -180.0 else degrees
 
@@ -110,7 +108,6 @@ def required_gain(target: complex, initial: complex, magnitude: float) -> float:
 
 
 def bounded(gain: float, bounds: tuple[float, float]) -> float:
-    """The gain, brought into [K_min, K_max]."""
     return min(max(gain, bounds[0]), bounds[1])
 
 

@@ -38,7 +38,6 @@ class LoopMargins:
 
 
 def loop_margins(half: LinearModel, full: LinearModel) -> LoopMargins:
-    """Margins of a loop that is closed with a gain."""
     if full.step_size is not None or full.names != half.names:
         raise ValueError("the margins of a loop need two continuous models with the same states")
     if np.linalg.eigvals(full.A).real.max() > ZERO:

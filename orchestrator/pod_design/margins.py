@@ -21,8 +21,6 @@ VARIATION = 0.2  # relative change of K, T_S1 and T_S2, one at a time
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of gain, phase and delay, and variations."""
-
     limit: float  # damping ratio below which a mode from 0.1 to 2 Hz, the target included, counts as lost
     # up, down: factor on the gain up to which no mode is lost and no eigenvalue turns unstable; None where that happens
     # neither up to ``reach`` (up) nor down to a gain of 0 (down)
@@ -41,7 +39,6 @@ class Margins:
 
 
 def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -> Margins:
-    """Margins of a setting; see `Margins`."""
     weakest, fastest = _extremes(loop, nominal.setting)
     limit, growth = min(least, damping_ratio(weakest)), fastest.real if fastest else 0.0
 
@@ -58,8 +55,6 @@ def compute_margins(loop: PodLoop, off: Placed, nominal: Placed, least: float) -
 
 
 def _extremes(loop: PodLoop, setting: PodSetting) -> tuple[complex, complex | None]:
-    """See `extremes`."""
-
     def computed() -> Arrays:
         weakest, fastest = extremes(loop.model(setting))
         return {"weakest": np.array(weakest), "fastest": np.array([] if fastest is None else [fastest], dtype=complex)}

@@ -2,7 +2,7 @@
 
 The paper's design stops at a prediction from the sensitivity at a small gain. Here the gain is searched with the mode
 itself, and where the gain alone does not do, the lead/lag is centred anew on the mode where it is, with the
-sensitivity that it has there. Where that does not do either, all settings are surveyed."""
+sensitivity that it has there. Where that does not do either, settings are searched on the linear models."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,7 +23,6 @@ from orchestrator.pod_design.lead_lag import (
     lead_lag_turning,
     local_non_compensated,
 )
-from orchestrator.pod_design.survey import CENTRES, MOST_STATES, survey
 
 
 @dataclass(frozen=True)
@@ -41,6 +40,7 @@ Judge = Callable[[Placed], Judgement]
 SearchSettings = Callable[[], Sequence[tuple[str, PodSetting]]]
 """Gives settings to try, each with where it comes from; raises AnalysisError where it cannot search."""
 
+_MOST_STATES = 500  # of a system whose other modes are looked at with every gain
 _GAINS = 9
 _TURN = 15.0
 """Step of the compensation's angle [°]. Once re-centring no longer helps, the angle is turned by this step to either
@@ -59,7 +59,7 @@ class GainSweep:
     filters: LeadLag
     points: tuple[Placed, ...]
     chosen: Placed  # the smallest gain that meets the requirement, else the gain of the best damping
-    # the gains with which the system is unstable [pu]; empty for systems with more than `MOST_STATES` states, which are
+    # the gains with which the system is unstable [pu]; empty for systems of more than `_MOST_STATES` states, which are
     # not examined
     unstable: tuple[float, ...] = ()
     # least damping ratio of all modes from 0.1 to 2 Hz at each of the points; empty for such systems
@@ -85,21 +85,19 @@ class Refinement:
 
 def refine(
     loop: PodLoop, off: Placed, filters: LeadLag, required: float, bounds: tuple[float, float], judge: Judge,
-    others: Sequence[complex], search: SearchSettings | None = None, *, evenly: bool = False,
+    search: SearchSettings, *, evenly: bool = False,
 ) -> Refinement:  # fmt: skip
     """Search gain and lead/lag on the closed loop.
 
     ``required``: damping ratio of the target.
     ``bounds``: of the gain [pu].
-    ``others``: the other modes without the controller [rad/s].
-    ``search``: gives settings where nothing near the design meets the requirement; by default a survey does.
+    ``search``: gives settings where nothing near the design meets the requirement.
     ``evenly``: whether, where no setting meets the requirement, that with the best least damping of all modes is
     chosen."""
     result = Refinement()
     even = -1.0
     near = ((why, candidate, None) for why, candidate in _candidates(loop, result, filters))
-    far = _surveyed(loop, result, off, others, filters.N_S, bounds) if search is None else _searched(result, search)
-    for why, candidate, gain in chain(near, far):
+    for why, candidate, gain in chain(near, _searched(result, search)):
         try:
             found = sweep(loop, off, candidate, required, bounds, why, gain)
         except AnalysisError as error:
@@ -166,8 +164,8 @@ def sweep(
 
 def _of_all_modes(loop: PodLoop, points: Sequence[Placed]) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """The gains with which the system is unstable, and the least damping ratio of all modes from 0.1 to 2 Hz at each;
-    empty for a system with more states than are surveyed."""
-    if len(loop.model(points[0].setting).names) > MOST_STATES:
+    empty for a system with more than `_MOST_STATES` states."""
+    if len(loop.model(points[0].setting).names) > _MOST_STATES:
         return (), ()
     found = [extremes(loop.model(point.setting)) for point in points]
     unstable = [p.setting.gain for p, (_, growing) in zip(points, found, strict=True) if growing is not None]
@@ -187,7 +185,6 @@ def _crossing(loop: PodLoop, low: Placed, high: Placed, required: float) -> Plac
 
 
 def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
-    """The best damping around the best of some gains."""
     if len(points) == 1:
         return points[0]
     k = max(range(len(points)), key=lambda i: points[i].damping_ratio)
@@ -226,30 +223,6 @@ def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[t
             if result.score < reached + _WORTH:
                 break
             turn, reached = turn + direction * _TURN, result.score
-
-
-def _surveyed(
-    loop: PodLoop, result: Refinement, off: Placed, others: Sequence[complex], stages: int, bounds: tuple[float, float]
-) -> Iterator[tuple[str, LeadLag, float | None]]:
-    """The best settings of a survey, which is made only if no other setting has met the requirement."""
-    states = len(loop.model(off.setting).names)
-    if stages == 0 or bounds[1] <= 0:
-        return
-    if states > MOST_STATES:
-        result.notes.append(f"not all settings were surveyed: the system has {states} states, more than {MOST_STATES}")
-        return
-    try:
-        found = survey(loop, off.eigenvalue, others, stages, bounds)
-    except AnalysisError as error:
-        result.notes.append(f"survey: {error}")
-        return
-    result.notes.append(
-        f"surveyed {found.settings} settings, of every turn of the lead/lag, centred from {CENTRES[0]:g} to "
-        f"{CENTRES[1]:g} times the mode's frequency, with every gain in the bounds: the best leaves no mode that it "
-        f"moves below {100 * found.damping:.2f} %"
-    )
-    for number, setting in enumerate(found.best, start=1):
-        yield f"surveyed, {number}", setting.filters, setting.gain
 
 
 def _searched(result: Refinement, search: SearchSettings) -> Iterator[tuple[str, LeadLag, float | None]]:

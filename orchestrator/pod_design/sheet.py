@@ -20,7 +20,6 @@ LABELS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
 
 
 def sheet(d: PodDesign) -> Iterable[Table | str]:
-    """The design step by step with formulas, figures and units, and then its result."""
     yield f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: " + escape(
         f"{d.case}, scenario {d.target.scenario}, mode {d.mode_name}, {_components(d.target.components)}"
     )
@@ -39,7 +38,6 @@ def sheet(d: PodDesign) -> Iterable[Table | str]:
 
 
 def first_screen(d: PodDesign) -> Iterable[Table | str]:
-    """Whether the requirement is met, and a row for each setting: its two least damped modes, and its stability."""
     yield f"[bold {'green' if d.met else 'red'}]{'met' if d.met else 'not met'}[/]: {escape(verdict(d))}"
     table = _table("", "", f"Mode {d.mode_name}", "Least damped, 0.1 to 2 Hz", "Next", "Stable")
     for title, around, target, stability in (
@@ -163,7 +161,6 @@ def _notes(d: PodDesign) -> Iterable[str]:
 
 
 def verdict(d: PodDesign) -> str:
-    """A sentence: whether the requirement is met, by how much, and if not, why."""
     text = f"the target has {percent(d.achieved_damping)} of damping, {percent(d.required_damping)} are required"
     if d.after.other_named:
         text += (
@@ -223,12 +220,10 @@ def _setting(p: Placed) -> str:
 
 
 def mode_text(value: complex) -> str:
-    """A mode with frequency and damping."""
     return f"{eigenvalue_text(value)} rad/s ({value.imag / math.tau:.3f} Hz, {percent(damping_ratio(value))})"
 
 
 def _growth(stability: Stability) -> str:
-    """The growth rate, as in the verdict's sentence."""
     rate = stability.largest_growth_rate
     return stability.verdict if rate is None else f"{rate:+.4g} 1/s"
 

@@ -18,7 +18,6 @@ CRITICAL = "least damped swing"
 
 
 def require_controllers(controllers: Sequence[str]) -> None:
-    """Refuse a controller that there is not, and none."""
     known = ", ".join(DAMPING_CONTROLLERS)
     if not controllers:
         raise InputError(f"controllers is empty; name one or both of {known}")
@@ -42,14 +41,7 @@ def find_target(
     case: Case, controller: str, *, scenario: str | None, pattern: str | None, stages: int | None,
     overrides: Mapping[str, Value], parameters: Sequence[ParameterFile],
 ) -> Target:  # fmt: skip
-    """Find the scenario and its components. By default it is the scenario in which all PODs exist and are off.
-
-    ``controller``: ``pod_p`` or ``pod_q``.
-    ``scenario``: name of the scenario; None for the one in which all PODs exist and are off.
-    ``pattern``: name or pattern of the components, such as ``gfor*``; all with the controller where None.
-    ``stages``: N_S of the lead/lag; None for the components' own.
-    ``overrides``: values by ``component.variable``.
-    ``parameters``: parameter files; ``overrides`` go before them."""
+    """Find the scenario and its components. By default it is the scenario in which all PODs exist and are off."""
     if scenario is not None and scenario not in case.scenarios:
         raise InputError(f"--scenario: there is no scenario {scenario!r}; the case has: {', '.join(case.scenarios)}")
     names = [scenario] if scenario is not None else list(case.scenarios)

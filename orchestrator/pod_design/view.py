@@ -101,13 +101,7 @@ class ControllerDesign:
 
 
 def parameter_file_path(given: str | Path, argument: str = "path") -> Path:
-    """The path of a parameter file, beside which the design's JSON finds a place of its own.
-
-    Raises
-    ------
-    InputError
-        If it is none, or ends in ``.json``.
-    """
+    """The path of a parameter file, beside which the design's JSON finds a place of its own."""
     path = path_of(given, argument)
     if path.suffix.lower() == ".json":
         raise InputError(
@@ -118,7 +112,6 @@ def parameter_file_path(given: str | Path, argument: str = "path") -> Path:
 
 
 def design_json(d: PodDesign) -> dict[str, Any]:
-    """The machine-readable form of `gfor design`."""
     S, setting = d.sensitivities, d.final.setting
     content = {
         "controller": d.request.controller,
@@ -178,7 +171,6 @@ def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
 
 
 def provenance(d: PodDesign, command: str) -> list[str]:
-    """The comments of a parameter file."""
     return [
         f"{LABELS[d.request.controller]} for {d.case}, designed by eigenvalue sensitivity"
         + (" and refined on the closed loop" if d.refinement else ""),

@@ -49,7 +49,6 @@ def _of_versions() -> "hashlib._Hash":
 
 
 def code_files() -> list[Path]:
-    """Files of this package that may compute, sorted."""
     rooms = [path for path in _ROOT.iterdir() if path.is_dir() and path.name not in _SHOWING]
     files = [file for room in rooms for ending in ("py", "c", "h") for file in room.rglob(f"*.{ending}")]
     return sorted([*files, *_ROOT.glob("*.py")])
@@ -84,7 +83,6 @@ def needed_modules(module: str) -> set[str]:
 
 
 def _module_files() -> dict[str, Path]:
-    """File of every module of this package."""
     parts = {file: (_ROOT.name, *file.relative_to(_ROOT).with_suffix("").parts) for file in _ROOT.rglob("*.py")}
     return {".".join(names).removesuffix(".__init__"): file for file, names in parts.items()}
 
@@ -97,7 +95,6 @@ def _code(name: str, file: Path) -> CodeType:
 
 
 def _imported(code: CodeType, files: dict[str, Path]) -> Iterator[str]:
-    """Modules that a piece of code names in its imports."""
     here = [name for name in code.co_names if name in files]
     yield from here
     yield from (f"{package}.{name}" for package in here for name in code.co_names if f"{package}.{name}" in files)
@@ -107,7 +104,6 @@ def _imported(code: CodeType, files: dict[str, Path]) -> Iterator[str]:
 
 
 def _computing(code: CodeType) -> Iterator[object]:
-    """What a piece of code does, without its sentences and its places in the file."""
     yield code.co_code, code.co_names, code.co_varnames, code.co_flags, code.co_exceptiontable
     yield code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_freevars, code.co_cellvars
     for constant in code.co_consts:

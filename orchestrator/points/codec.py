@@ -13,7 +13,6 @@ from orchestrator.points.store import Arrays
 
 
 def plain(value: Any) -> Any:
-    """A value without arrays as JSON's types."""
     return _Packing().packed(value)
 
 

@@ -51,7 +51,6 @@ class DaskCluster:
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
     ) -> Iterator[tuple[int, Result | WorkerLostError]]:
-        """See `Executor.run`."""
         if not tasks:
             return
         distributed = _distributed()

@@ -35,10 +35,7 @@ class ClusterWatch:
         self._seen = self._looked = time.monotonic()
 
     def look(self) -> None:
-        """Tell which workers are lost.
-
-        Raises a `CosimError` if no usable worker was there for so long as the patience lasts, or the scheduler is gone.
-        """
+        """Tell which workers are lost."""
         now = time.monotonic()
         if now - self._looked < INTERVAL:
             return

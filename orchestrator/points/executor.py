@@ -16,8 +16,6 @@ class WorkerLostError(CosimError):
 
 
 class Executor(Protocol):
-    """Computes ``function(task)`` for many tasks."""
-
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
     ) -> Iterator[tuple[int, Result | WorkerLostError]]:

@@ -13,8 +13,6 @@ from orchestrator.spelling import as_options
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a point could not be computed."""
-
     kind: ErrorKind
     text: str
     lasting: bool

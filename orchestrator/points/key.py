@@ -19,7 +19,6 @@ from orchestrator.points.code import code_hash, numbers_hash
 
 
 def digest(content: Mapping[str, Any]) -> str:
-    """Hash of JSON's types."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
@@ -58,9 +57,7 @@ def reference_to(case: CaseDefinition) -> str:
 
 @lru_cache(maxsize=8)
 def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
-    """The case of a task, as a worker sees it.
-
-    ``reference`` and ``wanted``: name or path of the case, and its fingerprint."""
+    """The case of a task, as a worker sees it."""
     case = load_case(reference, trust_fmus=trust_fmus)
     here = fingerprint(case)
     if here.partition("-")[0] != wanted.partition("-")[0]:

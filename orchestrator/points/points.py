@@ -39,9 +39,7 @@ class Work:
     def each(
         self, compute: Callable[[AnyTask], Point], tasks: Sequence[AnyTask], sizes: Sequence[int] | None = None
     ) -> Iterator[tuple[int, Point]]:
-        """Yield, in any order, the index of each task and its record.
-
-        ``sizes``: as how many points each task counts; as one where None."""
+        """Yield, in any order, the index of each task and its record."""
         counts = sizes or [1] * len(tasks)
         total, missing = self.computed + self.stored + sum(counts), list[int]()
         for index, task in enumerate(tasks):
@@ -65,6 +63,5 @@ class Work:
     def all(
         self, compute: Callable[[AnyTask], Point], tasks: Sequence[AnyTask], sizes: Sequence[int] | None = None
     ) -> list[Point]:
-        """The records in the order of their tasks."""
         found = dict(self.each(compute, tasks, sizes))
         return [found[index] for index in range(len(tasks))]

@@ -47,7 +47,6 @@ class Processes:
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
     ) -> Iterator[tuple[int, Result | WorkerLostError]]:
-        """See `Executor.run`."""
         waiting = deque(range(len(tasks)))
         while waiting:
             suspects = yield from self._run_together(function, tasks, waiting)
@@ -101,7 +100,6 @@ class Processes:
         return ProcessPoolExecutor(workers, mp_context=self._context, initializer=_start_worker)
 
     def close(self) -> None:
-        """See `Executor.close`."""
         pool, self._pool = self._pool, None
         if pool is not None:
             if self._at_work:

@@ -6,12 +6,9 @@ from orchestrator.points.executor import Result, Task, WorkerLostError
 
 
 class Serial:
-    """Runs tasks here, in their order."""
-
     def run(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
     ) -> Iterator[tuple[int, Result | WorkerLostError]]:
-        """See `Executor.run`."""
         for index, task in enumerate(tasks):
             yield index, function(task)
 

@@ -27,7 +27,6 @@ class PointStore:
         made_folder(folder, what="points cannot be kept there")
 
     def load(self, key: str) -> tuple[dict[str, Any], Arrays] | None:
-        """Header and arrays of a point; None if there is no file of it that can be read."""
         try:
             with np.load(self._path(key), allow_pickle=False) as data:
                 arrays = {name: data[name] for name in data}
@@ -53,5 +52,4 @@ class PointStore:
 
 
 def any_kept(folder: Path) -> bool:
-    """Whether a `PointStore` kept a point in a folder."""
     return any(not path.name.startswith(PARTIAL) for path in folder.glob(f"*{_KEPT}"))

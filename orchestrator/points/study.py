@@ -31,11 +31,6 @@ _WORKER = "orchestrator.points.worker"
 def choose_executor(
     workers: int | None, scheduler: str | None, imports: Sequence[str], tls: str | Path | None = None
 ) -> Executor:
-    """Where the points are computed.
-
-    ``workers``: number of processes on this machine; one for each core where None. ``scheduler``: address of a Dask
-    cluster, such as ``tcp://host:8786``; this machine where None. ``imports``: modules that each
-    worker imports before its first point. ``tls``: as `DaskCluster` takes it."""
     if scheduler is not None:
         if workers not in (None, 1):
             raise InputError("workers and scheduler exclude each other; a Dask cluster brings its own workers")
@@ -69,12 +64,10 @@ class Study(Generic[Asks, Shown]):
 
     @property
     def asks(self) -> type:
-        """The class of the request."""
         return cast("type", self.request)
 
     @property
     def of_several(self) -> bool:
-        """Whether it is of several scenarios, or of one."""
         return hasattr(self.request, "scenarios")
 
 
@@ -104,9 +97,5 @@ class PointStudy(Study[Asks, Shown], Generic[Asks, Plan, Result, Shown]):
     def compute(
         self, planned: Plan, executor: Executor, folder: str | Path | None, report: CountReport, *more: Any
     ) -> Shown:
-        """Compute a plan, and close the executor.
-
-        ``folder``: its subfolder ``points`` keeps the points; without a folder they are forgotten. ``more``: further
-        arguments of the study."""
         with TemporaryDirectory() as passing, closing(executor):
             return self.shown(self.run(planned, Work.into(Path(folder or passing), executor, report), *more))

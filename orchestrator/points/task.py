@@ -62,7 +62,6 @@ class Kept:
 
     @property
     def error(self) -> str | None:
-        """The message of the failure."""
         return None if self.failure is None else self.failure.text
 
     @property
@@ -71,7 +70,6 @@ class Kept:
         return self.failure is None or (self.keeps_failures and self.failure.lasting)
 
     def stored(self) -> tuple[dict[str, Any], Arrays]:
-        """Header and arrays for a `PointStore`."""
         return packed(self)
 
     @classmethod

@@ -13,9 +13,7 @@ _SHOWN = 6
 
 
 def exceptions_in_words(sources: Mapping[str, str], fit_errors: Mapping[str, float] | None = None) -> str | None:
-    """One sentence about the components that were not perturbed; None where all were.
-
-    ``sources``: by component, as in `LinearModel`."""
+    """One sentence about the components that were not perturbed; None where all were."""
     parts = []
     for source, how in _HOW.items():
         names = [name for name, found in sources.items() if found == source]

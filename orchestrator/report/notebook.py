@@ -16,13 +16,7 @@ _ROWS = 40
 
 
 def new_axes(width: float = 7.2, height: float = 4.4) -> Axes:
-    """Axes of a new figure of pyplot, in the look of all plots.
-
-    Parameters
-    ----------
-    width, height
-        Of the figure [inches].
-    """
+    """Axes of a new figure of pyplot, in the look of all plots."""
     import matplotlib as mpl  # noqa: PLC0415 - a second to import
     import matplotlib.pyplot as plt  # noqa: PLC0415 - as above
 
@@ -36,13 +30,6 @@ def new_axes(width: float = 7.2, height: float = 4.4) -> Axes:
 
 
 def axes_or_new(given: Axes, width: float, height: float) -> Axes:
-    """The Axes that a caller gave, or those of a new figure.
-
-    Raises
-    ------
-    InputError
-        If what was given is no Axes.
-    """
     if given is None:
         return new_axes(width, height)
     if not hasattr(given, "get_legend_handles_labels"):
@@ -56,17 +43,7 @@ def curves_on(axes: Axes) -> int:
 
 
 def page(title: str, lines: Iterable[str] = (), table: pd.DataFrame | None = None, rest: str = "") -> str:
-    """HTML of a result: a title, lines of text, a table, and HTML of parts.
-
-    Parameters
-    ----------
-    title, lines
-        Plain text.
-    table
-        Its first rows are shown.
-    rest
-        HTML.
-    """
+    """HTML of a result; of its table the first rows are shown, and ``rest`` is HTML already."""
     parts = [f"<p><b>{escape(title)}</b></p>", *(f"<p>{escape(line)}</p>" for line in lines)]
     if table is not None:
         counted = isinstance(table.index, pd.RangeIndex) and table.index.name is None

@@ -36,7 +36,6 @@ def add_legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) ->
 
 
 def colour(index: int) -> str:
-    """A scenario's colour, the same in every plot."""
     return _COLOURS[index % len(_COLOURS)]
 
 

@@ -21,7 +21,6 @@ _DIGITS = {"v_pu": 4, "angle_deg": 2, "rating_mva": None, "losses_mw": 3}
 
 
 def totals(found: dict[str, Any]) -> list[tuple[str, str]]:
-    """Generation, losses, the slack's share and the range of voltages, in words."""
     slack, voltages = found["slack"], [bus["v_pu"] for bus in found["buses"]]
     share = "" if slack["share_percent"] is None else f", {slack['share_percent']:.0f} % of the generation"
     return [
@@ -33,7 +32,6 @@ def totals(found: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def cells(rows: Sequence[dict[str, Any]], kind: str) -> list[list[str]]:
-    """Rows as text, in the order of `COLUMNS`."""
     return [[_cell(column, row[column]) for column in COLUMNS[kind]] for row in rows]
 
 

@@ -78,7 +78,6 @@ class ColumnTable(Generic[Row]):
         return f"{rest} more in {self.file}" if rest > 0 else ""
 
     def records(self) -> list[dict[str, Any]]:
-        """What files and programs have of each row."""
         return [{column.name: column.get(row) for column in self.columns if column.name} for row in self.rows]
 
     def frame(self) -> pd.DataFrame:
@@ -101,7 +100,6 @@ def _on_page(cell: str | Marked) -> str:
 
 
 def damping(percent: float | None) -> str | Marked:
-    """A damping [%], marked where it is small."""
     text = "–" if percent is None else f"{percent:.2f}"
     return Marked(text, "bad") if percent is not None and percent < LEAST_DAMPING else text
 
@@ -112,7 +110,6 @@ def verdict(stable: bool | None) -> str | Marked:
 
 
 def mode_columns(mode_of: Callable[[Row], Any]) -> list[Column[Row]]:
-    """Eigenvalue, frequency and damping of a row's `Mode`, or of what has its figures."""
     return [
         Column("Mode [rad/s]", lambda row: mode_of(row).eigenvalue, eigenvalue_text),
         Column("", lambda row: mode_of(row).eigenvalue.real, name="real"),

@@ -42,7 +42,6 @@ def make_table(title: str, *columns: str, left: int = 1, rows: Iterable[Sequence
 
 
 def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
-    """The first few of many."""
     items = list(items)
     shown = ", ".join(text(item) for item in items[:_ITEMS_SHOWN])
     return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")

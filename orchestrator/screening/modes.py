@@ -42,7 +42,6 @@ class CriticalRegion:
     damping: float
 
     def holds(self, value: complex) -> bool:
-        """Whether an eigenvalue [rad/s] is a critical mode."""
         hertz = value.imag / (2 * np.pi)
         return self.lowest_hz <= hertz <= self.highest_hz and damping_ratio(value) <= self.damping
 
@@ -54,8 +53,6 @@ class CriticalRegion:
 
 @dataclass(frozen=True)
 class FoundModes:
-    """Modes of one operating point."""
-
     modes: ModeSet
     searched: bool  # whether they come from a search of their own rather than from a neighbour's
     # number of growing eigenvalues that are none of these modes; None where they were not counted
@@ -68,7 +65,6 @@ class FoundModes:
     slowest: float = 0.0
 
     def critical(self, wanted: CriticalRegion) -> list[int]:
-        """Places of the critical modes, least damped first."""
         held = [k for k, value in enumerate(self.modes.eigenvalues.tolist()) if wanted.holds(value)]
         return sorted(held, key=lambda k: damping_ratio(complex(self.modes.eigenvalues[k])))
 
@@ -142,7 +138,6 @@ def _with_names(modes: ModeSet, names: tuple[str, ...]) -> ModeSet:
 
 
 def _kept(modes: ModeSet, wanted: CriticalRegion) -> ModeSet:
-    """Those modes that are followed, least damped first."""
     wider = wanted.wider
     held = [k for k, value in enumerate(modes.eigenvalues.tolist()) if wider.holds(value)]
     held.sort(key=lambda k: damping_ratio(complex(modes.eigenvalues[k])))

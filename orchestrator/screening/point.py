@@ -30,8 +30,6 @@ from orchestrator.study.modes import modes_from
 
 @dataclass(frozen=True)
 class StretchTask(Task):
-    """Operating points with outages that are computed together."""
-
     record = StretchRecord
     wanted: CriticalRegion
     anchor: Item  # the intact network at the first point, from which the rest is reached
@@ -57,7 +55,6 @@ class _Result:
 
 
 def compute_stretch(task: StretchTask) -> StretchRecord:
-    """Compute all items of a stretch; failures become records as well."""
     return computed(task, _stretch)
 
 
@@ -129,7 +126,6 @@ class _Worker:
         )  # fmt: skip
 
     def _item(self, item: Item, neighbour: FoundModes | None, *, count: bool) -> _Result:
-        """One operating point with an outage, or the reason why it has no modes."""
         warnings: tuple[str, ...] = ()
         try:
             prepared = self._preparation.prepared(item)
@@ -214,7 +210,6 @@ def _as_kept(modes: ModeSet) -> ModeSet:
 
 
 def _shares(modes: ModeSet) -> dict[str, Any]:
-    """Participation of every component, shape (m,)."""
     if not len(modes.eigenvalues):
         return {}
     factors = modes.participation()

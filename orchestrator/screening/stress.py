@@ -23,12 +23,10 @@ class OutageRow:
 
     @property
     def unstable(self) -> bool:
-        """Whether something grows at its worst point."""
         return self.worst is not None and self.worst.record.stable is False
 
 
 def by_outage(summary: Summary) -> list[OutageRow]:
-    """All outages: what grows first, then what is not judged, then by the least damping."""
     groups: dict[str, list[ScreenedItem]] = {}
     for item in summary.result.items:
         groups.setdefault(item.outage.name, []).append(item)
@@ -83,7 +81,6 @@ def _out(summary: Summary, items: Sequence[ScreenedItem]) -> str:
 
 
 def _loading(summary: Summary, items: Sequence[ScreenedItem]) -> str:
-    """Whether all of them are at points of high or of low load."""
     plan = summary.result.plan
     loads = {point.name: load_of(plan, point) for point in plan.points}
     middle, here = float(np.median(list(loads.values()))), [loads[item.point.name] for item in items]

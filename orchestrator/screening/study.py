@@ -49,12 +49,10 @@ class ScreeningPlan(OperatingPoints):
 
     @property
     def number_of_items(self) -> int:
-        """Operating points times outages."""
         return len(self.items)
 
 
 def plan_screening(case: Case, request: ScreeningRequest) -> ScreeningPlan:
-    """Check a screening, and build the FMUs that it needs."""
     region, sharing = request.region, cast("SharingRule | None", request.sharing)
     read = read_operating_points(case, request, request.points, request.outages, request.scenario)
     study = StudyCase.of(read.prepared, read.layers, request.step_size)
@@ -93,10 +91,7 @@ class ScreeningResult:
 
 
 def run_screening(plan: ScreeningPlan, work: Work, shard: Shard | None = None) -> ScreeningResult:
-    """Compute the stretches that are not stored yet, and follow the modes over all of them.
-
-    ``plan``: as `plan_screening` gives it.
-    ``shard``: the part to compute; all where None."""
+    """Compute the stretches that are not stored yet, and follow the modes over all of them."""
     part = shard or Shard()
     tasks = {k: task for k, task in enumerate(plan.tasks) if part.has(k)}
     sizes = [len(task.items) for task in tasks.values()]

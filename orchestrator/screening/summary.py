@@ -27,17 +27,14 @@ class ModeAt:
 
     @property
     def value(self) -> complex:
-        """λ [rad/s]."""
         return complex(self.item.record.eigenvalues[self.place])
 
     @property
     def damping(self) -> float:
-        """Damping ratio [%]."""
         return damping_percent(self.value)
 
     @property
     def frequency(self) -> float:
-        """Frequency [Hz]."""
         return self.value.imag / (2 * np.pi)
 
     def participation(self, most: int | None = _SHOWN) -> list[tuple[str, float]]:
@@ -94,7 +91,6 @@ class Summary:
 
     @property
     def counted(self) -> int:
-        """Items at which growth was counted at all frequencies."""
         return sum(item.record.counted for item in self.result.items)
 
     @property
@@ -104,7 +100,6 @@ class Summary:
         return max((item.record.slowest for item in self.result.items), default=0.0)
 
     def failures(self) -> Iterator[ScreenedItem]:
-        """Items that have no modes."""
         return (item for item in self.result.items if item.record.status is not Status.COMPUTED)
 
     def least_damped(self) -> list[ModeAt]:

@@ -97,7 +97,6 @@ def _least(item: ScreenedItem) -> ModeAt | None:
 
 
 def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
-    """Every operating point with every outage."""
     return ColumnTable("Items", (
         Column("Point", lambda item: item.point.name, name="point"),
         Column("Outage", lambda item: item.outage.name, name="outage"),
@@ -142,7 +141,6 @@ def _cells(summary: Summary) -> Cells:
 
 
 def _every_mode(summary: Summary) -> ColumnTable[tuple[ModeAt, str]]:
-    """The critical modes of every item, in the items' order, with the names of the modes that they are."""
     names = {(id(one.item), one.place): mode.name for mode in summary.modes for one in mode.at}
     rows = [(ModeAt(item, place), names[id(item), place]) for item in summary.result.items
             for place in item.record.critical]  # fmt: skip
@@ -162,7 +160,6 @@ def _every_mode(summary: Summary) -> ColumnTable[tuple[ModeAt, str]]:
 
 
 def verdict(summary: Summary) -> str:
-    """The verdict as rich markup, and what it rests on."""
     return f"{verdict_of(summary).markup()}\n{escape_markup(what_was_counted(summary))}"
 
 
@@ -228,7 +225,6 @@ def modes_table(summary: Summary, most: int = 12, *, whole: bool = False) -> Col
 
 
 def remarks(summary: Summary) -> list[str]:
-    """What was not computed, and what is unusual, counted and named."""
     texts = []
     for status, number in summary.counts.items():
         if status is Status.COMPUTED:
@@ -249,7 +245,6 @@ def remarks(summary: Summary) -> list[str]:
 
 
 def as_json(summary: Summary) -> dict[str, Any]:
-    """The summary as JSON's types."""
     result = summary.result
     return {
         "case": result.plan.case.name,
@@ -333,7 +328,6 @@ def _durations(summary: Summary, figures: Figures) -> str:
 
 
 def _longest(summary: Summary) -> list[ScreenedMode]:
-    """The least damped of those that are there most of the time."""
     most = max((len(mode.at) for mode in summary.modes), default=0)
     return [mode for mode in summary.modes if len(mode.at) >= most / 4][:_CURVES]
 

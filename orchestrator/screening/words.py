@@ -17,12 +17,10 @@ from orchestrator.screening.summary import ModeAt, Summary
 
 
 def verdict_sentence(summary: Summary) -> str:
-    """The verdict on all points and outages in one sentence."""
     return str(verdict_of(summary))
 
 
 def verdict_of(summary: Summary) -> VerdictSentence:
-    """The verdict on all points and outages."""
     total = len(summary.result.items)
     if summary.unstable:
         worst = summary.unstable[0]
@@ -74,7 +72,6 @@ def what_was_counted(summary: Summary) -> str:
 
 
 def _what_was_linearised(summary: Summary) -> str:
-    """Of which system the modes are: without a communication step, or with it, over one or several."""
     step = summary.result.plan.prepared.step_size
     computed = [item.record.map_steps for item in summary.result.items if item.record.status is Status.COMPUTED]
     found = []

@@ -41,15 +41,7 @@ class Derivative:
 
 
 def differentiate(parameter: Parameter, shift_at: Callable[[float], Shift], eigenvalue: complex) -> Derivative | None:
-    """Central differences of two sizes; of one side where the parameter stands at a bound.
-
-    ``shift_at``: The shift of the eigenvalue for a changed value of the parameter.
-    ``eigenvalue``: λ [rad/s].
-
-    Returns
-    -------
-    The derivative; None if the declared bounds leave no room on either side.
-    """
+    """Central differences of two sizes; of one side where the parameter is at a bound, None where it has no room."""
     found: Derivative | None = None
     for size in SIZES:
         change = size * parameter.scale

@@ -8,7 +8,6 @@ from orchestrator.watch.limits import AT_LIMIT, limits_of
 
 
 def limits_that_act(master: Master) -> dict[str, tuple[str, ...]]:
-    """The names of the limits that act, by component; components without any are left out."""
     found = {
         name: tuple(limit.name for limit in limits_of(plan) if _acts(limit, plan, master.components[name]))
         for name, plan in master.system.components.items()

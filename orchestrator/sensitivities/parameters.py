@@ -33,7 +33,6 @@ class Parameter:
         return abs(self.value) or 1.0
 
     def allows(self, change: float) -> bool:
-        """Whether the declared bounds leave room for a change."""
         changed = self.value + change
         above = self.minimum is None or changed >= self.minimum
         return above and (self.maximum is None or changed <= self.maximum)

@@ -72,7 +72,6 @@ class Sensitivity:
 
     @property
     def frequency_per_unit(self) -> float | None:
-        """∂f/∂p [Hz per unit of the parameter]."""
         return None if self.derivative is None else self.derivative.imag / (2 * np.pi)
 
     @property
@@ -101,8 +100,6 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class SensitivityResult:
-    """The sensitivities of one mode, largest effect first."""
-
     modes: ModesResult
     mode: Mode
     rows: tuple[Sensitivity, ...]
@@ -117,7 +114,6 @@ def damping_change(eigenvalue: complex, change: complex) -> float:
 
 
 def find_sensitivities(prepared: PreparedScenario, again: Again, request: SensitivitiesRequest) -> SensitivityResult:
-    """Differentiate one mode by parameters."""
     mode, held, directional = request.mode, request.held, request.directional
     patterns, report = names_of(request.parameters, "parameters"), request.report
     if held and request.fixed:
@@ -263,8 +259,6 @@ def _answer(master: Master, name: str) -> Numbers:
 
 
 def _in_running(master: Master, blocks: Blocks, at: _Mode, parameter: Parameter) -> Callable[[float], Shift]:
-    """Shifts by linearising the parameter's own component again."""
-
     def shift(value: float) -> Shift:
         with changed(master, {parameter.name: value}, {parameter.name: parameter.value}):
             return at.shift(blocks.with_component(master, parameter.component), master)
@@ -273,8 +267,6 @@ def _in_running(master: Master, blocks: Blocks, at: _Mode, parameter: Parameter)
 
 
 def _started_anew(again: Again, at: _Mode, parameter: Parameter, *, directional: bool) -> Callable[[float], Shift]:
-    """Shifts by starting the whole case with another value."""
-
     def shift(value: float) -> Shift:
         with running(again({parameter.name: value})) as master:
             try:
@@ -309,7 +301,6 @@ def _none(parameter: Parameter, mode: Mode, operating_point: str, reason: str) -
 
 
 def _between_models(derivative: Derivative, parameter: Parameter, mode: Mode) -> tuple[str, ...]:
-    """What step map and continuous model say differently."""
     step, exact = derivative.step, derivative.continuous
     if exact is None:
         return ()

@@ -66,7 +66,6 @@ class Sensitivities:
 
 
 def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
-    """One row for each parameter, largest effect first; None where there is no figure."""
     mode = result.mode
     name = result.modes.name_of(mode) or "critical"
     kind = "the operating point held" if result.held else "total: the operating point moves with the parameter"
@@ -105,7 +104,6 @@ def _part(value: complex | None, part: str) -> float | None:
 
 
 def as_json(result: SensitivityResult) -> dict[str, Any]:
-    """What ``gfor sensitivities --json`` prints of a scenario."""
     modes, mode = result.modes, result.mode
     return {
         "case": modes.prepared.case.name, "scenario": modes.prepared.name, "stable": modes.stability.stable,
@@ -121,5 +119,4 @@ def _text(figure: float | None) -> str:
 
 
 def left_out(result: SensitivityResult) -> list[Sensitivity]:
-    """Parameters without a figure."""
     return [row for row in result.rows if row.derivative is None]

@@ -24,7 +24,6 @@ class SspArchive:
             raise InputError(f"{path}: the archive has no {SYSTEM_FILE} at its top; an SSP must, so export it again")
 
     def member(self, source: str) -> str:
-        """Name of the member that a relative URI means."""
         try:
             uri = urlsplit(source)
         except ValueError as error:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Collection
-from xml.etree.ElementTree import Element, register_namespace
+from xml.etree.ElementTree import Element, indent, register_namespace, tostring
 
 from orchestrator.fmi.description import REVERSE_DOMAIN
 
@@ -37,8 +37,13 @@ def tag(name: str) -> str:
 
 
 def children(element: Element, path: str) -> list[Element]:
-    """Elements at a path such as ``ssd:Elements/ssd:Component``."""
     return element.findall(path, NAMESPACES)
+
+
+def xml_text(root: Element) -> bytes:
+    indent(root)
+    text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
 
 
 def plain_name(name: str, taken: Collection[str] = ()) -> str:

@@ -89,7 +89,6 @@ def _value(name: str, element: Element) -> float | bool | str:
 
 
 def read_parameter_mapping(root: Element) -> dict[str, str]:
-    """Target → source; several targets may have one source."""
     if root.tag != tag("ssm:ParameterMapping"):
         raise InputError(f"{root.tag!r} is not a parameter mapping of SSP 1.0")
     mapping = {}

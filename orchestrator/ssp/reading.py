@@ -62,7 +62,6 @@ def read_ssp(path: Path, cache: Path) -> SspCase:
 
 
 def _times(description: Element) -> dict[str, float]:
-    """Stop time of the default experiment [s], where it has one."""
     times = {}
     for experiment in children(description, "ssd:DefaultExperiment"):
         for name, text in experiment.attrib.items():

@@ -10,13 +10,13 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from platform import machine as machine_of
-from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
+from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 from orchestrator.coupling.run_state import state_as_bytes
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import open_component
-from orchestrator.ssp.names import PARAMETER_SET_TYPE, SSP_VERSION, tag
+from orchestrator.ssp.names import PARAMETER_SET_TYPE, SSP_VERSION, tag, xml_text
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"  # where LS-REF has its files
 VERSION = "1.0.0-beta.1"  # of LS-REF
@@ -60,7 +60,6 @@ def platform_of(fmi_version: str) -> str:
 
 
 def _run(description: FmuDescription) -> tuple[bytes, bytes, bytes]:
-    """Stimuli and references as CSV, and the serialised state after initialisation."""
     variables = description.variables.values()
     inputs = {v.name: float(v.start or 0) for v in variables if v.causality == "input" and v.type == "Real"}
     outputs = [v.name for v in variables if v.causality == "output" and v.type == "Real"]
@@ -96,7 +95,6 @@ def as_csv(rows: Iterable[Sequence[str]]) -> bytes:
 
 
 def parameter_set(name: str, values: Mapping[str, float | bool | str], description: FmuDescription) -> bytes:
-    """Values of variables in the form of SSP."""
     root = Element(tag("ssv:ParameterSet"), version=SSP_VERSION, name=name)
     listed = SubElement(root, tag("ssv:Parameters"))
     for variable, value in values.items():
@@ -109,7 +107,7 @@ def parameter_set(name: str, values: Mapping[str, float | bool | str], descripti
             case _:
                 text = repr(value)
         SubElement(entry, tag(f"ssv:{type_}"), value=text)
-    return _text(root)
+    return xml_text(root)
 
 
 def _smoke_test() -> bytes:
@@ -128,7 +126,7 @@ def experiment(name: str, text: str, stop: float, step: float, sources: Mapping[
     SubElement(found, "TransientSimulation", {"startTime": "0.0", "stopTime": repr(stop), "stepSize": repr(step)})
     for kind, source in sources.items():
         SubElement(found, kind, source=source)
-    return _text(root)
+    return xml_text(root)
 
 
 def manifest(files: Mapping[str, tuple[str, str, str, bytes]]) -> bytes:
@@ -146,11 +144,10 @@ def manifest(files: Mapping[str, tuple[str, str, str, bytes]]) -> bytes:
         digest = hashlib.sha3_256(content).hexdigest()
         attributes = {"type": type_, "source": name, "role": role, "description": text, "checksum": digest}
         SubElement(root, "Related", attributes)
-    return _text(root)
+    return xml_text(root)
 
 
 def _purpose(name: str) -> tuple[str, str, str]:
-    """Type, role and description of a file."""
     match name.rpartition(".")[2]:
         case "ssv":
             return PARAMETER_SET_TYPE, "parameter", "Parameters of the smoke test"
@@ -167,9 +164,3 @@ def _purpose(name: str) -> tuple[str, str, str]:
             if name.startswith("stimuli"):
                 return "text/csv", "other", "Inputs of the smoke test at each step"
             return "text/csv", "result", "Reference results of the smoke test"
-
-
-def _text(root: Element) -> bytes:
-    indent(root)
-    text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text + b"\n"

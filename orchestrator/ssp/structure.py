@@ -31,7 +31,6 @@ class Structure:
 
 
 def read_structure(archive: SspArchive, description: Element, note: Callable[[str, str], None]) -> Structure:
-    """Lay the systems of a description flat."""
     systems = children(description, "ssd:System")
     if len(systems) != 1:
         note("ssd:System", "there must be exactly one system at the top; export the SSP again")

@@ -36,12 +36,7 @@ class SspStudy:
 def study_of(
     scenario: str, title: str, step_size: float, schedule: Schedule, events: Sequence[Event], tables: Mapping[str, Any]
 ) -> SspStudy:
-    """The study of a scenario. Each event is written as the variables that it sets.
-
-    ``step_size``: communication step [s].
-    ``schedule``: the order in which the components are stepped.
-    ``events``: events of the scenario, whose order is kept.
-    ``tables``: tables of the case file that only this project knows."""
+    """The study of a scenario. Each event is written as the variables that it sets."""
     if faults := faults_among(events):
         raise InputError(f"an SSP cannot hold faults ({faults[0]}); remove them from the scenario to export it")
     settings = tuple(

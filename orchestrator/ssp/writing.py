@@ -4,24 +4,18 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from urllib.parse import quote
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.coupling.imperfections import described
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import InputError
-from orchestrator.ssp.names import FMU_TYPE, PARAMETER_SET_TYPE, SSP_VERSION, SYSTEM_FILE, plain_name, tag
+from orchestrator.ssp.names import FMU_TYPE, PARAMETER_SET_TYPE, SSP_VERSION, SYSTEM_FILE, plain_name, tag, xml_text
 from orchestrator.ssp.parameter_sets import write_parameter_set, write_units
 from orchestrator.ssp.study import SspStudy, write_osp_step, write_study
 
 
 def ssp_members(name: str, title: str, system: System, stop_time: float, study: SspStudy) -> dict[str, bytes]:
-    """Members of the archive by path: the structure, the components' values and their FMUs.
-
-    ``name`` and ``title``: name and title of the system, as tools show them.
-    ``stop_time``: stop time of the default experiment [s].
-    ``study``: the parts of the scenario that SSP cannot express.
-    Raises an `InputError` if a value is of a type that cannot be written, or a connection does more than carry its
-    value."""
+    """Members of the archive by path: the structure, the components' values and their FMUs."""
     if disturbed := described(system.wires):
         raise InputError(
             f"an SSP cannot hold what a connection does to its value ({disturbed[0]}); remove the imperfections from "
@@ -35,8 +29,8 @@ def ssp_members(name: str, title: str, system: System, stop_time: float, study: 
             stems = [Path(file).stem for file in files.values()]
             files[component] = f"resources/{plain_name(component, stems)}.ssv"
             sets[files[component]] = write_parameter_set(component, plan, tool)
-    contents = {SYSTEM_FILE: _text(_description(name, title, system, fmus, files, stop_time, study, tool))}
-    contents |= {member: _text(root) for member, root in sets.items()}
+    contents = {SYSTEM_FILE: xml_text(_description(name, title, system, fmus, files, stop_time, study, tool))}
+    contents |= {member: xml_text(root) for member, root in sets.items()}
     return contents | {member: path.read_bytes() for path, member in fmus.items()}
 
 
@@ -49,12 +43,6 @@ def _file_names(system: System) -> dict[Path, str]:
             taken = [Path(member).stem for member in members.values()]
             members[path] = f"resources/{plain_name(path.stem, taken)}.fmu"
     return members
-
-
-def _text(root: Element) -> bytes:
-    indent(root)
-    text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text + b"\n"
 
 
 def _description(

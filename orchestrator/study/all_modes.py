@@ -20,9 +20,7 @@ def compute_all_modes(
 ) -> list[ModesResult]:  # fmt: skip
     """The same as `compute_modes` of each scenario, in their order, to the last bit.
 
-    FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file.
-
-    Raises a `CosimError`: As `compute_modes`, of the first scenario that cannot be computed."""
+    FMUs of others are instantiated by one scenario at a time: they may allow one instance, or share a file."""
     if len(scenarios) < 2 or not all(all_ours(prepared) for prepared in scenarios):
         return [compute_modes(one, frequency_range, critical, directional=directional) for one in scenarios]
     results: list[ModesResult] = []

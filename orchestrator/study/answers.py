@@ -27,8 +27,6 @@ KINDS = {
 
 @dataclass(frozen=True)
 class ScenarioAnswer:
-    """One line of the first table."""
-
     subject: str
     good: bool | None  # whether that is good; None where it is not known
     verdict: str
@@ -115,7 +113,6 @@ def _with_misfits(result: ModesResult, remark: str) -> str:
 
 
 def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[float, float]) -> Table:
-    """The first thing that a command prints."""
     low, high = frequency_range
     table = make_table("", "Scenario", "Verdict", "f [Hz]", "Damping [%]", left=2)
     table.title = None

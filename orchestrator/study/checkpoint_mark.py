@@ -59,12 +59,10 @@ def _shown(path: Path) -> str:
 
 @lru_cache(maxsize=4)
 def _digest(text: str) -> str:
-    """Of all that a case file says; comments do not count."""
     return hashlib.sha256(json.dumps(_read(text), default=str).encode()).hexdigest()
 
 
 def _read(text: str) -> Any:
-    """What a case file says, without its comments."""
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError):  # nothing that was run; a file that somebody damaged

@@ -100,7 +100,6 @@ class Checkpoints:
             self.forget("what it has recorded until the checkpoint is not there any more, or is damaged")
 
     def forget(self, reason: str) -> None:
-        """Begin anew after all, and say why."""
         self._say(f"scenario {self._name!r} is computed from its start again: {reason}")
         self._kept = None
 

@@ -20,10 +20,7 @@ class CommonTimes:
     _recorded: tuple[Numbers, Numbers]
 
     def values(self, run: int, signal: Numbers) -> Numbers:
-        """Values at the common times, shape (n,).
-
-        ``run``: 0 for the first run, 1 for the second.
-        ``signal``: all values that this run has recorded, shape (times of the run,)."""
+        """Values at the common times, shape (n,)."""
         rows = self._rows[run]
         found = signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)
         return np.asarray(found, dtype=float)

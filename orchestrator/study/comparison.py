@@ -34,8 +34,6 @@ _WEAKEST = 1e-3
 
 @dataclass(frozen=True)
 class Comparison:
-    """One signal of two runs over the time that both have."""
-
     expression: str
     unit: str
     deviations: tuple[float, float]  # largest deviation of each run from its own start [unit of the signal]
@@ -51,13 +49,7 @@ class Comparison:
 def open_trajectory(path: Path) -> xr.Dataset:
     """A recorded run: ``trajectory.nc``, or the scenario's folder that holds it; also one that is not finished.
 
-    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE; CSV and Excel are read as well.
-
-    Warns
-    -----
-    ResultsWarning
-        If the folder has no manifest, or its run did not end or still goes on.
-    """
+    A path to ``.cfg``, ``.dat`` or ``.cff`` is a measured recording in COMTRADE; CSV and Excel are read as well."""
     if is_comtrade(path):
         return read_comtrade(path)
     if path.suffix.lower() in SUFFIXES and path.is_file():
@@ -97,7 +89,6 @@ def _hint(path: Path) -> str:
 
 
 def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
-    """Refuse a signal that is not all numbers."""
     bad = np.flatnonzero(~np.isfinite(curve.values))
     if len(bad):
         times = curve["time"].values
@@ -140,7 +131,6 @@ def strongest_modes(curve: xr.DataArray, start: float, stop: float | None = None
 
 
 def _part(window: xr.DataArray) -> WindowPart:
-    """A part of a signal with its own modes, none where they cannot be identified."""
     try:
         modes = _modes_of(window)
     except AnalysisError:
@@ -158,11 +148,7 @@ def _modes_of(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode
 
 
 def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels: tuple[str, str]) -> Comparison:
-    """Compare one signal of two runs; oscillations are looked for from ``start`` [s] on.
-
-    ``expression``: the signal: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
-    ``start``: oscillations are looked for from this time on [s].
-    ``labels``: names of the two runs for tables and errors."""
+    """Compare one signal of two runs; oscillations are looked for from ``start`` [s] on."""
     first, second = (recorded(run, expression, label) for run, label in zip((a, b), labels, strict=True))
     for curve, label in zip((first, second), labels, strict=True):
         require_numbers(curve, expression, label)
@@ -187,9 +173,7 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
 def most_different(
     a: xr.Dataset, b: xr.Dataset, count: int = 10, labels: tuple[str, str] = ("the first run", "the second run")
 ) -> list[str]:
-    """Signals that both runs have, those first whose difference is largest beside their own deviation.
-
-    ``a`` and ``b``: trajectories of the two runs, compared at the times of `common_times`."""
+    """Signals that both runs have, those first whose difference is largest beside their own deviation."""
     times = common_times(a["time"].values, b["time"].values, labels)
 
     def share(name: str) -> float:

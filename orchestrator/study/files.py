@@ -100,7 +100,6 @@ def _mode_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
 
 
 def _participation_rows(results: Sequence[ModesResult]) -> list[dict[str, Any]]:
-    """Participation by state, by component and by area in every mode."""
     return [
         {
             "scenario": r.prepared.name, "frequency [Hz]": f"{m.frequency_hz:.6g}",
@@ -193,7 +192,6 @@ def _power_flow(prepared: PreparedScenario) -> dict[str, Any] | None:
 
 
 def _linear_differences(result: RunResult) -> dict[str, float] | None:
-    """Of every recorded signal, as a share of its largest deviation."""
     if result.linear is None:
         return None
     return {str(n): relative_difference(result.dataset[n], result.linear[n]) for n in result.dataset.data_vars}

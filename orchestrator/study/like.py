@@ -21,9 +21,7 @@ def run_like(
 ) -> xr.Dataset:
     """Run a scenario from what its FMUs start with, along another master's rules.
 
-    The operating point is not improved before and no modes are computed: another master does neither.
-
-    ``prepared``: the scenario; its own schedule is not used."""
+    The operating point is not improved before and no modes are computed: another master does neither."""
     emulation = emulate(
         prepared.system, rules, prepared.step_size, prepared.stop_time, prepared.record, prepared.record_every,
         prepared.events, order, observers,

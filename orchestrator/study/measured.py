@@ -23,7 +23,6 @@ _LEAST_NOISE = 1e-5  # singular values below this part of the largest are noise:
 
 
 def is_measured(curve: xr.DataArray) -> bool:
-    """Whether a signal is of a COMTRADE recording."""
     return LINE_FREQUENCY in curve.coords
 
 

@@ -147,7 +147,6 @@ def _unfollowed(name: str, naming: Naming, lost: str, *, freed: bool) -> Naming:
 
 
 def _freed(naming: Naming, name: str, reason: str) -> Naming:
-    """The naming without a name, and with the reason."""
     named = {other: mode for other, mode in naming.named.items() if other != name}
     return replace(naming, named=named, reasons={**naming.reasons, name: f"no mode is named {name!r}: {reason}"})
 
@@ -315,7 +314,6 @@ class _Others:
 
 
 def _as(other: PreparedScenario | None, prepared: PreparedScenario) -> PreparedScenario:
-    """A scenario with the schedule of another."""
     assert other is not None
     for schedule in SCHEDULES:
         if schedule == prepared.schedule.name != other.schedule.name:

@@ -21,7 +21,6 @@ _RAY_LABEL = (0.055, 0.05)  # room for a ray's label, in parts of the Axes' widt
 
 
 def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> None:
-    """Eigenvalue map of all scenarios as a picture."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 5.0), layout="constrained")
         axis = figure.subplots()

@@ -56,8 +56,6 @@ BlackBoxes = Callable[[Master], Mapping[str, ComponentLinearization]]
 
 @dataclass(frozen=True)
 class ModesResult:
-    """Steady state and modes of one scenario."""
-
     prepared: PreparedScenario
     operating_point: OperatingPoint
     model: LinearModel
@@ -159,7 +157,6 @@ def modes_from(
 
 
 def _computed(system: "Linearised") -> ModesResult:
-    """The result, with both spectra computed side by side."""
     with side_by_side() as pool:
         system.begin(pool)
     return system.finished()

@@ -63,14 +63,11 @@ class ModeShift:
 
     @property
     def shift(self) -> float:
-        """How far the communication step moves the eigenvalue [rad/s]."""
         return abs(self.eigenvalue - self.continuous)
 
 
 @dataclass
 class RunResult:
-    """A scenario's modes and its simulated response."""
-
     modes: ModesResult
     dataset: xr.Dataset
     statistics: StepStatistics | None = None
@@ -119,9 +116,6 @@ def run_scenario(
     A component that fails in the middle ends the run, and so do Ctrl-C and SIGTERM; what was recorded until then is in
     the result.
 
-    ``frequency_range``: modes of these frequencies are shown [Hz].
-    ``observers``: what else looks on at every step, such as a recorder.
-    ``linear``: compute the linear model's response as well.
     ``recording``: where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
     ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates."""
     if federates is not None:

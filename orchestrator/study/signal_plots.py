@@ -50,12 +50,7 @@ def draw_signal(
     axis: Any, results: Sequence[RunResult], expression: str, scale: float = 1.0, first: int = 0,
     label: str | None = None,
 ) -> None:  # fmt: skip
-    """One signal of all runs that recorded it; dashed, the linear model's response where there is one.
-
-    ``axis``: Matplotlib Axes.
-    ``expression``: ``"a.b"`` or ``"a.b - c.d"``, see `signal`.
-    ``first``: Index of the first run's colour: the number of runs that the Axes show already.
-    ``label``: Of the curves; each run's own by default."""
+    """One signal of all runs that recorded it; dashed, the linear model's response where there is one."""
     for index, result in enumerate(results, start=first):
         data = outline(result.dataset, expression)
         if data is not None:

@@ -83,7 +83,6 @@ class StepChoice:
         return [trial for trial in self.trials if trial.schedule == schedule]
 
     def largest(self, schedule: ScheduleName) -> TriedStep | None:
-        """The largest step that is within the error with all shorter ones that were tried; None without one."""
         found = None
         for trial in self.of(schedule):
             if not trial.is_within(self.allowed):
@@ -102,14 +101,7 @@ def choose_step(
     prepared: PreparedScenario, allowed: Allowed, steps: Sequence[float] = (), schedules: Sequence[ScheduleName] = (),
     frequency_range: tuple[float, float] = (0.1, 2.0),
 ) -> StepChoice:  # fmt: skip
-    """What schedules do to a scenario's critical modes at several steps, against the continuous system.
-
-    ``steps``: communication steps [s]; by default `MULTIPLES` of the case's own.
-    ``schedules``: by default `TRIED`.
-    ``frequency_range``: of the critical modes [Hz].
-    Raises an `AnalysisError` if a component gives no derivatives, so that there is no continuous system to compare
-    with; if no mode is in range; or if the system is too large for all its eigenvalues.
-    Raises an `InputError` if no step fits the case's events."""
+    """What schedules do to a scenario's critical modes at several steps, against the continuous system."""
     lengths, left_out = _fitting(prepared, steps)
     with running(prepared.rescheduled("gauss-seidel")) as master:
         find_operating_point(master)
@@ -242,7 +234,6 @@ def _doubts(blocks: Blocks, schedule: Schedule, model: LinearModel) -> tuple[str
 
 
 def step_choice_json(choice: StepChoice) -> dict[str, Any]:
-    """The machine-readable form of one scenario."""
     return {
         "scenario": choice.prepared.name,
         "allowed": {"hertz": choice.allowed.hertz, "points": choice.allowed.points},

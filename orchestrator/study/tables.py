@@ -15,7 +15,6 @@ from orchestrator.study.run import RunResult
 
 
 def steady_states(results: Sequence[ModesResult]) -> Table:
-    """Residual of the coupled steady state, scenario by scenario."""
     columns = ("Scenario", "States", "Residual per step", "Drift [1/s]", "Power-flow residual [pu]")
     rows = [
         (r.prepared.title, str(r.model.number_of_states),
@@ -50,7 +49,6 @@ def named_modes(results: Sequence[ModesResult], reference_title: str | None) -> 
 
 
 def all_modes(result: ModesResult) -> Table:
-    """Every mode of a scenario in the range, least damped first; those with a name are marked."""
     states, residual = result.model.number_of_states, result.operating_point.residual
     title = f"{result.prepared.title}: {states} states, residual {residual:.1e}"
     table = make_table(title, "Mode [rad/s]", "f [Hz]", "Damping [%]")
@@ -83,7 +81,6 @@ def mode_shapes(results: Sequence[ModesResult]) -> Table:
 
 
 def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
-    """Machines, buses and branches of every power flow."""
     flows: dict[str, dict[str, Any]] = {}
     for r in results:
         if flow := power_flow_json(r.prepared):
@@ -99,7 +96,6 @@ def power_flows(results: Sequence[ModesResult]) -> Iterator[Table]:
 
 
 def ring_downs(results: Sequence[RunResult]) -> Table:
-    """Frequency and damping of the simulated response against the eigenvalue."""
     columns = ("Scenario", "f simulated [Hz]", "f mode [Hz]", "Damping simulated [%]", "Damping mode [%]")
     rows = [
         (r.modes.prepared.title, f"{seen.frequency_hz:.4f}", f"{mode.frequency_hz:.4f}",
@@ -128,7 +124,6 @@ def linear_differences(results: Sequence[RunResult]) -> Table:
 
 
 def mode_shifts(results: Sequence[RunResult]) -> Table:
-    """|λ(H) − λ(continuous)| of the electromechanical mode."""
     steps = sorted({s.step_size for r in results for s in r.shifts})
     columns = ("Scenario", "Schedule", *(f"{h * 1e6:g} µs" for h in steps))
     table = make_table("Shift of the electromechanical mode by the communication step [rad/s]", *columns, left=2)
@@ -140,7 +135,6 @@ def mode_shifts(results: Sequence[RunResult]) -> Table:
 
 
 def run_statistics(results: Sequence[RunResult]) -> Table:
-    """Speed, and where the time went."""
     table = make_table("Run", "Scenario", "Steps", "Steps/s", "× real time", "Threads", "Inside FMUs", "Of each FMU")
     for r in results:
         if s := r.statistics:

@@ -31,8 +31,6 @@ _ALPHA_INFO = VariableInfo(ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0
 
 @dataclass(frozen=True)
 class Vary:
-    """One ``--vary`` as it was written."""
-
     # ``component.parameter``, several with commas, patterns such as ``gfor*.P_0`` or ``grid.X_line_7_*``; or lines
     # whose length is multiplied, ``line_7_9, line_8_9: length``.
     key: str
@@ -56,7 +54,6 @@ class Axis:
     scale: Callable[[float], float] | None = None  # what a value comes to before that factor; itself where None
 
     def sets(self, value: Value) -> dict[str, Value]:
-        """What one of the values comes to, by ``component.variable``."""
         if not self.members:
             return {self.key: value}
         scaled = value if self.scale is None else self.scale(float(value))
@@ -90,9 +87,6 @@ def parse_vary(text: str) -> Vary:
 
 
 def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
-    """Find the variable that is varied, and its values in the variable's unit.
-
-    Raises `InputError` if there is no such variable, or if a value does not fit its type, unit or range."""
     if vary.limits is not None and not vary.count:
         raise InputError(f"--vary {vary.key}: COUNT is missing; write {_FORMS}, or search for a limit with --until")
     if ":" in vary.key:
@@ -122,7 +116,6 @@ def resolve(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
 
 
 def _joint_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
-    """Several parameters with one value."""
     keys: dict[str, None] = {}
     for part in (part.strip() for part in vary.key.split(",")):
         pattern, _, variable = part.partition(".")
@@ -213,7 +206,6 @@ def _of_line(vary: Vary, scenarios: Sequence[PreparedScenario], variable: str) -
 
 
 def refuse_doubles(axes: Sequence[Axis], scenarios: Sequence[PreparedScenario]) -> None:
-    """Refuse two axes that vary one variable."""
     names = [*dict.fromkeys(name for s in scenarios for name in s.system.components)]
     single = [replace(axis, key=key) for axis in axes for key, _ in axis.members or ((axis.key, 1.0),)]
     for one, other in itertools.combinations(single, 2):

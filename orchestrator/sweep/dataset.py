@@ -42,8 +42,6 @@ def swing_states(sweep: ScenarioSweep, patterns: list[str]) -> list[str]:
 
 
 class Samples:
-    """Figures of the trajectories, point by point."""
-
     def __init__(self, result: SweepResult) -> None:
         self.result = result
         self._curves: dict[int, Curve] = {}
@@ -54,7 +52,6 @@ class Samples:
         self.components = [*dict.fromkeys(name.partition(".")[0] for names in everything for name in names)]
 
     def of(self, sweep: ScenarioSweep, trajectory: Trajectory) -> Curve:
-        """Places of the grid, in order, with the figures of a trajectory there."""
         if id(trajectory) not in self._curves:
             self._curves[id(trajectory)] = list(self._samples(sweep, trajectory))
         return self._curves[id(trajectory)]
@@ -81,7 +78,6 @@ class Samples:
             )  # fmt: skip
 
     def setting(self, place: GridPlace) -> dict[str, float | bool]:
-        """Values of the varied parameters at a place of the grid."""
         return {axis.key: axis.values[int(i)] for axis, i in zip(self.axes, place, strict=True)}
 
 
@@ -179,7 +175,6 @@ def _attributes(samples: Samples) -> dict[str, Any]:
 
 
 def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
-    """One row for every trajectory at every point of the grid, and one for every point that failed."""
     rows = []
     units = {axis.key: f"{axis.key} [{axis.unit}]" if axis.unit else axis.key for axis in samples.axes}
     for sweep in samples.result.scenarios:
@@ -206,7 +201,6 @@ def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
 
 
 def _verdict(record: PointRecord) -> dict[str, str]:
-    """The stability of a point in a row of the table."""
     rate = record.stability.get("largest_growth_rate")
     word = "" if record.stability.get("stable") is None else str(record.stability["stable"]).lower()
     hertz = record.stability.get("frequency_hz")
@@ -222,7 +216,6 @@ def _share(shares: dict[str, float], name: str) -> str:
 
 
 def sweep_json(samples: Samples) -> dict[str, Any]:
-    """The machine-readable form of `gfor sweep`."""
     result = samples.result
     failed: dict[str, list[dict[str, Any]]] = {s.prepared.name: [] for s in result.scenarios}
     for sweep, place, error in result.failures():

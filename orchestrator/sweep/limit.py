@@ -85,10 +85,6 @@ def search(
 
 @dataclass(frozen=True)
 class ParameterLimit:
-    """How far a parameter may go in one scenario.
-
-    ``key``, ``unit``, ``title``: The parameter, and the scenario's title."""
-
     key: str
     unit: str
     scenario: str
@@ -115,7 +111,6 @@ class ParameterLimit:
 
     @property
     def sentence(self) -> str:
-        """The answer, with the figures of both sides."""
         start, stop = (self._value(self.tried[k]["value"]) for k in (0, -1))
         mode, why = (
             f": {self._mode(self.mode)}" if self.mode else "",
@@ -135,7 +130,6 @@ class ParameterLimit:
 
     @property
     def remarks(self) -> list[str]:
-        """What else is to be known."""
         shown = ", ".join(self._value(value) for value in self.again)
         again = [f"{self.title}: {self.until.holding} again at {shown}: the range is not of one piece"]
         return again * bool(self.again) + [
@@ -197,7 +191,6 @@ def _mode_json(name: str, value: complex, components: dict[str, float]) -> dict[
 
 
 def _who(mode: Mode, speeds: Sequence[str]) -> str:
-    """``sg1, sg2 against sg3``, or the components that take part most."""
     states = [name for name in mode.shape if any(fnmatch.fnmatchcase(name, pattern) for pattern in speeds)]
     together, against = (", ".join(s.partition(".")[0] for s in side) for side in mode.swing(states))
     if mode.participation_of(states) >= 0.1 and together:

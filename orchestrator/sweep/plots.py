@@ -21,7 +21,6 @@ _DASHES = ("-", "--", ":", "-.")
 
 
 def save_sweep_plots(samples: Samples, folder: Path) -> list[Path]:
-    """Draw every plot that the sweep has data for; return the paths of the files."""
     plots: list[tuple[Callable[[Samples, Path], bool], str]] = [
         (plot_trajectories, "trajectories.png"),
         (plot_named, "named_modes.png"),
@@ -109,7 +108,6 @@ def _named(samples: Samples) -> list[tuple[int, ScenarioSweep, Trajectory, Curve
 
 
 def _draw(axis: Any, samples: Samples, curve: Curve, value: Callable[[dict[str, Any]], float], **style: Any) -> None:
-    """One curve over the last axis; thick where the mode has the case's name, thin where another has it."""
     last = samples.axes[-1]
     for piece in _rows(curve):
         x = np.array([float(last.values[int(place[-1])]) for place, _ in piece])

@@ -13,8 +13,6 @@ from orchestrator.study.modes import ModesResult, compute_modes
 
 @dataclass(frozen=True)
 class PointRecord(Kept):
-    """The modes of a point, or the reason why it has no modes."""
-
     modes: ModeSet | None = None  # least damped first
     named: dict[str, int] = field(default_factory=dict)  # names that the case gives to some of these modes, by index
     failure: Failure | None = None  # why there are none; None for a point with modes
@@ -28,7 +26,6 @@ class PointRecord(Kept):
 
     @property
     def is_unstable(self) -> bool:
-        """Whether a mode is known to grow."""
         return self.stability.get("stable") is False
 
 
@@ -40,7 +37,6 @@ class SweepPointTask(Task):
 
 
 def compute_point(task: SweepPointTask) -> PointRecord:
-    """Prepare, find the steady state, linearise, find the modes."""
     return computed(task, _modes)
 
 

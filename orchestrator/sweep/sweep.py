@@ -46,17 +46,14 @@ class SweepPlan:
 
     @property
     def number_of_points(self) -> int:
-        """Points of the grid in all scenarios."""
         return len(self.scenarios) * int(np.prod([len(axis.values) for axis in self.axes]))
 
     def values(self, place: GridPlace) -> dict[str, Value]:
-        """The varied values at a place. A place between two grid points of the last axis has an interpolated value."""
         given = [axis.sets(_value_at(axis, position)) for axis, position in zip(self.axes, place, strict=True)]
         return {key: value for one in given for key, value in one.items()}
 
     @cached_property
     def studies(self) -> dict[str, StudyCase]:
-        """What the points of a scenario have in common."""
         return {one.name: StudyCase.of(one, self.layers, self.step_size) for one in self.scenarios}
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
@@ -91,7 +88,6 @@ class ScenarioSweep:
 
     @property
     def stable(self) -> bool | None:
-        """Whether every point is stable; None where a point has no verdict and none is unstable."""
         verdicts = [record.stability.get("stable") for record in self.points.values()]
         if any(verdict is False for verdict in verdicts):
             return False
@@ -118,7 +114,6 @@ class SweepResult:
 
 
 def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
-    """Check a sweep, and build the FMUs that it needs."""
     vary, until = cast("Sequence[Vary]", request.vary), cast("Until | None", request.until)
     if not vary:
         raise InputError("nothing is varied; give --vary, such as --vary grid.X_L=0.1:0.5:9, or --scr bus_9=5:1.2:5")
@@ -133,7 +128,6 @@ def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
 
 
 def _searched(vary: Sequence[Vary]) -> Vary:
-    """The one range along which a limit is searched for."""
     if len(vary) != 1:
         raise InputError(
             f"--until searches along one range, and {len(vary)} are varied; give one --vary (several parameters that "
@@ -170,9 +164,7 @@ def _check_end(plan: SweepPlan, varied: Mapping[str, Value]) -> list[Problem]:
 
 def run_sweep(plan: SweepPlan, work: Work) -> SweepResult:
     """Compute the points that are not stored yet, then follow the modes. Further points are added where a mode is not
-    recognised.
-
-    ``plan``: A plan that `plan_sweep` has checked."""
+    recognised."""
     result = SweepResult(plan, [ScenarioSweep(prepared) for prepared in plan.scenarios])
     grid = list(grid_places(plan.axes))
     wanted: list[tuple[ScenarioSweep, GridPlace]] = [(sweep, place) for sweep in result.scenarios for place in grid]

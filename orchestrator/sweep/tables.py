@@ -85,7 +85,6 @@ def limits(samples: Samples) -> list[str]:
 
 
 def _turns(samples: Samples, sweep: ScenarioSweep) -> str:
-    """Between which neighbours of a sweep over one parameter the verdict changes."""
     if len([axis for axis in samples.axes if len(axis.values) > 1]) != 1:
         return ""
     places = sorted(grid_places(samples.axes), key=lambda place: [float(v) for v in samples.setting(place).values()])
@@ -101,7 +100,6 @@ def _turns(samples: Samples, sweep: ScenarioSweep) -> str:
 
 
 def remarks(samples: Samples) -> list[str]:
-    """Sentences on points that failed, on trajectories that break, and on refining points."""
     result, texts = samples.result, [f"question: {question}" for question in samples.result.plan.idle]
     texts += [text for limit in result.limits for text in limit.remarks]
     failures = list(result.failures())

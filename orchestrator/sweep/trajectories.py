@@ -31,8 +31,6 @@ class TrajectoryPoint:
 
 @dataclass
 class Trajectory:
-    """One mode that was followed over the grid."""
-
     # the case's name for the mode, with a number if several trajectories carry this name in turn; otherwise "mode" and
     # a number
     name: str = ""
@@ -97,7 +95,6 @@ def _history(
     followed: Followed[GridPlace], modes: Mapping[GridPlace, ModeSet], first: set[GridPlace], place: GridPlace,
     index: int, frequency_range: tuple[float, float],
 ) -> tuple[float, Beginning]:  # fmt: skip
-    """Least similarity since the last grid point, and the kind of the trajectory's beginning."""
     number, refined, alike = followed.trajectory[place][index], False, 1.0
     while True:
         origin = followed.origin[place][index]

@@ -43,7 +43,6 @@ def rms(signal: Numbers) -> float:
 
 
 def rises(signal: Numbers, *, extents: bool = False) -> bool:
-    """Whether a swing grows from quarter to quarter, to far above its beginning."""
     sizes = [float(part.mean()) if extents else rms(part) for part in np.array_split(signal, 4)]
     return sizes[3] > FAR_ABOVE * sizes[0] and all(late > RISING * early for early, late in pairwise(sizes))
 

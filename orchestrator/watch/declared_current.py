@@ -18,7 +18,6 @@ _ABOVE = 1.05  # part of the declared current from which one is above it, as in 
 
 
 def above_declared(seen: Seen, system: System) -> Iterator[Finding]:
-    """The largest current over a cycle of each device that declares one."""
     cycle = round(_CYCLE / seen.interval) if seen.interval else 0
     for name, plan in system.components.items():
         described = plan.description

@@ -23,8 +23,6 @@ NOT_JUDGED: Kind = "not_judged"
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One fault of a run, with its place and time."""
-
     kind: Kind
     time: float  # when it began [s]
     # component, variable: the component and variable that show the fault most, or whose limit acts

@@ -45,7 +45,6 @@ class Limit:
         return tuple(name for name in (self.signal, derivative, self.scale) if name is not None)
 
     def needed(self) -> tuple[str, ...]:
-        """All variables that an FMU must have."""
         lead = (self.lead.time, self.lead.gain, self.lead.lag) if self.lead is not None else ()
         parameters = (self.limit, self.low, self.enabled, *lead)
         return (*self.variables(), *self.knows, *(p for p in parameters if p is not None))

@@ -71,6 +71,5 @@ def without_trend(signal: Numbers) -> Numbers:
 
 @lru_cache(maxsize=64)
 def _cubics(count: int) -> Numbers:
-    """Orthonormal columns that span the cubics."""
     basis: Numbers = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, count), 3))[0]
     return basis

@@ -100,7 +100,6 @@ def unsettled_response(
 
 
 def judgements(found: Sequence[Finding]) -> list[Finding]:
-    """The findings that are no mere remarks."""
     return [finding for finding in found if finding.kind != NOT_JUDGED]
 
 
@@ -167,7 +166,6 @@ def _component(name: str) -> str:
 
 
 def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | None:
-    """The swing of a signal, if it is large enough to be examined. The signal and its times begin with the event."""
     deviation, scale = float(np.abs(signal - signal[0]).max()), max(1.0, abs(float(signal[0])))
     rows = times >= begin
     _, middle, last = (rms(part) for part in np.array_split(signal[rows], 3))
@@ -206,7 +204,6 @@ def _pieces(times: Numbers, breaks: Sequence[float], shortest: float) -> list[ND
 
 
 def _roughness(swing: Swing) -> float:
-    """How far a signal moves from look to look, as a part of its swing: large if noise makes the swing."""
     return float(np.std(np.diff(swing.signal))) / (swing.size * swing.scale)
 
 
@@ -250,7 +247,6 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
 
 
 def _regular(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding | None:
-    """A finding, unless the oscillation decays."""
     grown = change(swing, oscillation.rate)
     if grown < -STEADY:
         return None

@@ -82,7 +82,6 @@ class _Drift:
 
     @property
     def straight(self) -> bool:
-        """Whether it does not slow down."""
         return abs(self.fourth) >= STRAIGHT * abs(self.third)
 
     @property
@@ -104,7 +103,6 @@ class _Drift:
 
 
 def speed_signals(system: System) -> list[str]:
-    """Signals that show every unit's speed."""
     return [f"{name}.{SPEED}" for name, plan in system.components.items() if SPEED in plan.description.outputs]
 
 
@@ -154,7 +152,6 @@ def _farthest(
 
 
 def _outside(times: Numbers, course: _Course, allowed: float) -> float | None:
-    """Time at which a speed leaves its band [s]; None unless it stays outside for longer than allowed or at the end."""
     far = course.on & _beyond(course.signal / course.signal[0], BAND)
     if np.isinf(allowed):  # it slips
         return float(times[int(np.argmax(far))]) if far[-1] else None
@@ -167,7 +164,6 @@ def _outside(times: Numbers, course: _Course, allowed: float) -> float | None:
 
 
 def _rated(signal: Numbers) -> float:
-    """The rated value of a speed: 1 in per unit; of one in another unit, its start."""
     return 1.0 if BAND[0] < signal[0] < BAND[1] else float(signal[0])
 
 
@@ -236,7 +232,6 @@ def _rating(system: System, name: str) -> float:
 
 
 def _drifts(times: Numbers, course: _Course, stretch: Stretch) -> bool:
-    """Whether a signal moves on and away at a rate that does not fall, on the grid, to the end of a long stretch."""
     drift = _drift(times, course, stretch, shortest=LONG)
     return drift is not None and drift.straight
 

@@ -49,7 +49,6 @@ class Seen:
 
     @property
     def interval(self) -> float:
-        """Between two looks [s]."""
         return float(self.times[1] - self.times[0]) if len(self.times) > 1 else 0.0
 
 
@@ -77,12 +76,10 @@ def rescaled(seen: Seen, misfits: Mapping[str, Sequence[Misfit]]) -> Seen:
 
 
 def is_derivative(name: str) -> bool:
-    """Whether a signal is a derivative, ``der(state)`` in FMI."""
     return name.partition(".")[2].startswith("der(")
 
 
 def unit(name: str, system: System) -> str:
-    """Unit of a signal, as its FMU declares it."""
     component, _, variable = name.partition(".")
     return system.components[component].description.variables[variable].unit
 
@@ -152,7 +149,6 @@ class Watcher:
         self._recorder.resume(rows)
 
     def seen(self, recorded: Recorder | None) -> Seen:
-        """Everything, with what was recorded besides where it was at the looks."""
         values = dict(_columns(self._recorder.names, self._recorder.values))
         distance = 0 if recorded is None else recorded.every * recorded.keep
         if recorded is not None and self.every % distance == 0:

@@ -26,7 +26,6 @@ _FEWEST = 40  # least number of looks by which a departure is judged
 
 
 def is_short(stretch: Stretch) -> bool:
-    """Whether only growth can be judged in a stretch."""
     return stretch.end - stretch.begin < SETTLING * (1 - 1e-9)
 
 

@@ -58,7 +58,6 @@ def _row(times: Numbers, time: float) -> int:
 
 
 def _noticed(times: Numbers, signals: Mapping[str, Numbers], begin: float, time: float) -> bool:
-    """Whether an event changes the course of any signal at once."""
     first, row = _row(times, begin) + 1, _row(times, time)
     start = max(first, row - _USUAL_LOOKS)
     for signal in signals.values():

@@ -9,8 +9,6 @@ KEPT = 0.7  # A swing is decaying if its last third is smaller than this part of
 
 @dataclass(frozen=True)
 class Swing:
-    """A signal that still swings at the end as it did before."""
-
     name: str
     size: float  # root mean square in the last third without the trend, relative to ``scale``
     scale: float  # 1 or the start's magnitude [the signal's unit]

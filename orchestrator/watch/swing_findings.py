@@ -13,7 +13,6 @@ _PARTS, _SHORT = 40, 0.1
 
 
 def swing_rises(swing: Swing) -> bool:
-    """Whether a swing grows from quarter to quarter of the judged part, to far above its beginning."""
     return rises(swing.signal, extents=swing.turns_hz is not None)
 
 
@@ -41,7 +40,6 @@ def growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch)
 
 
 def sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
-    """An oscillation that neither decays nor grows."""
     since = _since(swing, oscillation.frequency_hz)
     message = (
         f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to {_end(stretch)} "
@@ -70,7 +68,6 @@ def _remedy(swing: Swing, oscillation: Oscillation | None, stretch: Stretch) -> 
 
 
 def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
-    """A swing at no single frequency."""
     amplitude, since = _irregular_amplitude(swing), _since(swing, None)
     fast = ", too fast for the looks at it" if too_fast(swing.times, swing.signal) else ""
     grows = swing_rises(swing)

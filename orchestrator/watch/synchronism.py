@@ -23,7 +23,6 @@ _NAMED = 4  # largest number of a group's units that a message names
 
 
 def angle_signals(system: System) -> list[str]:
-    """Signals that show every unit's angle."""
     found = ((name, _angle_variable(system, name)) for name in system.components)
     return [f"{name}.{variable}" for name, variable in found if variable is not None]
 
@@ -89,7 +88,6 @@ class _Pair:
 
     @property
     def slips(self) -> bool:
-        """Whether the groups still slip when the run ends."""
         return self.lasts and slips_at_the_end(self.relative)
 
 
@@ -107,7 +105,6 @@ def _sides(angles: Numbers, on: NDArray[np.bool_]) -> NDArray[np.int_]:
 
 
 def _groups(sides: NDArray[np.int_]) -> list[list[int]]:
-    """Groups of units that are on the same side whenever they are on the grid."""
     groups: list[list[int]] = []
     for unit, side in enumerate(sides):
         for group in groups:
@@ -120,13 +117,11 @@ def _groups(sides: NDArray[np.int_]) -> list[list[int]]:
 
 
 def _row_apart(one: NDArray[np.int_], other: NDArray[np.int_]) -> int | None:
-    """The first row at which two units on the grid are on different sides."""
     rows = np.flatnonzero((one != other) & (one >= 0) & (other >= 0))
     return int(rows[0]) if len(rows) else None
 
 
 def _mean(angles: Numbers, on: NDArray[np.bool_]) -> Numbers:
-    """Mean angle of the units on the grid [rad], shape (n,); NaN if all units are off the grid."""
     count = on.sum(axis=0)
     total = np.where(on, angles, 0.0).sum(axis=0)
     mean: Numbers = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
@@ -142,7 +137,6 @@ def _pair(sides: NDArray[np.int_], group: Sequence[int], other: Sequence[int], r
 
 
 def _angle(seen: Seen, system: System, settings: Settings, name: str) -> Numbers:
-    """Angle in the network frame [rad], shape (n,)."""
     variable = _angle_variable(system, name)
     signal = seen.values[f"{name}.{variable}"].copy()
     if variable == _SPEED:

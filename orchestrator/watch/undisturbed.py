@@ -67,7 +67,6 @@ def _motions(seen: Seen, system: System, count: int) -> dict[str, Numbers]:
 
 
 def _is_growth(motion: Numbers) -> bool:
-    """Whether a motion rose steeply from almost 0 over several looks."""
     reached = int(np.argmax(motion >= 0.5 * motion[-1]))
     if reached == 0 or motion[reached // 2] > _STEEP * motion[reached]:
         return False

@@ -166,7 +166,6 @@ def _misfits(found: Mapping[str, Sequence[Misfit]]) -> Iterator[Finding]:
 
 
 def _failure(error: CosimError | None) -> Sequence[Finding]:
-    """The finding on a run that a component ended."""
     if not isinstance(error, ComponentError):
         return ()
     time = error.time or 0.0

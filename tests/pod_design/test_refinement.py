@@ -7,7 +7,6 @@ import pytest
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import LeadLag
 from orchestrator.pod_design.refinement import Judgement, refine
-from orchestrator.pod_design.survey import MOST_STATES
 from tests.pod_design.plant import NONE, Plant, gain_for
 
 
@@ -16,8 +15,8 @@ def content(placed):
     return Judgement(placed.damping_ratio, None)
 
 
-def refined(plant, required=0.2, filters=NONE, bounds=(0.0, 100.0), judge=content):
-    return refine(plant, plant.off, filters, required, bounds, judge, plant.modes[1:])
+def refined(plant, required=0.2, filters=NONE, bounds=(0.0, 100.0), judge=content, search=lambda: []):
+    return refine(plant, plant.off, filters, required, bounds, judge, search)
 
 
 def test_the_smallest_gain_that_meets_the_requirement():
@@ -63,29 +62,21 @@ def test_a_mode_that_takes_the_targets_name_counts_and_is_said():
 
 
 def test_a_sensitivity_that_points_aside_is_turned_by_the_lead_lag():
-    """The mode moves upwards only; with the lead/lag centred anew it moves to the left."""
+    """By itself the mode moves along the imaginary axis; with a turned lead/lag it moves to the left."""
     plant = Plant(slopes=(-0.01j,))
-    found = refined(plant, filters=LeadLag(0.0, 0.0, 2))
+    found = refined(plant, required=0.175, filters=LeadLag(0.0, 0.0, 2))
     assert found.met
-    assert found.sweeps[0].chosen.damping_ratio < 0.2
+    assert found.sweeps[0].chosen.damping_ratio < 0.15
     assert found.chosen.setting.filters.T_S1 > 0
     turned = plant.eigenvalues(found.chosen.setting)[0] - plant.modes[0]
-    assert math.degrees(abs(math.atan2(turned.imag, -turned.real))) < 45
+    assert math.degrees(abs(math.atan2(turned.imag, -turned.real))) < 65
 
 
-def test_where_nothing_near_meets_it_all_settings_are_surveyed():
-    plant = Plant(modes=(-0.4 + 4j, -1.0 + 8j), slopes=(-0.01 + 0j, 0.004 + 0j))
-    found = refined(plant, required=0.9, filters=LeadLag(0.0, 0.0, 2), bounds=(0.0, 10.0))
+def test_where_nothing_near_meets_it_the_settings_of_a_search_are_tried():
+    found = refined(Plant(), required=0.9, search=lambda: [("searched", PodSetting(60.0, NONE))])
     assert not found.met
-    assert any(note.startswith("surveyed ") for note in found.notes)
-    assert any(sweep.why.startswith("surveyed, ") for sweep in found.sweeps)
-
-
-def test_a_large_system_is_not_surveyed_and_that_is_said():
-    count = MOST_STATES // 2
-    plant = Plant(modes=(-0.4 + 4j, *([-5 + 70j] * count)), slopes=(-0.01 + 0j, *([0j] * count)))
-    found = refined(plant, required=0.9, filters=LeadLag(0.0, 0.0, 1), bounds=(0.0, 1.0))
-    assert any(f"more than {MOST_STATES}" in note for note in found.notes)
+    assert found.sweeps[-1].why == "searched"
+    assert 60.0 in [point.setting.gain for point in found.sweeps[-1].points]
 
 
 def test_gains_that_leave_the_system_unstable_are_listed():
@@ -103,7 +94,7 @@ def test_where_nothing_meets_it_the_least_of_all_modes_decides_if_no_mode_is_nam
     def judge(placed):
         return Judgement(placed.damping_ratio, None, min(-z.real / abs(z) for z in plant.eigenvalues(placed.setting)))
 
-    found = refine(plant, plant.off, NONE, 0.9, (0.0, 100.0), judge, plant.modes[1:],
+    found = refine(plant, plant.off, NONE, 0.9, (0.0, 100.0), judge,
                    lambda: [("searched", PodSetting(8.33, NONE))], evenly=evenly)  # fmt: skip
     assert not found.met
     assert found.chosen.setting.gain == pytest.approx(8.33 if evenly else 100.0)

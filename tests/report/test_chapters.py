@@ -7,7 +7,9 @@ import shutil
 import pytest
 
 from orchestrator.errors import InputError
+from orchestrator.report.html.chapters import chapters_of
 from orchestrator.report.html.page import write_report
+from orchestrator.sweep.limit import Ending, ParameterLimit, Until
 
 SHEET = {
     "controller": "pod_p", "target_mode": {"real": -0.39, "imag": 3.65}, "predicted_mode": {"real": -0.7, "imag": 3.65},
@@ -138,3 +140,14 @@ def test_a_page_tells_of_the_mode_that_the_name_was_without_the_controller(gfor,
     cells = re.sub(r"<[^>]+>", " ", (tmp_path / "page.html").read_text(encoding="utf-8")).split()
     named = [(cells[k - 3], cells[k - 2]) for k, word in enumerate(cells) if word == "electromechanical"]
     assert [pair for pair in named if pair[0] in ("gfor", "pod_p")] == [("gfor", "0.3502"), ("pod_p", "0.7257")]
+
+
+def test_the_answer_of_a_search_for_a_limit_is_on_the_page(tmp_path):
+    tried = ({"value": 2.0}, {"value": 9.0})
+    limit = ParameterLimit(
+        "grid.scr", "1", "base", "Base", Until(), Ending.FAILS, 6.87, 6.86, None, "", tried, (), "", 2.0
+    )
+    (tmp_path / "limits.json").write_text(json.dumps([limit.as_json()]), encoding="utf-8")
+    (chapter,) = chapters_of(tmp_path)
+    assert (chapter.question, chapter.answer) == ("How far may grid.scr go?", f"base: {limit.sentence}")
+    assert "6.87" in chapter.answer

@@ -28,12 +28,7 @@ def branch(
     name: str, ends: tuple[str, str], nominal: tuple[float, float], z: complex,
     to_earth: tuple[complex, complex] = (0j, 0j), rho: float = 1.0, alpha: float = 0.0,
 ) -> Branch:  # fmt: skip
-    """A branch in pu.
-
-    ``name`` and ``ends``: its name, and the buses' ids.
-    ``nominal``: nominal voltages of the buses [kV].
-    ``z`` and ``to_earth``: behind the ratio [ohm, S].
-    ``rho`` and ``alpha``: the ratio V'/V [kV/kV], and its angle [degrees]."""
+    """A branch in pu."""
     first, second = nominal
     base = second**2 / BASE_MVA
     return Branch(
@@ -42,10 +37,7 @@ def branch(
 
 
 def lines(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
-    """Lines that are closed at both ends.
-
-    ``network``: pypowsybl's.
-    ``nominal``: bus → nominal voltage [kV]; a branch that ends at another bus is out of service."""
+    """Lines that are closed at both ends."""
     for row in network.get_lines(all_attributes=True).itertuples():
         ends = row.bus1_id, row.bus2_id
         if row.connected1 and row.connected2 and all(end in nominal for end in ends):

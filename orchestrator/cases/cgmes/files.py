@@ -18,7 +18,6 @@ _HEAD = 64 * 1024  # bytes of a file in which its profile is looked for
 
 
 def load_cgmes(path: Path) -> Any:
-    """The network of a CGMES model, as pypowsybl holds it."""
     if not path.exists():
         raise InputError(f"{path}: there is no such file; give a zip or a folder with the profiles EQ, SSH, TP and SV")
     profiles = _profiles(path)

@@ -42,9 +42,7 @@ class CgmesNetwork:
 
 
 def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
-    """Read the network of a CGMES model.
-
-    ``leaving_out``: kinds of `LEFT_OUT` that the user lets go."""
+    """Read the network of a CGMES model."""
     unknown = [kind for kind in leaving_out if kind not in LEFT_OUT]
     if unknown:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}")
@@ -59,10 +57,7 @@ def _read(path: Path, versions: tuple[tuple[str, int], ...], leaving_out: tuple[
 
 
 def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
-    """Tables of a network that pypowsybl holds.
-
-    ``place``: path of its source, for messages.
-    ``leaving_out``: kinds of `LEFT_OUT` that may go."""
+    """Tables of a network that pypowsybl holds."""
     return _Reading(place, source).network(leaving_out)
 
 

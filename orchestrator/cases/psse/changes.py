@@ -19,9 +19,7 @@ _KNOWN = {"bus", "load", "fixed shunt", "generator", "branch", "system switching
 
 
 def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
-    """Note the elements that our network does not have.
-
-    ``allowed``: kinds of `LEFT_OUT` that the user lets go."""
+    """Note the elements that our network does not have."""
     unknown = [kind for kind in allowed if kind not in LEFT_OUT]
     if unknown:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown; choose from {', '.join(LEFT_OUT)}")

@@ -43,11 +43,8 @@ def machine_models(
 
     ``leaving_out``: models whose records may be left out; their generators keep what the case says of that part.
     ``replaced``: machines in whose place a converter of the case stands: they need no record.
-    ``idle``: machines of the RAW file that are out of service.
     ``approximate``: whether WECC's grid-following converters become `gfl_phasor`, which leaves a part of them out; else
-    they are refused.
-    Raises an `InputError` with every machine that has no machine record, every record of a machine that is not there,
-    every model that is unknown, and every value that our part cannot have."""
+    they are refused."""
     at = {(machine.bus, machine.name.strip()): machine for machine in machines}
     problems: list[str] = []
     parts: dict[tuple[int, str], dict[str, str]] = {key: {} for key in at}

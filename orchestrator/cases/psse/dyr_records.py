@@ -16,8 +16,6 @@ _TOKEN = re.compile(r"'([^']*)'|([^\s,'/]+)|(/)|(,)")
 
 @dataclass(frozen=True)
 class DynamicRecord:
-    """One record: ``bus 'NAME' id values … /``, with its file and line."""
-
     file: str
     line: int
     bus: int

@@ -35,13 +35,7 @@ def with_records(
     rows: Sequence[UnitRow], machines: Sequence[Machine], path: Path, leaving_out: Sequence[str],
     without: Collection[str], idle: Collection[tuple[int, str]] = (), *, approximate: bool = False,
 ) -> list[UnitRow]:  # fmt: skip
-    """The units with what the records say of them.
-
-    ``rows`` and ``machines``: in the same order.
-    ``leaving_out``: models whose records may be left out.
-    ``without``: labels of units that are converters of the case alone, and need no record.
-    ``idle``: bus and identifier of the machines that are out of service.
-    ``approximate``: whether grid-following converters become `gfl_phasor`."""
+    """The units with what the records say of them."""
     keys = [(machine.bus, machine.name.strip()) for machine in machines]
     replaced = {key for key, row in zip(keys, rows, strict=True) if row.label in without}
     models = machine_models(read_dyr(path), machines, leaving_out, replaced, idle, approximate=approximate)

@@ -49,9 +49,7 @@ def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
 
 
 def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValue]:
-    """Ask about machines without an exciter or a governor where others have one.
-
-    ``rows``: machines, with the choices of ``[units]``."""
+    """Ask about machines without an exciter or a governor where others have one."""
     for kind, quantity in _CONSTANT.items():
         able = [row for row in rows if _can_have(kind, row)]
         without = [row for row in able if kind not in row.parts and not row.partial]
@@ -72,10 +70,7 @@ def _can_have(kind: str, row: UnitRow) -> bool:
 
 
 def completed(rows: Sequence[UnitRow], replaced: Collection[str]) -> list[UnitRow]:
-    """The units with what PSS/E assumes for every part that nothing says; a record that is left out stays open.
-
-    ``rows``: with the choices of ``[units]``.
-    ``replaced``: labels of units that are converters of the case alone."""
+    """The units with what PSS/E assumes for every part that nothing says; a record that is left out stays open."""
     return [
         row if row.converter or row.partial or row.label in replaced else replace(row, parts={**_WITHOUT, **row.parts})
         for row in rows

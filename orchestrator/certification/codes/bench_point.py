@@ -32,8 +32,6 @@ class BenchResult(Kept):
 
 @dataclass(frozen=True)
 class BenchTask(Task):
-    """A row's case file."""
-
     record: ClassVar[Any] = BenchResult
     row: str
     changes: tuple[tuple[str, Value], ...] = ()  # values by ``component.variable`` that are others than the case file's
@@ -43,7 +41,6 @@ class BenchTask(Task):
 
 
 def compute_row(task: BenchTask) -> BenchResult:
-    """Run a row; a failure becomes part of the result."""
     return computed(task, row_result)
 
 

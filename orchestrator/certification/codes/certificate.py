@@ -13,8 +13,9 @@ from orchestrator.certification.codes.bench_point import BenchResult, BenchTask,
 from orchestrator.certification.codes.row import CodeRow, GridCode
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.certification.refusal import refusing
-from orchestrator.certification.request import GIVEN, CertificationRequest, shown
+from orchestrator.certification.request import GIVEN, CertificationRequest
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
+from orchestrator.fmi.values import as_text
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, Work, nobody
 from orchestrator.points.task import StudyCase
@@ -22,8 +23,6 @@ from orchestrator.points.task import StudyCase
 
 @dataclass
 class CodeCertificate(Certificate[RowVerdict]):
-    """A code's rows on the test bench."""
-
     code: GridCode
     f_n: float
     results: Mapping[str, BenchResult]
@@ -31,7 +30,7 @@ class CodeCertificate(Certificate[RowVerdict]):
     @property
     def departures(self) -> tuple[str, ...]:
         values = self.request.values
-        set_too = tuple(f"converter.{name} = {shown(values[name])}" for name in GIVEN if name in values)
+        set_too = tuple(f"converter.{name} = {as_text(values[name])}" for name in GIVEN if name in values)
         if self.f_n != self.code.f_n:
             set_too += (f"the rated frequency, {self.f_n:g} Hz in place of {self.code.f_n:g} Hz",)
         return set_too

@@ -52,7 +52,6 @@ class ChangeTask(BenchTask):
 
 
 def compute_change(task: ChangeTask) -> ChangeResult:
-    """Run and judge a changed row; a failure becomes part of the result."""
     return computed(task, _judged)
 
 

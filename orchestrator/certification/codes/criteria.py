@@ -263,7 +263,6 @@ def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
 
 
 def _power_band(name: str, begin: float, end: float, low: float | None, high: float | None) -> Band:
-    """Limits of the power [pu] from a time to another [s]."""
     lowest, highest = (None if level is None else np.full(2, level) for level in (low, high))
     return Band(name, POWER_SHOWN, lambda row: row.mean_p, np.array([begin, end]), lowest, highest)
 
@@ -280,7 +279,6 @@ def _without_spikes(row: MeasuredRow) -> Numbers:
 
 
 def _longest(mask: np.ndarray) -> int:
-    """Most values in a row that are true."""
     best = count = 0
     for value in mask.tolist():
         count = count + 1 if value else 0

@@ -48,7 +48,6 @@ class AskedStiffness:
 
     @property
     def met(self) -> bool:
-        """Whether the device is stiff enough at every measured frequency of the band."""
         return self.found >= self.value
 
     def sentence(self) -> str:
@@ -99,7 +98,6 @@ def _values(description: FmuDescription, request: CertificationRequest, f_n: flo
 
 
 def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, Any]:
-    """The figures, as JSON's types; ``f_n`` is the rated frequency [Hz]."""
     least = {
         name: dict(zip(("value", "at_hz"), found.least(values, *BAND), strict=True))
         for name, values in (("P/theta [pu/rad]", found.p_theta), ("Q/V [pu/pu]", found.q_v))
@@ -121,7 +119,6 @@ def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
 
 
 def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> list[Path]:
-    """Write ``frequency.csv``, ``frequency.json`` and ``frequency.png``."""
     table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
     rows = []
     for k, f in enumerate(found.frequencies.tolist()):

@@ -82,7 +82,6 @@ class MeasuredRow:
 
     @property
     def faults(self) -> list[str]:
-        """What the watch found that no stable system does."""
         watched = [str(f["message"]) for f in self.findings if f["kind"] in UNSTABLE]
         odd = [] if self.finite else ["the response is not finite"]
         gone = self.tripped

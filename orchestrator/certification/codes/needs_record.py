@@ -30,7 +30,6 @@ _READING = (
 
 
 def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) -> list[Path]:
-    """Write ``sensitivities.html`` and ``sensitivities.json`` beside the certificate."""
     made = datetime.now(UTC).replace(microsecond=0)
     content = {"made": made.isoformat(), **needs_json(plan, needs)}
     save_json(content, folder / NEEDS_JSON)
@@ -68,7 +67,6 @@ def _confirmed_json(c: ConfirmedChange) -> dict[str, Any]:
 
 
 def needs_table(need: CriterionNeeds, *, whole: bool = False) -> PlainTable:
-    """The table of one criterion; without what has no effect, unless ``whole``."""
     rows = [_cells(s) for s in need.sensitivities if whole or not s.idle]
     return make_table(_title(need), *_COLUMNS, rows=rows)
 
@@ -87,7 +85,6 @@ def _setting(parameter: Parameter, value: float) -> str:
 
 
 def confirmed_text(need: CriterionNeeds) -> str:
-    """What the run of the most effective change gave, as a sentence."""
     c = need.confirmed
     if c is None:
         return f"{need.row}, {need.criterion.criterion}: no parameter moves it smoothly, so that no change was tried."
@@ -102,7 +99,6 @@ def confirmed_text(need: CriterionNeeds) -> str:
 
 
 def plan_text(plan: ChangePlan) -> str:
-    """What is going to be run, and about how long it takes, as a sentence."""
     rows = ", ".join(v.row.name for v in plan.rows)
     long = f"{plan.seconds / 60:.1f} minutes" if plan.seconds >= 90 else f"{plan.seconds:.0f} s"
     return (

@@ -65,8 +65,6 @@ class BenchProgramme:
 
 @dataclass
 class _Ramps:
-    """Builds changes of the source's frequency."""
-
     rated: float
     changes: list[BenchChange] = field(default_factory=list)
     time: float = FIRST

@@ -78,7 +78,6 @@ def code_page(c: CodeCertificate, made: datetime, mark: str) -> str:
 
 
 def _pictures(c: CodeCertificate) -> str:
-    """Every row's responses, folded where it is accepted."""
     figures, parts = Figures(), []
     for v in c.verdicts:
         if content := row_pictures(v, c.results[v.row.name], c.f_n, figures):

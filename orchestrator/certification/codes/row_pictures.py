@@ -21,7 +21,6 @@ BEFORE = 0.25  # so much of the response before an event is shown beside an enve
 
 
 def row_pictures(verdict: RowVerdict, result: BenchResult, f_n: float, figures: Figures) -> str:
-    """The pictures of a row; without limits where there is no whole response."""
     if len(result.times) < 2:
         return ""
     programme = verdict.row.programme(f_n)

@@ -29,7 +29,6 @@ class RowVerdict:
 
     @property
     def failed(self) -> list[RowFinding]:
-        """The criteria that are not met; none where the code gives no verdict."""
         return [finding for finding in self.findings if finding.accepted is False]
 
     def margins(self) -> list[CriterionMargin]:

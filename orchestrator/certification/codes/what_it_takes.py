@@ -37,8 +37,6 @@ CHANGE = 0.05  # by which part of itself a parameter is changed to either side; 
 
 @dataclass(frozen=True)
 class ConfirmedChange:
-    """The most effective single change, run."""
-
     parameter: Parameter
     change: float  # relative; of 1 unit where the parameter is 0
     straight_line: float
@@ -54,8 +52,6 @@ class ConfirmedChange:
 
 @dataclass
 class CriterionNeeds:
-    """A failed criterion, and how each parameter moves its margin."""
-
     row: str
     criterion: ChangedCriterion
     sensitivities: Sequence[MarginSensitivity]
@@ -116,7 +112,6 @@ def plan_changes(
 
 
 def _why_not(info: VariableInfo, unknown: Sequence[str], named: bool) -> str:
-    """Why a parameter is not changed."""
     if info.type != "Real":
         return f"of type {info.type}"
     if info.name in unknown:
@@ -125,7 +120,6 @@ def _why_not(info: VariableInfo, unknown: Sequence[str], named: bool) -> str:
 
 
 def run_changes(plan: ChangePlan, executor: Executor, report: CountReport = nobody) -> list[CriterionNeeds]:
-    """Run the changed rows and work out the slopes; runs are kept as they come."""
     results = _computed(plan, plan.tasks, executor, report)
     found = []
     for v in plan.rows:

@@ -45,7 +45,6 @@ Content = Mapping[str, Any]
 
 
 def chapters_of(place: Path) -> list[Chapter]:
-    """The chapters of a folder, or of one JSON file, of any study but runs and sweeps."""
     files = [place] if place.is_file() else sorted(place.glob("*.json"))
     if place.is_dir() and (manifest := read_manifest(place)) is not None:
         manifest.check(file.name for file in files)
@@ -186,6 +185,12 @@ def _check(file: Path, c: Content) -> Chapter:
     )  # fmt: skip
 
 
+def _limits(file: Path, found: Any) -> Chapter:
+    answer = "; ".join(f"{x['scenario']}: {x['sentence']}" for x in found)
+    sure = f"{sum(len(x['tried']) for x in found)} values tried, then bisected"
+    return Chapter(file, f"How far may {found[0]['parameter']} go?", answer, None, sure)
+
+
 def _comparison(file: Path, signals: Any) -> Chapter:
     rows = [[escape(s["expression"]), escape(s["unit"]), f"{s['largest']:.4g}", f"{s['at']:.3f}", f"{s['rms']:.4g}"]
             for s in signals]  # fmt: skip
@@ -207,7 +212,7 @@ def _identified(file: Path, modes: Any) -> Chapter:
 
 
 _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
-    ({"device", "buses", "confirmed", "answer"}, _site),
+    ({"device", "buses", "confirmed", "answer"}, _site), ({"holds_at", "beyond", "sentence"}, _limits),
     ({"counted_at_all_frequencies", "failures", "modes"}, _screening),
     ({"controller", "target_mode", "T_S1", "verdict"}, _design),
     ({"settings", "verdict", "met", "ranking"}, _coordinated), ({"cells", "codes", "sentence"}, _matrix),
@@ -219,7 +224,6 @@ _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
 
 
 def sections(chapter: Chapter, number: int) -> str:
-    """The chapter's figures: its own, or the sections of the result's own page."""
     place = chapter.source if chapter.source.is_dir() else chapter.source.parent
     if not chapter.page or not (place / chapter.page).is_file():
         return chapter.content
@@ -231,7 +235,6 @@ def sections(chapter: Chapter, number: int) -> str:
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
-    """Question and where its results lie, answer, how sure, and what was not judged, of all chapters."""
     rows = []
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
@@ -260,7 +263,6 @@ def made(place: Path) -> list[str]:
 
 
 def changes(old: Path, chapters: Sequence[Chapter]) -> str:
-    """What changed since an older page of the same studies."""
     try:
         found = re.search(r'id="answers">(.*?)</script>', old.read_text(encoding="utf-8"), re.DOTALL)
         before = {(x["question"], x["source"]): x["answer"] for x in json.loads(found[1])} if found else None
@@ -287,7 +289,6 @@ def kept_answers(chapters: Sequence[Chapter]) -> str:
 
 
 def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
-    """Of a sweep's trajectories; its section is `studies.sweep`."""
     named = sweep["damping"].where(sweep["named"] == 1)
     least = named if bool(named.notnull().any()) else sweep["damping"]
     at = least.where(least == least.min(), drop=True)

@@ -56,7 +56,6 @@ class Frame:
         return _LEFT + across * (_WIDTH - _LEFT - _RIGHT), self.height - _BOTTOM - up * (self.height - _TOP - _BOTTOM)
 
     def svg(self, name: str, extra: str = "") -> str:
-        """The finished picture; ``name`` is read out by a screen reader."""
         right, bottom = _WIDTH - _RIGHT, self.height - _BOTTOM
         grid: list[str] = []
         named = [(float(k), escape(text)) for k, text in enumerate(self.x_names)]
@@ -88,10 +87,7 @@ class Frame:
 
 
 def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210) -> str:
-    """Curves over one axis; the pointer shows all values at its x.
-
-    ``curves``: at least one, with a point at least.
-    ``height``: of the picture [px]."""
+    """Curves over one axis; the pointer shows all values at its x."""
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
     frame = Frame(_span(x_all, 0.0), _span(y_all, 0.06), x_label, y_label, height)

@@ -12,13 +12,6 @@ _HERE = Path(__file__).parent
 def document(
     title: str, kind: str, findings: str, content: Sequence[tuple[str, str]], moment: datetime | None = None
 ) -> str:
-    """A page.
-
-    ``title``: text, for the page's head and its first line.
-    ``kind``: what sort of report it is, for the line below the title.
-    ``findings``: HTML of what a reader in a hurry should take away.
-    ``content``: heading and HTML of every section.
-    ``moment``: when it was made (UTC); now where None."""
     links = "".join(f'<a href="#section-{k}">{escape(name)}</a>' for k, (name, _) in enumerate(content))
     body = "".join(
         f'<section id="section-{k}"><h2>{escape(name)}</h2>{text}</section>' for k, (name, text) in enumerate(content)
@@ -34,7 +27,6 @@ def document(
 
 
 def _footer(title: str) -> str:
-    """The title at the foot of every printed page, beside its number."""
     safe = "".join(c if c.isalnum() or c in " .,:;()_-" else f"\\{ord(c):06x}" for c in title)
     return f'@page {{ @bottom-left {{ content: "{safe}"; }} }}'
 

@@ -10,7 +10,6 @@ COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#5
 
 
 def colour(index: int) -> str:
-    """A scenario's colour."""
     return COLOURS[index % len(COLOURS)]
 
 
@@ -27,8 +26,6 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], l
 
 
 class Figures:
-    """Counts figures, so that texts can refer to them."""
-
     def __init__(self) -> None:
         self.count = 0
 
@@ -59,7 +56,6 @@ def eigenvalue(real: float, imag: float) -> str:
 
 
 def damping(percent: float, least: float = 5.0) -> str:
-    """A damping in percent, marked where it is negative or below a limit."""
     text = number(percent, 2)
     return f'<span class="bad">{text}</span>' if percent < least else text
 

@@ -20,8 +20,6 @@ SUMMARY = "summary.json"  # what a folder of `gfor run` has, and no other
 
 @dataclass
 class Results:
-    """Contents of result folders, read as far as they are there."""
-
     folder: Path
     case: Case
     scenarios: list[dict[str, Any]]  # one summary a scenario, as in ``summary.json``
@@ -35,9 +33,6 @@ class Results:
 
 
 def read_results(folder: Path) -> Results:
-    """Read a run's folder.
-
-    Raises an `InputError` if its files are of different runs or not as they were written, or one cannot be read."""
     summary = folder / SUMMARY
     tables = ("summary.json", "case.toml", "modes.csv", "participation.csv", "step_size.csv")
     check_one_run(folder, tables, ("trajectory.nc", "linear.nc"))

@@ -30,8 +30,7 @@ Sections = list[tuple[str, str]]
 def write_report(
     folder: Path, others: Sequence[Path] = (), path: Path | None = None, against: Path | None = None
 ) -> Path:
-    """Write one file that needs no network and no other file, by default ``report.html`` in the first folder; each
-    folder or file with results is a chapter or several. Of an older page it says what changed since."""
+    """One file that needs no other, by default in the first folder; of an older page it says what changed since."""
     target = path or (folder if folder.is_dir() else folder.parent) / "report.html"
     write_text(target, page(list(dict.fromkeys([folder, *others])), against))
     return target

@@ -78,7 +78,6 @@ def _verdict_shade(stable: bool | None) -> str:
 
 
 def _answers(results: Results) -> str:
-    """One line a scenario: verdict, least damped mode, remark."""
     least = dict(_least_damped(results))
     rows = []
     for s in results.scenarios:
@@ -108,7 +107,6 @@ def _least_damped(results: Results) -> list[tuple[str, dict[str, str]]]:
 
 
 def studied(results: Results) -> str:
-    """What was studied: source of the data, scenarios, events, solver."""
     case = results.case.table
     rows = []
     for s in results.scenarios:
@@ -129,7 +127,6 @@ def studied(results: Results) -> str:
 
 
 def _isolated(results: Results) -> str:
-    """What kept foreign FMUs from the rest of the machine."""
     found = {name: tuple(p["name"] for p in listed if p["in_force"])
              for s in results.scenarios for name, listed in s.get("isolated", {}).items()}  # fmt: skip
     sentences = [
@@ -141,7 +138,6 @@ def _isolated(results: Results) -> str:
 
 
 def _linearised(results: Results) -> str:
-    """Where the linear models behind the modes come from."""
     sources: dict[str, str] = {}
     errors: dict[str, float] = {}
     for s in results.scenarios:
@@ -159,7 +155,6 @@ def _linearised(results: Results) -> str:
 
 
 def operating_point(results: Results) -> str:
-    """Residuals, and what every unit feeds."""
     rows, details = [], []
     for s in results.scenarios:
         flow = s.get("power_flow")
@@ -189,7 +184,6 @@ def operating_point(results: Results) -> str:
 
 
 def modes(results: Results, figures: Figures) -> str:
-    """Named modes beside other people's, the map, and who takes part."""
     reference = results.case.table.reference
     compared = reference is not None and any(s["references"] for s in results.scenarios)
     columns = ["Mode", "Scenario", "λ [rad/s]", "f [Hz]", "Damping [%]"]
@@ -281,7 +275,6 @@ def _participation(results: Results, figures: Figures) -> str:
 
 
 def responses(results: Results, figures: Figures) -> str:
-    """The case's plots, and what the curves say about the modes."""
     parts = [scenario_legend(results)]
     for plot in results.case.table.plots:
         charts, columns = [], []
@@ -364,7 +357,6 @@ def _ring_downs(results: Results) -> str:
 
 
 def step_sizes(results: Results) -> str:
-    """How far the communication step moves the electromechanical mode."""
     steps = sorted({float(r["step size [s]"]) for r in results.step_sizes})
     title, rows = titles(results), []
     for name in title:
@@ -378,7 +370,6 @@ def step_sizes(results: Results) -> str:
 
 
 def provenance(results: Results) -> str:
-    """Versions, FMUs, settings and the case file itself."""
     parts = []
     attributes = next((d.attrs for d in results.trajectories.values()), {})
     if attributes:

@@ -12,17 +12,14 @@ from orchestrator.report.html.elements import Figures, colour, damping, eigenval
 
 
 def axis_of(sweep: xr.Dataset) -> str:
-    """The parameter along which the trajectories run: the last one that varies."""
     return str([d for d in sweep["frequency"].dims if d not in ("scenario", "trajectory")][-1])
 
 
 def sweep_title(sweep: xr.Dataset) -> str:
-    """``Trajectories along grid.X_L``."""
     return f"Trajectories along {axis_of(sweep)}"
 
 
 def sweep(sweep: xr.Dataset, scenarios: Sequence[Mapping[str, Any]], figures: Figures) -> str:
-    """Trajectories of the modes, and damping, frequency and participation of the named ones along the parameter."""
     axis = axis_of(sweep)
     others = [d for d in sweep["frequency"].dims if d not in ("scenario", "trajectory", axis)]
     shown = sweep.isel(dict.fromkeys(others, 0))
@@ -66,7 +63,6 @@ def sweep(sweep: xr.Dataset, scenarios: Sequence[Mapping[str, Any]], figures: Fi
 
 
 def _unstable(shown: xr.Dataset, axis: str, title: dict[str, str]) -> str:
-    """Where a mode grows at any frequency, scenario by scenario."""
     if "stable" not in shown:
         return ""
     lines = []
@@ -117,7 +113,6 @@ def _highest(shown: xr.Dataset) -> float:
 
 
 def _named(shown: xr.Dataset, scenario: str, axis: str, quantity: str) -> dict[str, tuple[Any, Any]]:
-    """Along every trajectory that carries a name of the case somewhere: parameter and value."""
     one, found = shown.sel(scenario=scenario), {}
     for t in np.flatnonzero((one["named"] == 1).any(axis).values).tolist():
         values = one[quantity].isel(trajectory=t).values
@@ -137,7 +132,6 @@ def _extremes(curves: list[ChartCurve], unit: str) -> str:
 
 
 def _states(shown: xr.Dataset, axis: str, label: str, names: list[str], title: dict[str, str], figures: Figures) -> str:
-    """Participation of the swing states in the named mode, one small chart a scenario."""
     states = [str(s) for s in shown["state"].values]
     if not 0 < len(states) <= 6:
         return ""
@@ -159,12 +153,10 @@ def _states(shown: xr.Dataset, axis: str, label: str, names: list[str], title: d
 
 
 def design_title(sheet: dict[str, Any]) -> str:
-    """``Design of pod_p``."""
     return f"Design of {sheet['controller']}"
 
 
 def design(sheet: dict[str, Any]) -> str:
-    """The calculation sheet of a POD design, step by step."""
     sensitivity, target = sheet["sensitivity"], sheet["target_mode"]
     modes = {"Target, POD off": target, "Predicted": sheet["predicted_mode"], "Achieved": sheet["achieved_mode"]}
     settings = [

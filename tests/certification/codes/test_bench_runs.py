@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 import orchestrator as gfor
+from orchestrator.certification.anew import ROWS, chosen_rows
 from orchestrator.certification.codes import bench_point
 from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_case import case_name
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.codes.ercot import ERCOT
-from orchestrator.certification.codes.rows_anew import chosen_rows, verify_rows
 from orchestrator.certification.files import save
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.verification import read_certificate, verify_files
@@ -80,10 +80,10 @@ def test_ours_meets_the_jump_is_kept_and_its_certificate_verifies(converter, tmp
     assert "row phase_jumps, computed anew: its response, and its criteria" in said
     other = deepcopy(content)
     other["rows"][0]["findings"] = [{"kind": "loss_of_synchronism", "time": 2.0, "message": ""}]
-    (fault,) = verify_rows(folder, other, ["phase_jumps"], Serial()).faults
+    (fault,) = ROWS.verify(folder, other, ["phase_jumps"], Serial()).faults
     assert fault == "row phase_jumps: the watch finds nothing, and loss of synchronism was certified"
     other["values"] = {"droop.R_f": 0.1}
-    (fault,) = verify_rows(folder, other, ["phase_jumps"], Serial()).faults
+    (fault,) = ROWS.verify(folder, other, ["phase_jumps"], Serial()).faults
     assert "not what the table of ercot and the certified values give" in fault
     other["values"], other["f_n"] = {"S_n": 50.0}, 50.0
     assert "'departures' is" in " ".join(verify_files(folder, other).faults)
