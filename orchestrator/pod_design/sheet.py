@@ -182,10 +182,7 @@ def verdict(d: PodDesign) -> str:
             "--gain-bounds, choose another controller, or see with --refine what is within reach"
         )
     elif d.active_bound == "lower":
-        text += (
-            f"; the sensitivity asks for {d.unbounded_gain:.4g} pu, and the lower bound of the gain is more and not "
-            "enough: see with --refine what is"
-        )
+        text += "; more gain than the sensitivity asks for does not help here: see with --refine what does"
     else:
         text += "; the sensitivity at ΔK does not hold as far as the mode has to move: use --refine"
     return text
