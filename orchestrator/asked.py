@@ -196,24 +196,20 @@ def frequency_range(given: Any, argument: str = "frequencies") -> tuple[float, f
 
 
 def read_part(rule: str, least: float, most: float) -> Callable[[str], float]:
-    """What reads percent, ``20`` or ``20%``, as a ratio."""
+    """What reads percent, ``20`` or ``20%``, as a ratio; a bare number below 1 looks like a ratio and is refused."""
 
     def read(text: str) -> float:
         number = as_number(text.strip().removesuffix("%"))
         if not least <= number <= most:
             raise ValueError(f"{text!r} is not {rule}")
-        refuse_ratio(text, number)
+        if 0 < number < 1 and "%" not in text:
+            raise ValueError(
+                f"{text!r} is read in percent; write {100 * number:g} for a ratio of {number:g}, or {text}% if so "
+                "little is meant"
+            )
         return number / 100
 
     return read
-
-
-def refuse_ratio(text: str, number: float) -> None:
-    if 0 < number < 1 and "%" not in text:
-        raise ValueError(
-            f"{text!r} is read in percent; write {100 * number:g} for a ratio of {number:g}, or {text}% if so little "
-            "is meant"
-        )
 
 
 def read_percent(text: str, most: float = 90) -> float:

@@ -137,7 +137,9 @@ def judge(
         faults = [f"the study failed with the converter: {having.failure}"]
     modes: tuple[ModeVerdict, ...] = ()
     beside: tuple[ModeVerdict, ...] = ()
-    critical = None if lacking.modes is None else critical_mode(lacking.modes)
+    critical, unknown = None if lacking.modes is None else critical_mode(lacking.modes), not_judged(having.findings)
+    if having.stability and having.stability["stable"] is None:
+        unknown = f"nothing shows that the system with the converter is stable: {having.stability['sentence']}"
     if having.modes is not None and lacking.modes is not None:
         matched = list(matched_modes(having.modes, lacking.modes, having.components) if known is None else known)
         modes, beside = tuple(judged_modes(matched)), tuple(neighbouring_modes(matched))
@@ -152,8 +154,7 @@ def judge(
         faults.append(f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}")
     if time is None and not having.failure:
         faults.append(f"there is no response of {signal}")
-    unknown = "" if faults else not_judged(having.findings)
-    return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside, unknown, critical)
+    return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside, "" if faults else unknown, critical)
 
 
 def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:

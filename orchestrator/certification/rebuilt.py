@@ -134,6 +134,9 @@ def _verdict(point: dict[str, Any], having: PointResult, lacking: PointResult, p
     if point["time"] is None and (faults or unknown):
         return replace(again, time=None, faults=faults, unknown=unknown)
     same = (bool(again.faults), bool(again.unknown)) == (bool(faults), bool(unknown))
+    stability = having.stability or {"stable": True}
+    if again.unknown and faults and not unknown and stability["stable"] is None:
+        same = True  # until 0.3 a point whose stability is not known was one that fails
     return replace(again, faults=faults, unknown=unknown) if same else again
 
 

@@ -28,7 +28,8 @@ the likenesses is largest; a mode without a partner of at least 0.5 counts as in
 like, it is named, and the better damped of both counts for a mode below 5 %. A mode from 0.1 to 1.5 Hz has no partner
 below 0.08 or above 1.875 Hz.</li>
 <li>An eigenvalue that grows, at whatever frequency, is not accepted where none grew without the converter; nor one
-that grows without a communication step and is hidden by it.</li>
+that grows without a communication step and is hidden by it. A point at which it is not known whether the system is
+stable is not judged.</li>
 <li>{watched}</li>
 <li>What is faster than 5 Hz is taken out of the signal first (Butterworth of order 4, forth and back): the norm judges
 modes up to 1.5 Hz.</li>

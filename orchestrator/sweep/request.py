@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
-from orchestrator.asked import FieldKind, Names, asked, plain_value, refuse_ratio
+from orchestrator.asked import FieldKind, Names, asked, plain_value
 from orchestrator.cases.given import check_case_name
 from orchestrator.errors import InputError
 from orchestrator.points.request import OverCluster, of_frequencies, of_scenarios, of_values
@@ -24,7 +24,6 @@ def read_until(text: str) -> Until:
         damping = -1.0
     if not 0 < damping < 100:
         raise ValueError(f"{text!r} is none; give 'unstable', or a damping from 0 to 100 % such as '5 %'")
-    refuse_ratio(text, damping)
     return Until(damping)
 
 
@@ -38,6 +37,7 @@ def _until(given: Any, argument: str) -> Until | None:
 
 
 def _varied(vary: Any, argument: str) -> tuple[Vary, ...]:
+    """What is varied, from values by name, from texts, or as it was read already."""
     if isinstance(vary, Mapping):
         if wrong := [key for key in vary if not isinstance(key, str)]:
             raise InputError(f"{argument}: {wrong[0]!r} is not a name; give values by name, {_HOW}")

@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.certification.files import figures_hash, write_sealed
+from orchestrator.certification.rebuilt import rebuilt
 from orchestrator.safe_files import file_hash
 
 ISSUED = Path(__file__).parent / "issued"
@@ -37,6 +38,18 @@ def verified(gfor, folder):
 @pytest.mark.parametrize("name", VERDICTS)
 def test_what_was_issued_holds(issued, gfor, name):
     assert verified(gfor, issued(name)) == (3, [])
+
+
+def test_a_point_of_unknown_stability_failed_and_still_does(issued):
+    """Until 0.3 such a point was not accepted; now it is not judged."""
+    folder = issued("nts631_of_0_2")
+    content = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
+    (point,) = content["points"]
+    point["stability"]["with"] = {"stable": None, "sentence": "not known: it answers otherwise"}
+    with xr.open_dataset(folder / "responses.nc", engine="scipy") as data:
+        assert rebuilt(folder, content, data).verdicts[0].unknown
+        point["faults"] = ["nothing shows that the system is stable"]
+        assert rebuilt(folder, content, data).verdict == "fails"
 
 
 def forged(folder, content):
