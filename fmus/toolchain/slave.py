@@ -10,6 +10,7 @@ master takes no log, the first such step writes it to the standard error stream.
 the constructor: there a failure must make fmi2Instantiate return NULL."""
 
 import ctypes
+import functools
 import importlib
 import json
 import math
@@ -24,7 +25,6 @@ from pythonfmu.enums import Fmi2Status
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = range(4)
 MOST_PARTS = 1_000_000  # internal steps in one communication step
 LOGGING = ctypes.sizeof(ctypes.c_void_p)  # where the wrapper's logger, a C++ object, says whether it logs
-LONG = 64  # from here on it pays to see whether value references follow each other
 PLATFORMS = {
     ("linux", "x86_64"): ("linux64", ".so"),
     ("win32", "amd64"): ("win64", ".dll"),
@@ -33,6 +33,14 @@ PLATFORMS = {
 }
 POINTER = ctypes.c_void_p
 DAMAGED = "resources/tape.bin is damaged ({}); build or copy the FMU again"
+
+
+def rising(references):
+    """Value references, of which there is one at least, if they rise by one each, as those of all states do."""
+    if references[-1] - references[0] != len(references) - 1:
+        return None
+    row = list(range(references[0], references[-1] + 1))
+    return row if references == row else None
 
 
 class Slave(Fmi2Slave):
@@ -72,7 +80,8 @@ class Slave(Fmi2Slave):
         self._failure = None
         self._outputs_stale = True
         self._parameters_changed = True
-        self._step_size, self._parts = 0.0, 1
+        self._step_size = self._of = None  # the size that the next step may have without a further look
+        self._read = self._written = None  # value references that were seen to follow each other, of _row and _entry
         self._load_kernel(resources, model["kernel_module"])
 
     def _load_kernel(self, resources, python_kernel):
@@ -93,7 +102,8 @@ class Slave(Fmi2Slave):
             self._kernel = evaluated.Kernel(content, len(self._names))
         except ValueError as error:
             raise ValueError(DAMAGED.format(error)) from error
-        self._advance, self._workspace_address = self._kernel.advance, None
+        advance, z = self._kernel.advance, self._z  # an instance that held itself would stay in memory
+        self._advance = lambda h, n: functools.partial(advance, z, h, n, None)
         self._arguments, self._margins_address = (self._z,), self._margins
 
     def _use_compiled(self, kernel, _):
@@ -115,10 +125,10 @@ class Slave(Fmi2Slave):
 
     def _use(self, kernel, workspace, *further):
         """``further``: arguments of its functions behind the variables."""
-        # Addresses, not arrays: a plain integer argument is the cheapest call.
-        self._kernel, self._advance, self._workspace = kernel, kernel.advance, workspace
-        kernel.advance.argtypes = [POINTER, ctypes.c_double, ctypes.c_int, POINTER]
-        self._workspace_address = ctypes.addressof(workspace)
+        # The cheapest call is one of objects without a prototype, then one of addresses as integers.
+        self._kernel, self._workspace, advance = kernel, workspace, kernel["advance"]
+        z, own = POINTER(ctypes.addressof(self._z)), POINTER(ctypes.addressof(workspace))
+        self._advance = lambda h, n: functools.partial(advance, z, ctypes.c_double(h), ctypes.c_int(n), own)
         self._arguments = (ctypes.addressof(self._z), *further)
         for function in (kernel.initialise, kernel.outputs, kernel.derivatives, kernel.requirements):
             function.argtypes, function.restype = [POINTER] * len(self._arguments), None
@@ -139,8 +149,7 @@ class Slave(Fmi2Slave):
 
     def _fail(self, text):
         """Report a problem after which no step may succeed."""
-        if self._failure is None:
-            self._failure = text
+        self._failure, self._step_size = self._failure or text, None
         self._report(text)
 
     def _discard(self, text, reported=False):
@@ -161,7 +170,7 @@ class Slave(Fmi2Slave):
     # -- life cycle ------------------------------------------------------------------------------
 
     def enter_initialization_mode(self):
-        self._phase = INITIALISING
+        self._phase, self._step_size = INITIALISING, None
 
     def exit_initialization_mode(self):
         try:
@@ -177,35 +186,42 @@ class Slave(Fmi2Slave):
 
     def do_step(self, current_time, step_size):
         try:
-            if self._failure is not None:
-                return self._discard(self._failure)
-            if self._phase != STEPPING:
-                return self._discard("fmi2DoStep is allowed only between initialisation and fmi2Terminate")
-            if step_size != self._step_size or not step_size > 0.0:
-                longest = MOST_PARTS * self._z[self._internal_step]
-                if not 0.0 < step_size <= longest:
-                    return self._discard(
-                        f"communication step size {step_size!r} s; it must exceed 0 and be at most {longest:g} s"
-                    )
-                self._step_size = step_size
-                self._parts = max(1, math.ceil(step_size / self._z[self._internal_step] - 1e-9))
-            if self._parameters_changed:
-                self._check_requirements()
-                self._parameters_changed = False
-                if self._failure is not None:
-                    return self._discard(self._failure, reported=True)
-            status = self._advance(self._arguments[0], step_size / self._parts, self._parts, self._workspace_address)
+            if step_size != self._step_size and not self._begin(step_size):
+                return False
+            status = self._again()
             self._outputs_stale = False
-            if status:
-                self._failure = self._describe_divergence(status - 1, current_time)
-                return self._discard(self._failure)
-            return True
+            if not status:
+                return True
+            self._failure = self._describe_divergence(status - 1, current_time)
         except Exception as error:
             self._failure = f"step from {current_time} s failed: {error!r}"
+        self._step_size = None
+        return self._discard(self._failure)
+
+    def _begin(self, step_size):
+        """Whether a step may have this size, now that something is not as it was in the last one."""
+        if self._failure is not None:
             return self._discard(self._failure)
+        if self._phase != STEPPING:
+            return self._discard("fmi2DoStep is allowed only between initialisation and fmi2Terminate")
+        longest = MOST_PARTS * self._z[self._internal_step]
+        if not 0.0 < step_size <= longest:
+            return self._discard(
+                f"communication step size {step_size!r} s; it must exceed 0 and be at most {longest:g} s"
+            )
+        if self._parameters_changed:
+            self._check_requirements()
+            self._parameters_changed = False
+            if self._failure is not None:
+                return self._discard(self._failure, reported=True)
+        parts = max(1, math.ceil(step_size / self._z[self._internal_step] - 1e-9))
+        if self._of != (step_size, parts):
+            self._of, self._again = (step_size, parts), self._advance(step_size / parts, parts)
+        self._step_size = step_size
+        return True
 
     def terminate(self):
-        self._phase = TERMINATED
+        self._phase, self._step_size = TERMINATED, None
 
     def _describe_divergence(self, state, time):
         inputs = range(self._first_input, self._first_state)
@@ -229,10 +245,11 @@ class Slave(Fmi2Slave):
         try:
             if self._outputs_stale:
                 self._refresh()
-            if len(vrs) > LONG and vrs[-1] < self._first_derivative:
-                first, end = vrs[0], vrs[0] + len(vrs)
-                if first >= 0 and vrs == list(range(first, end)):
-                    return self._z[first:end]  # such as all states at once
+            if vrs == self._read:
+                return self._z[self._row]
+            if vrs and vrs[0] >= 0 and vrs[-1] < self._first_derivative and (row := rising(vrs)):
+                self._read, self._row = row, slice(vrs[0], vrs[-1] + 1)
+                return self._z[self._row]
             if vrs and max(vrs) >= self._first_derivative:
                 self._kernel.derivatives(*self._arguments)
             if vrs and min(vrs) < 0:  # references above 2**31 arrive so, and Python would count from the end
@@ -246,11 +263,17 @@ class Slave(Fmi2Slave):
     def set_real(self, vrs, values):
         try:
             z, first, end = self._z, self._first_input, self._first_state
-            for reference, value in zip(vrs, values):
-                if first <= reference < end:
-                    z[reference] = value
-                else:
-                    self._set_guarded(reference, value, "Real")
+            if vrs == self._written:
+                z[self._entry] = values
+            elif vrs and first <= vrs[0] and vrs[-1] < end and (row := rising(vrs)):
+                self._written, self._entry = row, slice(vrs[0], vrs[-1] + 1)
+                z[self._entry] = values
+            else:
+                for reference, value in zip(vrs, values):
+                    if first <= reference < end:
+                        z[reference] = value
+                    else:
+                        self._set_guarded(reference, value, "Real")
             self._outputs_stale = True
         except Exception as error:
             self._fail(f"setting value references {list(vrs)} failed: {error!r}")
@@ -320,7 +343,7 @@ class Slave(Fmi2Slave):
         else:
             self._z[reference] = value
             self._parameters_changed = True
-            self._step_size = 0.0  # internal_step may be what changed
+            self._step_size = None  # internal_step may be what changed
 
     # -- state -----------------------------------------------------------------------------------
 
@@ -337,7 +360,7 @@ class Slave(Fmi2Slave):
             return
         self._phase, self._parameters_changed = state[16], bool(state[17])
         ctypes.memmove(self._z, state[18:], ctypes.sizeof(self._z))
-        self._outputs_stale, self._step_size, self._failure = True, 0.0, None
+        self._outputs_stale, self._step_size, self._failure = True, None, None
 
     @staticmethod
     def _fmu_state_to_bytes(state):

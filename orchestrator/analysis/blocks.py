@@ -39,6 +39,7 @@ class Blocks:
     ``without_step``: For `continuous`: components that know the step are given 0 meanwhile.
     ``directional``: Take the FMUs' own directional derivatives instead of perturbing them.
     ``known``: Components whose linear model is known already, such as an identified one; they are not perturbed.
+    ``once``: Perturb with one size alone, for a search whose result is verified; see `perturb`.
     ``schedule``: That the step maps will be composed for; the master's by default. Where its inputs follow straight
     lines, components are linearised over a part of the step, and not told the step.
 
@@ -49,11 +50,12 @@ class Blocks:
         self, master: Master, step_size: float | None = None, inputs: Sequence[str] = (), outputs: Sequence[str] = (),
         *, derivatives: bool = False, without_step: bool = False, directional: bool = False,
         known: Mapping[str, ComponentLinearization] | None = None, schedule: Schedule | None = None,
+        once: bool = False,
     ) -> None:  # fmt: skip
         known = known or {}
         schedule = schedule or master.schedule
         self._step_aware = [name for name in master.components if knows_step(master, name)]
-        self._without_step, self.directional = without_step, directional
+        self._without_step, self.directional, self._once = without_step, directional, once
         self._untold = without_step or schedule.is_second_order
         self._derivatives = without_step or (derivatives and (self._untold or not self._step_aware))
         self.step_size = step_size or master.clock.step_size
@@ -132,6 +134,7 @@ class Blocks:
         return linearize_within(
             master, name, self.step_size / self.parts, self._driven[name], self._observed[name],
             derivatives=self._derivatives, without_step=self._untold, directional=self.directional, idle=idle,
+            once=self._once,
         )  # fmt: skip
 
     def check_made_for(self, schedule: Schedule | None) -> None:
@@ -195,13 +198,16 @@ class Blocks:
 def linearize_within(
     master: Master, name: str, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (), *,
     derivatives: bool = False, without_step: bool = False, directional: bool = False, idle: Collection[str] = (),
+    once: bool = False,
 ) -> ComponentLinearization:  # fmt: skip
     """Linearise one component of a running system, which is given the step [s] meanwhile if it knows the step."""
     exchange, time = master.exchanges[name], master.time
     with other_step(master, name, 0.0 if without_step else step_size):
         if directional:
             return linearize_by_derivatives(exchange, time, step_size, inputs, observed)
-        return linearize_component(exchange, time, step_size, inputs, observed, derivatives=derivatives, idle=idle)
+        return linearize_component(
+            exchange, time, step_size, inputs, observed, derivatives=derivatives, idle=idle, once=once
+        )
 
 
 def _has_many_inputs(master: Master, name: str) -> bool:

@@ -66,14 +66,15 @@ class ComponentLinearization:
 
 def linearize_component(
     exchange: Exchange, time: float, step_size: float, inputs: Sequence[str] = (), observed: Sequence[str] = (), *,
-    derivatives: bool = False, idle: Collection[str] = (),
+    derivatives: bool = False, idle: Collection[str] = (), once: bool = False,
 ) -> ComponentLinearization:  # fmt: skip
     """Perturb one component around its present state, and restore that state.
 
     Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
 
     ``derivatives``: also difference the FMU's own derivatives, if it declares them; it costs a third more.
-    ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0."""
+    ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0.
+    ``once``: as `perturb`."""
     component = exchange.component
     StateAccess(component)  # refuses a component that can neither be perturbed nor has a model inside
     if (inside := embedded_model(component)) is not None:
@@ -84,7 +85,7 @@ def linearize_component(
     entries = (*exchange.inputs.names, *inputs)
     exits = (*exchange.outputs.names, *observed)
     moved = [k for k, name in enumerate(entries) if name not in idle]
-    found = perturb(PerturbedStep(component, [entries[k] for k in moved], exits, time, step_size), rates)
+    found = perturb(PerturbedStep(component, [entries[k] for k in moved], exits, time, step_size), rates, once=once)
 
     def by_input(answers: Matrix) -> Matrix:
         if len(moved) == len(entries):

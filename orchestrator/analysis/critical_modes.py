@@ -44,6 +44,9 @@ _KEPT = 100
 """Least number of vectors that Arnoldi's method keeps. With 50 it begins anew more often, and solves a fifth more
 equations (299 buses, 0.1 to 2 Hz)."""
 
+_KEPT_FOR_ONE = 30
+"""The same where only the eigenvalue nearest to the point is looked for, mostly next to it."""
+
 _TOLERANCE = 1e-9
 """Of Arnoldi's method, relative. The last digits of eigenvalues at the rim, which crowd, cost most of its equations;
 eigenvalues inside have settled far beyond it by then."""
@@ -95,7 +98,7 @@ def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
     if len(model.names) <= DENSE:
         values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
         return complex(values[np.argmin(np.abs(values - wanted))])
-    values = Search(model, wanted).nearest(2)
+    values = Search(model, wanted).nearest(2, _KEPT_FOR_ONE)
     return complex(values[np.argmin(np.abs(values - wanted))])
 
 
@@ -190,9 +193,9 @@ class Search:
         self._right = np.zeros((len(model.names), 0), dtype=complex)
         self._blocks: BlockArnoldi | None = None
 
-    def nearest(self, count: int) -> NDArray[np.complex128]:
+    def nearest(self, count: int, kept: int = _KEPT) -> NDArray[np.complex128]:
         self._blocks = None
-        nu, self._right = self._arnoldi(self._solver.solve, count)
+        nu, self._right = self._arnoldi(self._solver.solve, count, kept)
         self._values = self._to_lambda(nu)
         self.reach = float(1 / np.abs(nu).min())
         return self._values
@@ -284,13 +287,13 @@ class Search:
             f"the search for modes around {self.centre:.3g} rad/s does not converge; compute the full spectrum"
         )
 
-    def _arnoldi(self, solve: Callable[[Vector], Vector], count: int) -> tuple[Vector, Vector]:
+    def _arnoldi(self, solve: Callable[[Vector], Vector], count: int, kept: int = _KEPT) -> tuple[Vector, Vector]:
         n = len(self._model.names)
         start = np.random.default_rng(0).standard_normal(n).astype(complex)  # the same search gives the same answer
         inverse = spla.LinearOperator((n, n), matvec=solve, dtype=complex)
         try:
             with one_thread():
-                nu, vectors = spla.eigs(inverse, k=count, ncv=min(n, max(_KEPT, 2 * count + 10)), v0=start,
+                nu, vectors = spla.eigs(inverse, k=count, ncv=min(n, max(kept, 2 * count + 10)), v0=start,
                                       tol=_TOLERANCE)  # fmt: skip
         except spla.ArpackNoConvergence as error:
             raise self._not_converging from error

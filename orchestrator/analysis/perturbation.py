@@ -36,12 +36,17 @@ class PerturbationResult:
     doubtful: tuple[str, ...]
 
 
-def perturb(step: PerturbedStep, rates: Sequence[str]) -> PerturbationResult:
+def perturb(step: PerturbedStep, rates: Sequence[str], *, once: bool = False) -> PerturbationResult:
     """Perturb every state and input, with smaller sizes where two sizes disagree.
 
-    What answers differently up and down keeps the answer upwards of the usual size: a limit is that close."""
+    What answers differently up and down keeps the answer upwards of the usual size: a limit is that close.
+
+    ``once``: with the usual size alone, for a direction to search in; nothing is known to agree then."""
     names, h = step.names, step.step_size
     columns: Sequence[int] = range(len(names))
+    if once:
+        alone = step.differences(columns, PERTURBATIONS[0], rates)
+        return PerturbationResult(alone, alone, alone, {}, step.names)
     found: tuple[Differences, Differences] | None = None
     one_sided = np.zeros(len(names), dtype=bool)
     narrow: dict[str, float] = {}

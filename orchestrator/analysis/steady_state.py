@@ -47,14 +47,18 @@ def find_operating_point(
     x = state.read()
     change = state.step_from(x) - x
     first = residual = _largest(change)
-    iterations = 0
+    iterations, once = 0, True  # one size of perturbation, unless its direction is worth little: a limit is close
     while residual > accept and iterations < max_iterations:
-        candidate = x + _newton_correction(master, len(x), change)
+        candidate = x + _newton_correction(master, len(x), change, once=once)
         state.write(candidate)
         new_change = state.step_from(candidate) - candidate
         if not _largest(new_change) < residual:
             state.write(x)
-            break
+            if not once:
+                break
+            once = False
+            continue
+        once = once and _largest(new_change) < residual / 10
         x, change, residual = candidate, new_change, _largest(new_change)
         iterations += 1
     names = [f"{name}.{s}" for name, c in master.components.items() for s in c.description.states]
@@ -116,10 +120,10 @@ def _largest(change: Matrix) -> float:
     return float(np.abs(change).max(initial=0.0))
 
 
-def _newton_correction(master: Master, n: int, change: Matrix) -> Matrix:
+def _newton_correction(master: Master, n: int, change: Matrix, *, once: bool) -> Matrix:
     """Solve (I − A)·dx = change. Outputs that the exchange holds follow from the states."""
     schedule = gauss_seidel(master.schedule.groups)
-    model = compose(Blocks(master, schedule=schedule), schedule)
+    model = compose(Blocks(master, schedule=schedule, once=once), schedule)
     right = np.zeros(len(model.names))
     right[:n] = change
     # A turn of all angles changes nothing, so I − A is singular. The shift keeps the solution from moving along it.

@@ -2,6 +2,7 @@
 
 import pytest
 
+from orchestrator.analysis import steady_state
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
@@ -36,6 +37,18 @@ def test_a_wrong_start_is_moved_to_the_fixed_point_even_of_an_unstable_system():
         assert point.iterations >= 1
         assert point.residual < 1e-12
         assert find_operating_point(master).iterations == 0
+
+
+@pytest.mark.parametrize("worth", [-1.0, 0.3])  # of the direction that one size of perturbation gives
+def test_a_direction_that_a_limit_spoils_is_taken_anew(worth, monkeypatch):
+    exact = steady_state._newton_correction
+
+    def spoilt(*arguments, once):
+        return exact(*arguments, once=once) * (worth if once else 1.0)
+
+    monkeypatch.setattr(steady_state, "_newton_correction", spoilt)
+    with master_of("base", {"sg2.theta_0": 0.05}) as master:
+        assert find_operating_point(master).residual < 1e-12
 
 
 def test_where_power_does_not_balance_at_rated_frequency_there_is_no_fixed_point():

@@ -438,3 +438,46 @@ def test_a_step_of_more_parts_than_a_c_int_holds_is_refused(slave_class):
     slave.exit_initialization_mode()
     slave.set_real([slave._first_input], [0.9])
     assert slave.do_step(0.0, 2**32 * H) is False
+
+
+def test_what_a_slave_remembers_of_earlier_calls_changes_nothing(slave_class):
+    def told(forgetful):
+        slave, found = slave_class(), []
+        new = slave._get_fmu_state()
+        slave.enter_initialization_mode()
+        slave.exit_initialization_mode()
+        u, y, time = slave._first_input, slave._first_output, slave._names.index("pod_p.T_S2")
+        sound = slave._get_fmu_state()
+
+        def done(call, *arguments):
+            if forgetful:
+                slave._read = slave._written = slave._step_size = slave._of = None
+            found.append((call, getattr(slave, call)(*arguments), bytes(slave._z)))
+
+        def steps():
+            for size in (H, 7 * H, H):
+                done("set_real", [u, u + 1], [1.01, 0.02])
+                done("set_real", [u + 1, u], [0.01, 0.99])
+                done("do_step", 0.0, size)
+                for row in ([y, y + 1], [y + 1, y + 2], [y + 1, y], [y, y + 2]):
+                    done("get_real", row)
+
+        steps()
+        for call, *arguments in (
+            ("set_real", [time], [0.2]),
+            ("set_real", [time], [H / 10]),  # a rule is broken, which is found in the step
+            ("_set_fmu_state", sound),
+            ("set_real", [time], [math.nan]),
+            ("_set_fmu_state", sound),
+            ("_set_fmu_state", new),
+            ("_set_fmu_state", sound),
+            ("terminate",),
+        ):
+            done(call, *arguments)
+            steps()
+        return found
+
+    forgetful = told(forgetful=True)
+    runs = [what for call, what, _ in forgetful if call == "do_step"]
+    assert runs[::3] == [True, True, False, True, False, True, False, True, False]
+    assert told(forgetful=False) == forgetful
