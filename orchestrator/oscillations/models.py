@@ -21,6 +21,7 @@ _CERTAIN = 3.0  # standard errors by which a deviation must exceed zero
 _EXPLAINED = 0.4  # part of all voltages' swing that a place may leave unexplained
 _SHARE = 0.8  # of the squares of all unexplained currents that one unit must have
 _CONTRARY = 0.2  # what the deviation of another unit does, from which on no single place is named
+_NOTED = 0.05  # the same, from which on it is told
 _CLEARER = 0.6  # what the best place leaves beside what the second best does
 
 
@@ -64,11 +65,15 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
     """The unit whose current is not what its model makes of its voltage, where that drives what all voltages do.
 
     Where all that are observed do as their models: the bus that is not, or the load, that explains the voltages."""
-    places = [p for p in measured.places if p.kind == "unit" and _fits(models.units.get(p.name), p, measured.base)]
+    units = {name.casefold(): unit for name, unit in models.units.items()}
+    seen = [p for p in measured.places if p.kind == "unit" and p.name.casefold() in units]
+    places = [p for p in seen if _fits(units[p.name.casefold()], p, measured.base)]
     if not places:
-        return Opinion(OWN_MODEL, None, False, "no unit is at the operating point of its model", ())
+        off = ", ".join(p.name for p in seen)
+        why = f"the power of {off} is not what the case has there" if off else "no unit of the case is in the record"
+        return Opinion(OWN_MODEL, None, False, f"{why} (units: {', '.join(models.units)})", ())
     names = [p.name for p in places]
-    s, known = 2j * np.pi * found.frequency, [models.units[name] for name in names]
+    s, known = 2j * np.pi * found.frequency, [units[name.casefold()] for name in names]
     means = np.array([complex(p.p.mean(), p.q.mean()) / measured.base for p in places])
     own = [_frame(u.voltage).T @ u.admittance.at(s) @ _frame(u.voltage) for u in known]
     size = np.array([abs(unit.voltage) for unit in known])
@@ -104,7 +109,8 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
     def best(there: Complex) -> float:
         return left(voltages - there @ np.linalg.lstsq(there, voltages, rcond=None)[0])
 
-    further = _elsewhere(models, names) if len(set(rows)) > 1 else {}
+    unseen = {n: u for n, u in models.units.items() if n.casefold() not in {name.casefold() for name in names}}
+    further = {**{u.bus: u.reach for u in unseen.values()}, **models.loads} if len(set(rows)) > 1 else {}
     rivals = {name: best(reach(response)) for name, response in further.items()}
     beside = min((x for name, x in rivals.items() if name != known[top].bus), default=1.0)
     rest, parts = left(voltages - effects[top]), [left(effect) for effect in effects]
@@ -112,29 +118,22 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
     if alone and rest < _EXPLAINED and best(reach(known[top].reach)) <= beside:
         why = (f"{names[top]} gives a current that its own linear model does not, and that explains "
                f"{100 * (1 - rest):.0f} % of what the voltages do")  # fmt: skip
-        return Opinion(OWN_MODEL, names[top], True, why, ranking)
+        also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
+        return Opinion(OWN_MODEL, names[top], True, why + ("; less so " + ", ".join(also) if also else ""), ranking)
     order = sorted(rivals, key=rivals.__getitem__)
     clear = bool(order) and rivals[order[0]] < min(_EXPLAINED, _CLEARER * min([1.0, *map(rivals.get, order[1:2])]))
     if clear and max(parts) < _CONTRARY:
-        unseen = " or ".join(n for n, u in models.units.items() if u.bus == order[0] and n not in names) or order[0]
-        why = (f"the units that are observed do as their models, and a current of {unseen} explains "
+        name = " or ".join(n for n, u in unseen.items() if u.bus == order[0]) or order[0]
+        why = (f"the units that are observed do as their models, and a current of {name} explains "
                f"{100 * (1 - rivals[order[0]]):.0f} % of what the voltages do")  # fmt: skip
-        return Opinion(OWN_MODEL, unseen, True, why, ranking)
+        return Opinion(OWN_MODEL, name, True, why, ranking)
     both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3])
     why = f"no place alone deviates from its model and explains the voltages (deviations: {both})"
     return Opinion(OWN_MODEL, None, True, why, ranking)
 
 
-def _elsewhere(models: UnitModels, names: Sequence[str]) -> dict[str, Response]:
-    """What else can drive: buses with units that are not observed, and loads."""
-    hidden = {unit.bus: unit.reach for name, unit in models.units.items() if name not in names}
-    return {**hidden, **models.loads}
-
-
-def _fits(model: UnitModel | None, place: Site, base: float) -> bool:
+def _fits(model: UnitModel, place: Site, base: float) -> bool:
     """Whether a place's power is about that of the model's operating point."""
-    if model is None:
-        return False
     wanted = model.voltage * np.conj(model.current)
     return bool(abs(complex(place.p.mean(), place.q.mean()) / base - wanted) < _OTHER_POINT * max(abs(wanted), 0.1))
 

@@ -51,6 +51,7 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
             if own.place is not None and evidence.kind == "not known":
                 evidence = replace(evidence, kind="forced", reasons=(own.reason,))
         source, reason = _verdict(evidence, said)
+        reason += f"; {OWN_MODEL}: {said[-1].reason}" if said[-1].method == OWN_MODEL else ""
         answers.append(Located(one, evidence, tuple(said), source, reason, _advice(measured, evidence, source)))
     return answers
 

@@ -120,10 +120,15 @@ def test_a_run_is_compared_with_the_models_of_its_own_case(run, gfor, tmp_path):
 
 def test_a_table_of_phasors_is_compared_with_a_case(run, gfor, tmp_path):
     file = csv(tmp_path / "pmu.csv", measurements_of(run.dataset, "run"))
+    file.write_text(file.read_text().replace("sg1.", "SG1."))  # as people write names
     given = ("--case", "two_area_rms", "--scenario", "gfor")
     code, out, _ = gfor("signal", "source", file, *given, "--json")
     (one,) = json.loads(out)["oscillations"]
-    assert (code, one["source"], one["methods"][0]["method"]) == (0, "sg1", OWN_MODEL)
+    assert (code, one["source"], one["methods"][0]["method"]) == (0, "SG1", OWN_MODEL)
+    code, out, _ = gfor("signal", "source", file, "--case", "kundur", "--scenario", "gfor", "--json")
+    (other,) = json.loads(out)["oscillations"]
+    assert "is not what the case has there" in other["reason"]
+    assert other["methods"][-1]["applies"] is False
     code, _, error = gfor("signal", "source", file, "--scenario", "gfor")
     assert code == 2
     assert "--case" in error
