@@ -15,6 +15,7 @@ from orchestrator.errors import AnalysisError
 TOLERANCE = 1e-6  # singular values below this fraction of the largest are taken for noise
 _MIN_SAMPLES, _MAX_SAMPLES = 20, 1200
 _DROPPED = 1e-3  # rows of the triangle below this part of the tolerance change modes by its square, and most are
+_ALIASED = 1e-6  # part of a signal's power that is too fast for the samples used, from which on they are averages
 _LARGEST_EXPONENT = 300.0
 """Largest exponent of e within the window. A larger exponent is not a signal, and its square exceeds the range of
 numbers."""
@@ -50,7 +51,9 @@ def identify_modes(
     ``highest_hz``: the signal is thinned to ten samples per period of this frequency."""
     used = sampling(times, highest_hz)
     thin, interval = used.thin, used.interval
-    y = signal[::thin]
+    weights = averaging(signal, thin)
+    y = signal[::thin] if len(weights) == 1 else np.convolve(signal, weights, mode="valid")[::thin]
+    lags = np.arange(len(weights)) * used.recorded
     if len(y) < _MIN_SAMPLES or np.ptp(y) == 0:
         what = "a constant signal" if len(y) >= _MIN_SAMPLES else f"a signal of {len(signal)} samples"
         raise AnalysisError(f"no mode can be identified in {what}; record a longer response to an event")
@@ -67,12 +70,26 @@ def identify_modes(
         raise AnalysisError("no mode can be identified: the signal seems to grow beyond all bounds within the window")
     vandermonde = multipliers[None, :] ** np.arange(len(y))[:, None]
     residues = np.linalg.lstsq(vandermonde, y.astype(complex), rcond=None)[0]
-    modes = [
-        IdentifiedMode(complex(np.log(mu) / interval), float(abs(r)))
+    found = [
+        (complex(np.log(mu) / interval), abs(r))
         for mu, r in zip(multipliers, residues, strict=True)
         if mu.imag >= 0 and abs(mu) > 1e-6
     ]
+    modes = [IdentifiedMode(x, float(size / abs((weights * np.exp(x * lags)).sum()))) for x, size in found]
     return sorted(modes, key=lambda m: -m.amplitude)
+
+
+def averaging(signal: NDArray[np.float64], thin: int) -> NDArray[np.float64]:
+    """Weights of the samples of which every so many averages are used: one where nothing is too fast for these.
+
+    An average over equal times leaves the eigenvalues of a free response as they are."""
+    if thin <= 1 or len(signal) <= 4 * thin + 1:
+        return np.ones(1)
+    power = np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(len(signal)))) ** 2
+    if power[len(signal) // (2 * thin) :].sum() <= _ALIASED * power.sum():
+        return np.ones(1)
+    weights = np.hanning(4 * thin + 3)[1:-1]
+    return np.asarray(weights / weights.sum())
 
 
 @dataclass(frozen=True, slots=True)

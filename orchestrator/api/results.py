@@ -11,12 +11,10 @@ import numpy as np
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import Mode, eigenvalues
 from orchestrator.arrays import Complex
-from orchestrator.cases.given import Time, moment
+from orchestrator.cases.given import Time
 from orchestrator.errors import CosimError, InputError
 from orchestrator.late import pd, xr
-from orchestrator.oscillations.reading import measurements_of
-from orchestrator.oscillations.verdict import locate
-from orchestrator.oscillations.view import Sources
+from orchestrator.oscillations.view import Sources, sources_of
 from orchestrator.report.notebook import Axes, axes_or_new, curves_on, page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
@@ -267,7 +265,8 @@ class Run:
         start, stop
             The part of the run that is used [s]; by default all of it.
         """
-        return sources_of(self.dataset, str(self.dataset.attrs.get("scenario", "run")), start, stop)
+        label = str(self.dataset.attrs.get("scenario", "run"))
+        return sources_of(self.dataset, label, start, stop, self.result.modes.prepared)
 
     def summary(self) -> dict[str, Any]:
         """The same as ``gfor run --json`` prints of this scenario, as JSON's types."""
@@ -337,20 +336,3 @@ class Run:
         lines += [f"found: {finding.message}" for finding in self.findings]
         prepared = self.result.modes.prepared
         return page(f"Run of {prepared.case.name}: {prepared.title}", lines, rest=str(self.dataset._repr_html_()))
-
-
-def sources_of(dataset: xr.Dataset, label: str, start: Time | None, stop: Time | None) -> Sources:
-    """The oscillations of a part of a record.
-
-    Parameters
-    ----------
-    dataset
-        Signals over the time.
-    label
-        Name of the record.
-    start, stop
-        The part [s]; None for its own begin and end.
-    """
-    begin, end = (None if t is None else moment(t, name) for t, name in ((start, "start"), (stop, "stop")))
-    measured = measurements_of(dataset.sel(time=slice(begin, end)), label)
-    return Sources(measured, locate(measured))

@@ -6,17 +6,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from orchestrator.api.identification import opened
-from orchestrator.api.results import Run, sources_of
+from orchestrator.api.results import Run
+from orchestrator.api.scenario import Scenario
 from orchestrator.cases.given import Time
+from orchestrator.errors import InputError
 from orchestrator.oscillations.reading import contest_cases, read_contest
 from orchestrator.oscillations.verdict import locate
-from orchestrator.oscillations.view import Sources
+from orchestrator.oscillations.view import Sources, sources_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def source(run: Run | xr.Dataset | str | Path, start: Time | None = None, stop: Time | None = None) -> Sources:
+def source(
+    run: Run | xr.Dataset | str | Path, start: Time | None = None, stop: Time | None = None,
+    scenario: Scenario | None = None,
+) -> Sources:  # fmt: skip
     """Find the oscillations of a record, whether they are forced, and which place feeds them.
 
     Parameters
@@ -26,6 +31,9 @@ def source(run: Run | xr.Dataset | str | Path, start: Time | None = None, stop: 
         columns ``NAME.vm``, ``NAME.va``, ``NAME.p`` and ``NAME.q``.
     start, stop
         The part of the record that is used [s]; by default all of it.
+    scenario
+        The grid that was recorded: the place is then the unit that does not do as its own linear model. By default it
+        is the run's, or that of a record of a built-in case.
 
     Raises
     ------
@@ -41,7 +49,13 @@ def source(run: Run | xr.Dataset | str | Path, start: Time | None = None, stop: 
     0.8 Hz, forced: sg1
     """
     dataset, label = opened(run, "run")
-    return sources_of(dataset, label, start, stop)
+    if scenario is None:
+        prepared = run.result.modes.prepared if isinstance(run, Run) else None
+    elif isinstance(scenario, Scenario):
+        prepared = scenario.prepared
+    else:
+        raise InputError(f"scenario = {scenario!r}; give a scenario, as Case.scenario makes it, or leave it out")
+    return sources_of(dataset, label, start, stop, prepared)
 
 
 def contest_sources(folder: Path) -> list[Sources]:

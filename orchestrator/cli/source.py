@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.console import RenderableType
 from rich.markup import escape
 
+from orchestrator.api.case import load
 from orchestrator.api.source import contest_sources, source
 from orchestrator.cli.arguments import seconds, seconds_or_none
 from orchestrator.cli.terminal import make_console, print_json, print_parts, saying_warnings
@@ -23,6 +24,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         "NAME.va, NAME.p, NAME.q")  # fmt: skip
     parser.add_argument("--contest", type=Path, metavar="FOLDER",
                         help="cases in the form of the 2021 IEEE-NASPI contest (BusVolMag.txt and so on)")  # fmt: skip
+    parser.add_argument("--case", metavar="CASE", help="the grid that was recorded: its units' own linear models tell "
+                        "which of them drives (default: that of a built-in case's run)")  # fmt: skip
+    parser.add_argument("--scenario", metavar="NAME", help="of --case, where it has several")
     parser.add_argument("--start", type=seconds_or_none, metavar="T", help="begin of the part that is used [s]")
     parser.add_argument("--stop", type=seconds, metavar="T", help="its end [s]")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -33,11 +37,14 @@ def run(options: argparse.Namespace) -> int:
     """Print the oscillations of one record, or of each case of a contest's folder."""
     if (options.run is None) == (options.contest is None):
         raise InputError("give a run or a recording, or --contest FOLDER; not both")
+    if options.scenario and not options.case:
+        raise InputError("--scenario: it is one of a case; give --case as well")
     with saying_warnings():
         if options.contest is not None:
             found = contest_sources(options.contest)
         else:
-            found = [source(options.run, options.start, options.stop)]
+            scenario = load(options.case).scenario(options.scenario) if options.case else None
+            found = [source(options.run, options.start, options.stop, scenario)]
     if options.json:
         records = [one.as_json() for one in found]
         print_json(records if options.contest else records[0])

@@ -6,12 +6,12 @@ fitted to the signals: Schmid, "Dynamic mode decomposition of numerical and expe
 2010, with left and right vectors. The Q-V phase: what follows its voltage takes reactive power as it rises; what drives
 it gives more."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from orchestrator.arrays import Numbers
+from orchestrator.arrays import Complex, Numbers
 from orchestrator.oscillations.detection import SpectralLine, phasors
 from orchestrator.oscillations.measurements import Measurements, Site
 
@@ -107,6 +107,14 @@ def works(places: Sequence[Site], times: Numbers, found: SpectralLine, others: S
 
     They are those of the mean phasors of several blocks, each turned by the phase that all signals share; errors are
     the jackknife's."""
+    blocks = block_phasors(places, times, found, others)
+    (whole, errors) = jackknife(blocks, _energies)
+    names = tuple(place.name for place in places)
+    return _Work(names, whole[0], errors[0]), _Work(names, whole[1], errors[1])
+
+
+def block_phasors(places: Sequence[Site], times: Numbers, found: SpectralLine, others: Sequence[float]) -> Complex:
+    """Phasors of p, q, angle and ln v of each place in several blocks, each turned by the phase that all share."""
     step = float(times[1] - times[0])
     settle = 0 if found.begin is None else round(2 / (found.frequency * step))
     used = np.arange(min(found.first + settle, found.last - 4), found.last)
@@ -115,15 +123,18 @@ def works(places: Sequence[Site], times: Numbers, found: SpectralLine, others: S
     signals = np.column_stack([x for p in places for x in (p.p, p.q, p.angle, np.log(np.maximum(p.v, 1e-9)))])
     blocks = np.array([phasors(times[block], signals[block], beside) for block in np.array_split(used, count)])
     shared = np.linalg.svd(blocks / np.maximum(np.abs(blocks).mean(axis=0), 1e-300), full_matrices=False)[0][:, 0]
-    blocks = blocks * np.exp(-1j * np.angle(shared))[:, None]
-    whole = _energies(blocks.mean(axis=0))
-    without = np.array([_energies(np.delete(blocks, k, axis=0).mean(axis=0)) for k in range(count)])
-    errors = np.sqrt((count - 1) / count * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
-    names = tuple(place.name for place in places)
-    return _Work(names, whole[0], errors[0]), _Work(names, whole[1], errors[1])
+    return np.asarray(blocks * np.exp(-1j * np.angle(shared))[:, None])
 
 
-def _energies(signals: Numbers) -> Numbers:
+def jackknife(blocks: Complex, figures: Callable[[Complex], Numbers]) -> tuple[Numbers, Numbers]:
+    """Figures of the mean of all blocks, and their standard errors."""
+    count = len(blocks)
+    without = np.array([figures(np.delete(blocks, k, axis=0).mean(axis=0)) for k in range(count)])
+    spread = np.abs(without - without.mean(axis=0)) ** 2
+    return figures(blocks.mean(axis=0)), np.sqrt((count - 1) / count * spread.sum(axis=0))
+
+
+def _energies(signals: Complex) -> Numbers:
     """Dissipating and reactive work from the phasors of p, q, angle and ln v of each place, shape (2, places)."""
     p, q, angle, lnv = signals.reshape(-1, 4).T
     energy = 0.5 * np.real(np.conj(p) * 1j * angle + np.conj(q) * 1j * lnv)

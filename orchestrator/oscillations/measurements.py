@@ -44,6 +44,7 @@ class Measurements:
     times: Numbers
     places: tuple[Site, ...]
     remarks: tuple[str, ...] = field(default=())
+    base: float = 1.0  # what 100 MVA are in the unit of the powers
 
     @property
     def interval(self) -> float:

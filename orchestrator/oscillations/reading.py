@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,11 +31,11 @@ CONTEST_FILES = ("BusVolMag.txt", "BusVolAng.txt", "LinCurMag.txt", "LinCurAng.t
 def measurements_of(dataset: xr.Dataset, label: str) -> Measurements:
     """A run's record or a measured one."""
     times = np.asarray(dataset["time"].values, dtype=np.float64)
-    places = _of_run(dataset) if "places" in dataset.attrs else _of_columns(dataset, label)
+    places, base = (_of_run(dataset), 1.0) if "places" in dataset.attrs else _of_columns(dataset, label)
     if not places:
         more = "; record what is needed: 'record = [\"*\"]' in [solver], or run with --force"
         raise InputError(f"{label}: no place has voltage, P and Q; {_FORM}{more if 'places' in dataset.attrs else ''}")
-    return made_ready(label, times, places)
+    return replace(made_ready(label, times, places), base=base)
 
 
 def _of_run(dataset: xr.Dataset) -> list[Site]:
@@ -61,7 +62,8 @@ def _of_run(dataset: xr.Dataset) -> list[Site]:
     return found
 
 
-def _of_columns(dataset: xr.Dataset, label: str) -> list[Site]:
+def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float]:
+    """Places, and what 100 MVA are in the unit of their powers."""
     columns: dict[str, dict[str, Numbers]] = {}
     bases: dict[str, set[str]] = {}
     for name in map(str, dataset.data_vars):
@@ -71,7 +73,8 @@ def _of_columns(dataset: xr.Dataset, label: str) -> list[Site]:
             values, base = _in_base(dataset[name], what, f"{label}: {name!r}")
             columns.setdefault(parts["place"], {})[what] = values
             bases.setdefault("power" if what in "pq" else what, set()).add(base)
-    if len({base == "pu" for base in bases.get("power", ())}) > 1:
+    per_unit = {base == "pu" for base in bases.get("power", {"pu"})}
+    if len(per_unit) > 1:
         raise InputError(f"{label}: some powers are in pu and some in MW or Mvar; give all in one of both")
     found = []
     for place, own in columns.items():
@@ -86,7 +89,7 @@ def _of_columns(dataset: xr.Dataset, label: str) -> list[Site]:
             sign = -1.0 if arrow else 1.0
             kind: Kind = "branch" if arrow else "unit"
             found.append(Site(place, kind, bus, seen["vm"], seen["va"], sign * seen["p"], sign * seen["q"], beyond))
-    return found
+    return found, 1.0 if True in per_unit else 100.0
 
 
 def _in_base(curve: xr.DataArray, what: str, where: str) -> tuple[Numbers, str]:

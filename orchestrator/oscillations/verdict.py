@@ -1,12 +1,14 @@
 """The oscillations of a record with what they are and where they come from."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from orchestrator.oscillations.detection import SpectralLine, find_oscillations, signals_of
 from orchestrator.oscillations.kind import Evidence, evidence_of
 from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, opinions
 from orchestrator.oscillations.measurements import Measurements
+from orchestrator.oscillations.models import OWN_MODEL, UnitModels, own_models
 
 _SHOWN = 8
 _FEWEST_PERIODS = 5  # of an oscillation that is told
@@ -34,26 +36,37 @@ class Located:
         }  # fmt: skip
 
 
-def locate(measured: Measurements) -> list[Located]:
+def locate(measured: Measurements, models: UnitModels | None = None) -> list[Located]:
+    """What is there; with the linear models of a case's units, these decide."""
     signals = signals_of(measured)
     found = [one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_PERIODS]
     answers = []
     for one in found:
         evidence = evidence_of(signals, one)
         others = [o.frequency for o in found if o is not one]
-        said = tuple(opinions(measured, one, others))
+        said = opinions(measured, one, others)
+        if models is not None:
+            own = own_models(models, measured, one, others)
+            said = [own, *said] if own.applies else [*said, own]
+            if own.place is not None and evidence.kind == "not known":
+                evidence = replace(evidence, kind="forced", reasons=(own.reason,))
         source, reason = _verdict(evidence, said)
-        answers.append(Located(one, evidence, said, source, reason, _advice(measured, evidence, source)))
+        reason += f"; {OWN_MODEL}: {said[-1].reason}" if said[-1].method == OWN_MODEL else ""
+        answers.append(Located(one, evidence, tuple(said), source, reason, _advice(measured, evidence, source)))
     return answers
 
 
-def _verdict(evidence: Evidence, said: tuple[Opinion, ...]) -> tuple[str | None, str]:
+def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, str]:
     """A source where the methods agree or one is known not to apply."""
     if evidence.kind != "forced":
         what = (
             "a mode of the system has no source" if evidence.kind == "mode" else "it is not known whether it is forced"
         )
         return None, f"{what}: {evidence.reasons[0]}"
+    if said[0].method == OWN_MODEL:
+        others = "; ".join(f"{o.method}: {o.reason}" for o in said[1:] if o.applies and o.place != said[0].place)
+        return said[0].place, f"{said[0].reason}{others and f' (besides, {others})'}"
+    said = [o for o in said if o.method != OWN_MODEL]
     by_method = {o.method: o for o in said}
     flow, phase, mode = by_method[DEF], by_method[QV_PHASE], by_method[DYNAMIC_MODE]
     physical = [o for o in (flow, phase) if o.applies]

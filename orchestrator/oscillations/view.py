@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
-from orchestrator.late import pd
+from orchestrator.cases.given import Time, moment
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import CosimError
+from orchestrator.late import pd, xr
 from orchestrator.oscillations.measurements import Measurements
-from orchestrator.oscillations.verdict import Located
+from orchestrator.oscillations.reading import measurements_of
+from orchestrator.oscillations.verdict import Located, locate
 from orchestrator.report.notebook import page
 from orchestrator.report.tables import PlainTable, make_table
 
@@ -54,6 +59,24 @@ class Sources:
 
     def _repr_html_(self) -> str:
         return page(repr(self).strip("<>"), list(self.remarks), self.table())
+
+
+def sources_of(
+    dataset: xr.Dataset, label: str, start: Time | None, stop: Time | None, prepared: PreparedScenario | None = None
+) -> Sources:
+    """The oscillations of a part of a record, beside the units' models in a scenario or in its own built-in case."""
+    begin, end = (None if t is None else moment(t, name) for t, name in ((start, "start"), (stop, "stop")))
+    measured, models = measurements_of(dataset.sel(time=slice(begin, end)), label), None
+    if prepared is not None or "case_file" in dataset.attrs:
+        from orchestrator.oscillations import unit_models as own  # noqa: PLC0415 - only where there is a case
+
+        try:
+            prepared = prepared or own.recorded_case(dataset.attrs)
+            models = prepared and own.unit_models(prepared)
+        except CosimError as error:
+            remark = f"the record is compared with no models of the units: {error}"
+            measured = replace(measured, remarks=(*measured.remarks, remark))
+    return Sources(measured, locate(measured, models))
 
 
 def sources_table(found: Sequence[Sources]) -> PlainTable:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestrator.analysis.identification import IdentifiedMode, identify_modes, interval_used
+from orchestrator.analysis.identification import IdentifiedMode, averaging, identify_modes, sampling
 from orchestrator.arrays import Numbers
 from orchestrator.errors import AnalysisError
 from orchestrator.results.comtrade.reading import LINE_FREQUENCY
@@ -27,27 +27,13 @@ def is_measured(curve: xr.DataArray) -> bool:
 
 
 def measured_modes(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode]:
-    """The modes of a measured signal.
-
-    Where samples are dense they are averaged before they are thinned out, so that a faster oscillation does not appear
-    as a slower one. An average over equal times leaves the eigenvalues of a free response as they are."""
+    """The modes of a measured signal."""
     times, values = window["time"].values, np.asarray(window.values, dtype=float)
     _check(times, values, float(window.coords[LINE_FREQUENCY]))
     deviation = values - float(values.mean())
-    thin = round(interval_used(times) / _interval(times))
-    half = 2 * thin
-    if thin <= 1 or len(values) <= 2 * half + 1:
-        return identify_modes(times, deviation, tolerance=coarser * _noise(deviation[::thin]))
-    weights = np.asarray(np.hanning(2 * half + 3)[1:-1], dtype=float)
-    weights = weights / weights.sum()
-    smooth = np.convolve(deviation, weights, mode="valid")[::thin]
-    found = identify_modes(times[half : len(times) - half : thin], smooth, tolerance=coarser * _noise(smooth))
-    lags: Numbers = np.asarray((np.arange(len(weights)) - half) * _interval(times), dtype=np.float64)
-    passed = [
-        IdentifiedMode(m.eigenvalue, m.amplitude / _gain(m.eigenvalue, weights, lags, half * _interval(times)))
-        for m in found
-    ]
-    return sorted(passed, key=lambda m: -m.amplitude)
+    thin = sampling(times).thin
+    seen = np.convolve(deviation, averaging(deviation, thin), mode="valid")[::thin]
+    return identify_modes(times, deviation, tolerance=coarser * _noise(seen))
 
 
 def _noise(values: Numbers) -> float:
@@ -63,11 +49,6 @@ def _noise(values: Numbers) -> float:
     beta = hankel.shape[1] / hankel.shape[0]
     factor = 0.56 * beta**3 - 0.95 * beta**2 + 1.82 * beta + 1.43
     return max(_LEAST_NOISE, float(factor * np.median(singular) / (singular[0] or 1.0)))
-
-
-def _gain(eigenvalue: complex, weights: Numbers, lags: Numbers, delay: float) -> float:
-    """What the average leaves of an exponential, and the exponential's own change until the first average."""
-    return float(abs((weights * np.exp(eigenvalue * lags)).sum() * np.exp(eigenvalue * delay)))
 
 
 def _interval(times: Numbers) -> float:

@@ -88,3 +88,13 @@ def test_the_advice_is_what_makes_the_samples_denser(step, stop, advised):
         assert both < 0.9 * one.interval
         assert ("record more" in one.remedy) == ("more" in denser) or "and identify" in one.remedy
         assert ("identify a shorter" in one.remedy) == ("shorter" in denser) or "and identify" in one.remedy
+
+
+@pytest.mark.parametrize("hum", [49.7, 99.4])
+def test_what_is_too_fast_for_the_samples_used_is_no_slower_mode(hum):
+    times = np.arange(0, 20, 1e-3)
+    ring = np.exp(-0.2 * times) * np.cos(2 * np.pi * 0.6 * times)
+    found = identify_modes(times, ring + 0.05 * np.sin(2 * np.pi * hum * times), tolerance=1e-3)
+    assert found[0].frequency_hz == pytest.approx(0.6, abs=1e-4)
+    assert found[0].amplitude == pytest.approx(0.5, rel=1e-3)
+    assert all(mode.amplitude < 1e-3 for mode in found[1:])

@@ -4,14 +4,16 @@ The model is kept with its slow eigenvalues alone (tests/oscillations/models); `
 --models` makes them anew.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 
 import orchestrator as gfor
 from orchestrator.oscillations.measurements import Site, made_ready
+from orchestrator.oscillations.models import UnitModel, UnitModels
 
 MODELS = Path(__file__).parents[1] / "oscillations" / "models"
 FASTEST = 80.0
@@ -39,6 +41,13 @@ class Model:
     def references(self):
         """``unit.reference`` of everything that can be forced."""
         return [name for name in self.inputs if not name.startswith("grid.")]
+
+    def at(self, s):
+        """Outputs, shape (current or voltage, unit, part, inputs), at a complex frequency."""
+        parts = [C / (s - values) @ B for values, B, C in (
+            (self.eigenvalues, self.B, self.C), (self.eigenvalues.conj(), self.B.conj(), self.C.conj())
+        )]  # fmt: skip
+        return (0.5 * (parts[0] + parts[1]) + self.D).reshape(2, len(self.units), 2, -1)
 
     def response(self, inputs, times):
         """Outputs, shape (n, m), for inputs, shape (n, k), along straight lines between the times."""
@@ -97,6 +106,47 @@ def save(model, name):
     np.savez_compressed(MODELS / f"{name}.npz", **small)
 
 
+@dataclass(frozen=True)
+class Computed:
+    """A response as `orchestrator.oscillations.models` has them, from a function of s."""
+
+    at: Callable
+
+
+def unit_models_of(system):
+    """Each unit's own model, as the whole one implies it: what its currents do where something else is forced."""
+    firsts = {bus: system.buses.index(bus) for bus in dict.fromkeys(system.buses)}
+
+    def parts(unit, s):
+        k, (current, voltage) = system.units.index(unit), outputs_at(system, s)
+        own = np.array([name.startswith(f"{unit}.") for name in system.inputs])
+        admittance = current[k][:, ~own] @ np.linalg.pinv(voltage[k][:, ~own])
+        beside = current[k][:, own] - admittance @ voltage[k][:, own]
+        reach = np.concatenate([voltage[first][:, own] for first in firsts.values()]) @ np.linalg.pinv(beside)
+        return admittance, reach
+
+    def load(name, s):
+        voltage = outputs_at(system, s)[1][..., system.inputs.index(name)]
+        return np.concatenate([voltage[first] for first in firsts.values()])[:, None]
+
+    return UnitModels({
+        unit: UnitModel(bus, complex(system.v_0[k]), complex(system.i_0[k]),
+                        *(Computed(lambda s, unit=unit, part=part: parts(unit, s)[part]) for part in range(2)))
+        for k, (unit, bus) in enumerate(zip(system.units, system.buses, strict=True))
+    }, tuple(firsts), {name.removesuffix(".scale"): Computed(partial(load, name))
+                       for name in system.inputs if name.startswith("grid.")})  # fmt: skip
+
+
+_AT = {}
+
+
+def outputs_at(system, s):
+    key = (id(system), s)
+    if key not in _AT:
+        _AT[key] = system.at(s)
+    return _AT[key]
+
+
 @cache
 def model(name):
     with np.load(MODELS / f"{name}.npz") as kept:
@@ -152,7 +202,11 @@ def record(name, forced, *, times=None, loads=0.0, measuring=0.0, seed=1, withou
         inputs[:, columns] += load_noise(len(times), len(columns), 1 / (times[1] - times[0]), loads, seed)
     y = system.response(inputs, times).reshape(len(times), 2, len(system.units), 2)
     deviation = y[..., 0] + 1j * y[..., 1]
-    current, voltage = system.i_0 + deviation[:, 0], system.v_0 + deviation[:, 1]
+    # In each bus' own frame: what turns all angles changes no power and no magnitude, as in the grid.
+    moved = deviation[:, 1] / system.v_0
+    voltage = system.v_0 * np.exp(moved)
+    turned = 1j * moved.imag
+    current = np.exp(turned) * (system.i_0 + deviation[:, 0] - turned * system.i_0)
     rng = np.random.default_rng(seed + 1000)
 
     def noise():

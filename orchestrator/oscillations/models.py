@@ -1,0 +1,143 @@
+"""What each unit of a case does by its own linear model: one whose current does something else drives the oscillation.
+
+Chevalier, Vorobev and Turitsyn, "Using effective generator impedance for forced oscillation source location", IEEE
+Trans. Power Systems 33(6), 2018, with the linear models of the case's own components in the place of fitted ones."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.arrays import Complex, Matrix
+from orchestrator.oscillations.detection import SpectralLine
+from orchestrator.oscillations.location import Opinion, block_phasors, jackknife
+from orchestrator.oscillations.measurements import Measurements, Site
+
+OWN_MODEL = "own linear models"
+_OTHER_POINT = (
+    0.05  # difference of the mean power, beside the apparent one, from which on the model is of another point
+)
+_CERTAIN = 3.0  # standard errors by which a deviation must exceed zero
+_EXPLAINED = 0.4  # part of all voltages' swing that a place may leave unexplained
+_SHARE = 0.8  # of the squares of all unexplained currents that one unit must have
+_CONTRARY = 0.2  # what the deviation of another unit does, from which on no single place is named
+_NOTED = 0.05  # the same, from which on it is told
+_CLEARER = 0.6  # what the best place leaves beside what the second best does
+
+
+@dataclass(frozen=True)
+class Response:
+    """C·(sI − A)⁻¹·B + D."""
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+
+    def at(self, s: complex) -> Complex:
+        return np.asarray(self.C @ np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B) + self.D)
+
+
+@dataclass(frozen=True)
+class UnitModel:
+    """A unit at its operating point [pu on the system base, network frame]; the current flows out of it."""
+
+    bus: str
+    voltage: complex
+    current: complex
+    admittance: Response  # from its voltage to its current
+    reach: Response  # from a current into its bus beside it, to the voltages of all buses in the closed system
+
+
+@dataclass(frozen=True)
+class UnitModels:
+    units: Mapping[str, UnitModel]
+    buses: tuple[str, ...]  # with units, in the order of ``reach``
+    loads: Mapping[str, Response]  # from a load's size to the same voltages
+
+
+def turn(z: complex) -> Matrix:
+    """The real matrix that multiplies by a complex number."""
+    return np.array([[z.real, -z.imag], [z.imag, z.real]])
+
+
+def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, others: Sequence[float]) -> Opinion:
+    """The unit whose current is not what its model makes of its voltage, where that drives what all voltages do.
+
+    Where all that are observed do as their models: the bus that is not, or the load, that explains the voltages."""
+    units = {name.casefold(): unit for name, unit in models.units.items()}
+    seen = [p for p in measured.places if p.kind == "unit" and p.name.casefold() in units]
+    places = [p for p in seen if _fits(units[p.name.casefold()], p, measured.base)]
+    if not places:
+        off = ", ".join(p.name for p in seen)
+        why = f"the power of {off} is not what the case has there" if off else "no unit of the case is in the record"
+        return Opinion(OWN_MODEL, None, False, f"{why} (units: {', '.join(models.units)})", ())
+    names = [p.name for p in places]
+    s, known = 2j * np.pi * found.frequency, [units[name.casefold()] for name in names]
+    means = np.array([complex(p.p.mean(), p.q.mean()) / measured.base for p in places])
+    own = [_frame(u.voltage).T @ u.admittance.at(s) @ _frame(u.voltage) for u in known]
+    size = np.array([abs(unit.voltage) for unit in known])
+
+    def driven(blocks: Complex) -> Complex:
+        """Of each unit the current that its model does not explain, and the voltage, along the mean one and across."""
+        p, q, angle, lnv = blocks.reshape(-1, 4).T
+        voltage = size * np.array([lnv, angle])
+        turned = means.real * np.array([-lnv, angle]) + means.imag * np.array([angle, lnv])
+        current = (np.array([p, -q]) / measured.base + turned) / size
+        unlike = [current[:, k] - own[k] @ voltage[:, k] for k in range(len(places))]
+        return np.array([unlike, voltage.T])
+
+    whole, errors = jackknife(block_phasors(places, measured.times, found, others), driven)
+    extra, voltages = whole[0], whole[1].ravel()
+    rows = [models.buses.index(unit.bus) for unit in known]
+
+    def reach(response: Response, frame: complex = 1.0) -> Complex:
+        """To the voltages of the observed units, each in its own frame, from a current in a frame."""
+        parts = response.at(s).reshape(len(models.buses), 2, -1)
+        there = np.concatenate([_frame(unit.voltage).T @ parts[b] for b, unit in zip(rows, known, strict=True)])
+        return there @ _frame(frame) if there.shape[1] == 2 else there
+
+    def left(rest: Complex) -> float:
+        return float(np.linalg.norm(rest) / (np.linalg.norm(voltages) or 1.0))
+
+    amount = np.linalg.norm(extra, axis=1)
+    ranking = tuple((names[k], float(amount[k] ** 2 / ((amount**2).sum() or 1.0))) for k in np.argsort(-amount))
+    sure = np.where(amount > _CERTAIN * np.linalg.norm(errors[0], axis=1), amount, 0.0)
+    effects = [reach(unit.reach, unit.voltage) @ extra[k] * (sure[k] > 0) for k, unit in enumerate(known)]
+    top = int(sure.argmax())
+
+    def best(there: Complex) -> float:
+        return left(voltages - there @ np.linalg.lstsq(there, voltages, rcond=None)[0])
+
+    unseen = {n: u for n, u in models.units.items() if n.casefold() not in {name.casefold() for name in names}}
+    further = {**{u.bus: u.reach for u in unseen.values()}, **models.loads} if len(set(rows)) > 1 else {}
+    rivals = {name: best(reach(response)) for name, response in further.items()}
+    beside = min((x for name, x in rivals.items() if name != known[top].bus), default=1.0)
+    rest, parts = left(voltages - effects[top]), [left(effect) for effect in effects]
+    alone = bool(sure[top]) and ranking[0][1] >= _SHARE and max([*parts[:top], *parts[top + 1 :], 0.0]) < _CONTRARY
+    if alone and rest < _EXPLAINED and best(reach(known[top].reach)) <= beside:
+        why = (f"{names[top]} gives a current that its own linear model does not, and that explains "
+               f"{100 * (1 - rest):.0f} % of what the voltages do")  # fmt: skip
+        also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
+        return Opinion(OWN_MODEL, names[top], True, why + ("; less so " + ", ".join(also) if also else ""), ranking)
+    order = sorted(rivals, key=rivals.__getitem__)
+    clear = bool(order) and rivals[order[0]] < min(_EXPLAINED, _CLEARER * min([1.0, *map(rivals.get, order[1:2])]))
+    if clear and max(parts) < _CONTRARY:
+        name = " or ".join(n for n, u in unseen.items() if u.bus == order[0]) or order[0]
+        why = (f"the units that are observed do as their models, and a current of {name} explains "
+               f"{100 * (1 - rivals[order[0]]):.0f} % of what the voltages do")  # fmt: skip
+        return Opinion(OWN_MODEL, name, True, why, ranking)
+    both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3])
+    why = f"no place alone deviates from its model and explains the voltages (deviations: {both})"
+    return Opinion(OWN_MODEL, None, True, why, ranking)
+
+
+def _fits(model: UnitModel, place: Site, base: float) -> bool:
+    """Whether a place's power is about that of the model's operating point."""
+    wanted = model.voltage * np.conj(model.current)
+    return bool(abs(complex(place.p.mean(), place.q.mean()) / base - wanted) < _OTHER_POINT * max(abs(wanted), 0.1))
+
+
+def _frame(voltage: complex) -> Matrix:
+    """From a voltage's own frame to that of the network."""
+    return turn(voltage / abs(voltage))

@@ -1,0 +1,82 @@
+"""The linear models of a case's units, and how far each unit's current reaches in the closed system."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from orchestrator.analysis.blocks import Blocks
+from orchestrator.analysis.linearization import continuous
+from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.arrays import Matrix
+from orchestrator.cases.case import built_in_cases, load_case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import InputError
+from orchestrator.oscillations.models import Response, UnitModel, UnitModels, turn
+from orchestrator.results.storage import measuring_places
+from orchestrator.study.modes import running
+
+_VOLTAGE, _CURRENT, _EMF, _SHUNT = ("v_re", "v_im"), ("i_re", "i_im"), ("e_re", "e_im"), ("y_re", "y_im")
+
+
+def unit_models(prepared: PreparedScenario) -> UnitModels:
+    with running(prepared) as master:
+        find_operating_point(master)
+        homes = {
+            name: bus
+            for name, bus in measuring_places(prepared).items()
+            if name in master.exchanges and {*_CURRENT} <= {*master.components[name].description.variables}
+        }
+        if not homes:
+            raise InputError(f"{prepared.case.name}: no unit takes a voltage (v_re, v_im) and shows a current (i_re, "
+                             "i_im), so there are no models to compare the record with")  # fmt: skip
+        grid = {bus.partition(".")[0] for bus in homes.values()} & set(master.components)
+        scales = [f"{name}.{v}" for name in sorted(grid) for v in master.components[name].description.variables
+                  if v.endswith(".scale")]  # fmt: skip
+        observed = [f"{unit}.{i}" for unit in homes for i in _CURRENT]
+        blocks = Blocks(master, inputs=scales, outputs=observed, without_step=True)
+        model = continuous(blocks)
+        currents = {unit: complex(*master.components[unit].get([*_CURRENT]).values()) for unit in homes}
+        values = dict(zip(master.output_names, master.y.tolist(), strict=True))
+    F, G, H, K = (M.toarray() for M in (model.F, model.G, model.H, model.K))
+    settled = np.linalg.inv(np.eye(len(K)) - K)
+    row = {name: k for k, name in enumerate(blocks.output_names)}
+    buses = tuple(dict.fromkeys(homes.values()))
+    seen = [row[f"{bus}.{v}"] for bus in buses for v in _VOLTAGE]
+    A, C = F + G @ settled @ H, (settled @ H)[seen]
+
+    def reach(drive: Matrix) -> Response:
+        return Response(A, G @ drive, C, drive[seen])
+
+    first = len(row) + len(blocks.links)
+    loads = {name.removesuffix(".scale"): reach(settled[:, [first + k]]) for k, name in enumerate(scales)}
+    found = {}
+    for unit, bus in homes.items():
+        c = blocks.components[unit]
+        assert c.A_c is not None  # `continuous` refuses a component without derivatives
+        assert c.B_c is not None
+        columns = [c.inputs.index(v) for v in _VOLTAGE]
+        given, y = _CURRENT, complex(1.0)
+        if f"{unit}.i_re" not in row:  # a source behind an admittance y, which gives y times its own voltage
+            given, y = _EMF, complex(*(values.get(f"{unit}.{part}", 0.0) for part in _SHUNT))
+        if not y or f"{unit}.{given[0]}" not in row:
+            continue
+        drive = settled[:, [row[f"{unit}.{name}"] for name in given]] @ np.linalg.inv(turn(y))
+        own = Response(c.A_c, c.B_c[:, columns], c.C_o, c.D_o[:, columns])
+        voltage = complex(*(values[f"{bus}.{v}"] for v in _VOLTAGE))
+        found[unit] = UnitModel(bus, voltage, currents[unit], own, reach(drive))
+    return UnitModels(found, buses, loads)
+
+
+def recorded_case(attributes: Mapping[str, Any]) -> PreparedScenario | None:
+    """The scenario that a run's record is of, where it is one of a built-in case with the values that it has now."""
+    name, text = str(attributes.get("case")), attributes.get("case_file")
+    if name not in built_in_cases() or (case := load_case(name)).text != text:
+        return None
+    scenario, values = str(attributes["scenario"]), json.loads(attributes["values"])
+    (prepared,) = case.prepare([scenario])
+    changed = {key: value for key, value in values.items() if prepared.values.get(key) != value}
+    if changed:
+        (prepared,) = case.prepare([scenario], changed)
+    return prepared if dict(prepared.values) == values else None

@@ -1,0 +1,134 @@
+"""The units' own linear models as judges: what would make them wrong in silence ends in the right place or in none."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import orchestrator as gfor_api
+from orchestrator.oscillations.models import OWN_MODEL, UnitModels
+from orchestrator.oscillations.reading import measurements_of
+from orchestrator.oscillations.verdict import locate
+from tests.oscillations.test_planted import TIMES, at, late, turned
+from tests.oscillations.test_reading import csv
+from tests.support.forced_records import model, record, sine, unit_models_of
+
+NOISE = {"loads": 5e-4, "measuring": 5e-5}
+
+
+def source_of(case, *references, frequency=0.8, models=None, **further):
+    inputs = {reference: sine(TIMES, frequency, 0.02) for reference in references}
+    found = locate(record(case, inputs, times=TIMES, **further), models or unit_models_of(model(case)))
+    return at(found, frequency).source
+
+
+@pytest.mark.parametrize("frequency", [0.3, 0.5817])
+@pytest.mark.parametrize("reference", ["sg1.exciter.delta_V_ref", "sg2.exciter.delta_V_ref", "gfor.droop.delta_U_ref"])
+def test_where_energy_flow_fails_the_models_find_the_unit(reference, frequency):
+    assert source_of("two_area", reference, frequency=frequency, **NOISE) == reference.partition(".")[0]
+
+
+@pytest.mark.parametrize(("case", "load"), [("two_area", "grid.load_3"), ("ieee39", "grid.load_4")])
+def test_a_load_that_swings_is_no_unit(case, load):
+    assert source_of(case, f"{load}.scale", **NOISE) == load
+
+
+def test_a_unit_that_is_not_observed_is_named_with_what_stands_at_its_bus():
+    half = sorted(set(model("ieee39").buses))[1::2]
+    assert source_of("ieee39", "sg33.governor.delta_P_ref", without=half, **NOISE) == "sg33 or gfor33"
+    assert source_of("two_area", "sg2.governor.delta_P_ref", without=("bus_3",)) is None  # one bus cannot tell
+
+
+@pytest.mark.parametrize("without", [(), ("bus_30",), ("bus_37",)])
+def test_two_sources_are_not_one(without):
+    drives = "sg33.governor.delta_P_ref", "gfor37.droop.delta_U_ref"
+    assert source_of("ieee39", *drives, without=without) is None
+
+
+@pytest.mark.parametrize("unit", ["gfor", "sg1", "all"])
+@pytest.mark.parametrize(("p", "q"), [(True, True), (True, False), (False, True)])
+def test_wrong_signs(unit, p, q):
+    for reference in ("gfor.droop.delta_P_ref", "sg1.exciter.delta_V_ref"):
+        assert source_of("two_area", reference, change=turned(unit, p, q)) in (None, reference.partition(".")[0])
+
+
+def test_a_clock_that_is_off():
+    for seconds, signals in ((1e-3, ("v", "angle", "p", "q")), (1e-3, ("p", "q")), (0.03, ("angle",))):
+        for unit in ("sg1", "sg2"):
+            found = source_of("two_area", "sg1.exciter.delta_V_ref", change=late(unit, seconds, signals))
+            assert found in ((None, "sg1") if seconds > 1e-3 else ("sg1",))
+
+
+def worse(models, size, seed):
+    """Models whose elements are off by some part."""
+    rng = np.random.default_rng(seed)
+
+    class Off:
+        def __init__(self, response):
+            self._response, self._factors = response, 1 + size * rng.standard_normal((2, 2))
+
+        def at(self, s):
+            whole = self._response.at(s)
+            return whole * np.tile(self._factors, (len(whole) // 2, 1))[:, : whole.shape[1]]
+
+    units = {n: replace(u, admittance=Off(u.admittance), reach=Off(u.reach)) for n, u in models.units.items()}
+    return UnitModels(units, models.buses, {name: Off(load) for name, load in models.loads.items()})
+
+
+def test_models_that_are_a_fifth_off_name_no_other_unit():
+    models = unit_models_of(model("two_area"))
+    found = [
+        (source_of("two_area", r, models=worse(models, 0.2, seed), **NOISE), r.partition(".")[0])
+        for seed, r in enumerate(model("two_area").references)
+    ]
+    assert all(name in (None, unit) for name, unit in found)
+    assert sum(name == unit for name, unit in found) >= 3
+
+
+def test_a_machine_at_another_operating_point_is_not_judged_by_its_model():
+    models = unit_models_of(model("two_area"))
+    elsewhere = {name: replace(unit, current=1.2 * unit.current) for name, unit in models.units.items()}
+    measured = record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES)
+    found = at(locate(measured, replace(models, units=elsewhere)), 0.8)
+    own = next(o for o in found.opinions if o.method == OWN_MODEL)
+    assert not own.applies
+    assert found.source == "sg1"  # the other methods agree
+
+
+def test_noise_alone_has_no_source():
+    for name in ("two_area", "ieee39"):
+        found = locate(record(name, {}, loads=0.002, measuring=5e-5, times=TIMES), unit_models_of(model(name)))
+        assert all(x.source is None for x in found)
+
+
+@pytest.fixture(scope="module")
+def run():
+    scenario = gfor_api.load("two_area_rms").scenario("gfor", force="sg1.exciter.V_ref 0.8 Hz 2 %")
+    return scenario.run(stop=20.0)
+
+
+def test_a_run_is_compared_with_the_models_of_its_own_case(run, gfor, tmp_path):
+    (found,) = run.source()
+    assert found.opinions[0].method == OWN_MODEL
+    assert found.source == "sg1"
+    run.save(tmp_path)
+    code, out, _ = gfor("signal", "source", tmp_path / "gfor", "--json")
+    (one,) = json.loads(out)["oscillations"]
+    assert (code, one["source"], one["methods"][0]["method"]) == (0, "sg1", OWN_MODEL)
+
+
+def test_a_table_of_phasors_is_compared_with_a_case(run, gfor, tmp_path):
+    file = csv(tmp_path / "pmu.csv", measurements_of(run.dataset, "run"))
+    file.write_text(file.read_text().replace("sg1.", "SG1."))  # as people write names
+    given = ("--case", "two_area_rms", "--scenario", "gfor")
+    code, out, _ = gfor("signal", "source", file, *given, "--json")
+    (one,) = json.loads(out)["oscillations"]
+    assert (code, one["source"], one["methods"][0]["method"]) == (0, "SG1", OWN_MODEL)
+    code, out, _ = gfor("signal", "source", file, "--case", "kundur", "--scenario", "gfor", "--json")
+    (other,) = json.loads(out)["oscillations"]
+    assert "is not what the case has there" in other["reason"]
+    assert other["methods"][-1]["applies"] is False
+    code, _, error = gfor("signal", "source", file, "--scenario", "gfor")
+    assert code == 2
+    assert "--case" in error
