@@ -8,8 +8,9 @@ import scipy.linalg
 from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous
-from orchestrator.analysis.stability import judge
+from orchestrator.analysis.stability import judge, whole_spectrum
 from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.arrays import Complex
 from orchestrator.cases.facts import rated_frequency
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
@@ -34,22 +35,51 @@ class Cut:
     currents: dict[str, complex]
     rated_hz: float | None  # None where no component has one
     warnings: tuple[str, ...]
+    eigenvalues: Complex  # of the closed system [rad/s]; empty where it is too large for all of them
+    bus: str  # where the devices stand; "" where at several
 
 
-def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) -> Cut:
+@dataclass(frozen=True)
+class LinearCase:
+    """A case at its operating point, linearised once, to be cut at any place."""
+
+    prepared: PreparedScenario
+    blocks: Blocks
+    model: LinearModel
+    stable: bool | None
+    eigenvalues: Complex  # of the closed system [rad/s]; empty where it is too large for all of them
+    values: dict[str, float]  # of all outputs at the operating point
+    homes: dict[str, str]
+    fed: dict[str, str]
+    warnings: tuple[str, ...]
+
+    def cut(self, bus: str | None, names: tuple[str, ...]) -> Cut:
+        devices = _devices(self.homes, bus, names)
+        places = {self.homes[name] for name in devices}
+        device, network = _sides(self.blocks, self.model, devices)
+        voltages = {d: complex(*(self.values[self.fed[f"{d}.{v}"]] for v in _PORT[0])) for d in devices}
+        currents = {d: complex(*(self.values[f"{d}.{i}"] for i in _PORT[1])) for d in devices}
+        return Cut(devices, device, network, self.stable, voltages, currents, rated_frequency(self.prepared),
+                   self.warnings, self.eigenvalues, places.pop() if len(places) == 1 else "")  # fmt: skip
+
+
+def linear_case(prepared: PreparedScenario) -> LinearCase:
     with running(prepared) as master:
         said = sentences(misfits_of(master))
-        devices = _devices(master, bus, names)
+        homes = buses_of(master)
+        _devices(homes, None, ())
         find_operating_point(master)
         blocks = Blocks(master, without_step=True)
         model = continuous(blocks)
-        stability = judge(model)
-        device, network = _sides(blocks, model, devices)
+        spectrum = whole_spectrum(model)
+        found = np.zeros(0, dtype=complex) if spectrum is None else spectrum.eigenvalues
         values = dict(zip(master.output_names, master.y.tolist(), strict=True))
         fed = {str(c.target): str(c.source) for c in master.system.connections}
-        voltages = {d: complex(*(values[fed[f"{d}.{v}"]] for v in _PORT[0])) for d in devices}
-        currents = {d: complex(*(values[f"{d}.{i}"] for i in _PORT[1])) for d in devices}
-    return Cut(devices, device, network, stability.stable, voltages, currents, rated_frequency(prepared), said)
+        return LinearCase(prepared, blocks, model, judge(model, spectrum).stable, found, values, homes, fed, said)
+
+
+def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) -> Cut:
+    return linear_case(prepared).cut(bus, names)
 
 
 def buses_of(master: Master) -> dict[str, str]:
@@ -62,8 +92,7 @@ def buses_of(master: Master) -> dict[str, str]:
     }
 
 
-def _devices(master: Master, bus: str | None, names: tuple[str, ...]) -> tuple[str, ...]:
-    homes = buses_of(master)
+def _devices(homes: dict[str, str], bus: str | None, names: tuple[str, ...]) -> tuple[str, ...]:
     if not homes:
         raise InputError(
             "the case has no device that takes a voltage (v_re, v_im) and gives a current (i_re, i_im); phasor models "

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.frequency_response import Excitation
+from orchestrator.black_box.port import start_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
 from orchestrator.immittance.cut import Cut, cut_of
@@ -19,6 +21,7 @@ from orchestrator.immittance.measured import scan_fmu
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, PortPoint, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
+from orchestrator.immittance.strength import SourceBehind, short_circuit_mva, source_behind
 
 _UNLIKE = (0.003, 30.0)
 """Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
@@ -31,9 +34,9 @@ one."""
 @dataclass(frozen=True)
 class CutRequest:
     # device, network: A scan's file, an FMU or DLL; for the network a scan's file or a scenario. The network of a
-    # scenario alone is what remains of it.
+    # scenario alone is what remains of it; None where a short-circuit ratio stands for it.
     device: Path | None
-    network: Path | PreparedScenario
+    network: Path | PreparedScenario | None
     frequency: float = 50.0
     compensation: float = 0.0  # series capacitors, as share of the network's reactance at the rated frequency
     # of the device's frame before the network's [rad]; None where the files or the sides state it.
@@ -44,6 +47,10 @@ class CutRequest:
     generator: frozenset[str] = frozenset()  # sides whose files count currents out of them: ``device``, ``network``
     per_unit: frozenset[str] = frozenset()  # sides whose files are in per unit of the system base
     units_checked: bool = False
+    # scr, x_r: of the source behind R + jX that stands for the network; rating_mva: of the device, whose SCR is asked.
+    scr: float | None = None
+    x_r: float = 10.0
+    rating_mva: float | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
     binding: Path | None = None
     step_size: float = 1e-4
@@ -61,6 +68,21 @@ class CutResult:
     cut: Cut | None
     unit: str
     questions: tuple[str, ...]
+    # short_circuit, rating: of the network at the cut and of the device [MVA]; None where they are not known
+    short_circuit: float | None = None
+    rating: float | None = None
+
+    @property
+    def scr(self) -> float | None:
+        return self.short_circuit / self.rating if self.short_circuit and self.rating else None
+
+    @property
+    def scr_limit(self) -> float | None:
+        """SCR at which a stable loop is lost as the whole impedance of the network grows; 0 where it never is."""
+        up = self.judgement.margins.gain_up
+        if self.scr is None or self.verdict is not NyquistVerdict.STABLE:
+            return None
+        return 0.0 if up is None else self.scr / up.value
 
     @property
     def verdict(self) -> NyquistVerdict:
@@ -115,6 +137,7 @@ class CutResult:
                 "phase_deg": margin(m.phase_deg), "delay_s": margin(m.delay_s),
                 "distance": margin(m.distance), "disk": margin(m.disk),
             },
+            "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit},
             "difference_from_case": self.difference,
             "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
             "small_gain_hz": [list(band) for band in j.small_gain],
@@ -141,9 +164,12 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     known = _in_one_frame(request, scans, cut)
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
     device: Side | None = _sampled(scans["device"]) if "device" in scans else cut.device if cut else None
+    rating, base = _rating(request, cut), _base(request, scans, unit)
     network: Side | None = (
         _sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
     )
+    if request.scr is not None:
+        network = _source(request, rating, base)
     assert device is not None
     assert network is not None
     if cut is not None and "device" in scans:
@@ -154,9 +180,11 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     if request.compensation:
         loop = replace(loop, capacitors=_capacitors(loop, request))
     judgement = judge_loop(loop, frames_known=known)
-    if cut is not None and request.device is None and not request.compensation:
+    if cut is not None and request.device is None and not request.compensation and request.scr is None:
         judgement = _beside_modes(judgement, cut)
-    return CutResult(request, loop, judgement, scans, cut, unit, questions)
+    prepared = request.network if isinstance(request.network, PreparedScenario) and request.scr is None else None
+    short = short_circuit_mva(network, request.frequency, base, prepared, cut.bus if cut else "")
+    return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating)
 
 
 def _side(request: CutRequest, side: str, path: Path, cut: Cut | None, report: Callable[[str], None] | None) -> Scan:
@@ -174,6 +202,33 @@ def _side(request: CutRequest, side: str, path: Path, cut: Cut | None, report: C
         v = cut.voltages[name]
         values = {"v_0": abs(v), "theta_0": float(np.angle(v))} | values
     return scan_fmu(path, request.binding, values, request.step_size, request.excitation, report)
+
+
+def _rating(request: CutRequest, cut: Cut | None) -> float | None:
+    """Of the device [MVA], as it is given or as the device has it."""
+    if request.rating_mva is not None or (request.device is None and cut is None):
+        return request.rating_mva
+    if cut is not None and isinstance(request.network, PreparedScenario):
+        plans = [request.network.system.components[name] for name in cut.devices]
+        return sum(plan.number("S_n") for plan in plans if "S_n" in plan.description.variables) or None
+    if request.device is None or request.device.suffix.lower() in ENDINGS:
+        return None
+    description = bound_fmu(request.device, request.binding)
+    return float(request.values.get("S_n", start_of(description, "S_n"))) or None
+
+
+def _base(request: CutRequest, scans: Mapping[str, Scan], unit: str) -> float | None:
+    """What a power is divided by for an impedance: 100 MVA in per unit, else the square of the voltage [kV]."""
+    stated = [point.kilovolt for scan in scans.values() for point in scan.points.values() if point.kilovolt]
+    kilovolt = request.kilovolt or next(iter(stated), None)
+    return SYSTEM_BASE_MVA if unit == PER_UNIT else kilovolt**2 if kilovolt else None
+
+
+def _source(request: CutRequest, rating: float | None, base: float | None) -> SourceBehind:
+    if rating is None or base is None:
+        missing = "its rating by --rating '100 MVA'" if rating is None else "the rated voltage by --voltage '230 kV'"
+        raise InputError(f"--scr: a scan states no rating; give {missing}, to which the short-circuit ratio relates")
+    return source_behind(request.scr or 0.0, rating, request.x_r, 2 * np.pi * request.frequency, base)
 
 
 def _common_unit(scans: Any) -> str:
