@@ -1,6 +1,5 @@
 """Whether a device is stable at a network, by the generalised Nyquist criterion."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -17,6 +16,8 @@ from orchestrator.immittance.study import CutRequest, CutResult, study_cut
 from orchestrator.immittance.view import Nyquist
 from orchestrator.sensitivities.parameters import Parameter, parameters_in
 from orchestrator.units import to_unit
+
+_FMU = "device."  # before the names of an FMU's own parameters
 
 
 def nyquist(
@@ -117,50 +118,29 @@ class Asked:
     def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
         """Judge it."""
         result = study_cut(self.request(), report)
-        return Nyquist(
-            result, lambda changed: study_cut(self.request(changed)), lambda names: self._settings(result, names)
-        )
+        return Nyquist(result, lambda values: study_cut(self.request(values)), lambda x: self._settings(result, x))
 
     def _settings(self, result: CutResult, given: Sequence[str]) -> list[Tunable]:
-        """Parameters of the device: all tunable ones, or those that are named, each with its range."""
-        prefix, descriptions, values = "", {}, {}
+        """Parameters of the device that are not 0: all tunable ones, or those that are named."""
         if self._device is None and isinstance(result.request.network, PreparedScenario) and result.cut is not None:
             plans = {name: result.request.network.system.components[name] for name in result.cut.devices}
-            descriptions = {name: plan.description for name, plan in plans.items()}
-            value_of = lambda name, variable: plans[name].number(variable)  # noqa: E731
+            found = parameters_in({n: p.description for n, p in plans.items()}, lambda n, v: plans[n].number(v), given)
         elif self._device is not None and self._device.suffix.lower() not in ENDINGS:
-            prefix, values = "device.", result.request.values
-            descriptions = {"device": bound_fmu(self._device, result.request.binding)}
-            value_of = lambda _, variable: float(values.get(variable, start_of(descriptions["device"], variable)))  # noqa: E731
+            fmu, values = bound_fmu(self._device, result.request.binding), result.request.values
+            patterns = [f"{_FMU}{name}" for name in given]
+            found = parameters_in({_FMU[:-1]: fmu}, lambda _, v: float(values.get(v, start_of(fmu, v))), patterns)
         else:
             raise InputError(
-                f"--retune: {self._device} is a scan, which has no parameters; give the FMU or DLL itself, or a "
-                "case with it"
+                f"--retune: {self._device} is a scan and has no parameters; give the FMU, DLL or case itself"
             )
-        ranges = {name: read_range(span) for name, _, span in (text.partition("=") for text in given)}
-        found = parameters_in(descriptions, value_of, [prefix + name for name in ranges])
-        return [setting for x in found if (setting := _setting(x, x.name.removeprefix(prefix), ranges)) is not None]
+        return [_range(x) for x in found if x.value]
 
 
-def _setting(x: Parameter, name: str, ranges: Mapping[str, tuple[float, float] | None]) -> Tunable | None:
-    """With its range, within its bounds; None for one that is 0 and has none."""
-    low, high = ranges.get(name) or sorted((x.value / REACH, x.value * REACH))
-    low, high = (max(min(end, math.inf if x.maximum is None else x.maximum),
-                     -math.inf if x.minimum is None else x.minimum) for end in (low, high))  # fmt: skip
-    return Tunable(name, x.unit, x.value, min(low, x.value), max(high, x.value)) if low < high else None
-
-
-def read_range(text: str) -> tuple[float, float] | None:
-    """``LOW:HIGH``; None where it is empty."""
-    if not text:
-        return None
-    try:
-        low, high = (float(part) for part in text.split(":"))
-    except ValueError:
-        low = high = math.nan
-    if not low < high:
-        raise InputError(f"--parameter: {text!r} is no range; write NAME=LOW:HIGH, such as droop.R_f=0.02:0.2")
-    return low, high
+def _range(x: Parameter) -> Tunable:
+    """A quarter to four times its value, within its bounds."""
+    low, high = sorted((x.value / REACH, x.value * REACH))
+    low, high = low if x.minimum is None else max(low, x.minimum), high if x.maximum is None else min(high, x.maximum)
+    return Tunable(x.name.removeprefix(_FMU), x.unit, x.value, low, high)
 
 
 def is_case(text: str) -> bool:

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--x-r", "RATIO", "its X/R (10)", read=quantity("1"), default=10.0)
     option(parser, "--rating", "S", "of the device, for its SCR, where it states none", read=quantity("MVA"))
     switch(parser, "--retune", "which parameters of the device would keep it farther from −1, from a few scans each")
-    repeatable(parser, "--parameter", "NAME[=LOW:HIGH]", "only this one, tunable or fixed; also a pattern (repeatable; "
+    repeatable(parser, "--parameter", "NAME", "only this one, tunable or fixed; also a pattern (repeatable; "
                "default: all tunable ones, from a quarter to four times)")  # fmt: skip
     option(parser, "--distance", "D", "from −1, that --retune is to reach (0.3)", read=quantity("1"))
     option(parser, "--scenario", "NAME", "of a case (default: its first)")

@@ -39,47 +39,23 @@ class Cut:
     bus: str  # where the devices stand; "" where at several
 
 
-@dataclass(frozen=True)
-class LinearCase:
-    """A case at its operating point, linearised once, to be cut at any place."""
-
-    prepared: PreparedScenario
-    blocks: Blocks
-    model: LinearModel
-    stable: bool | None
-    eigenvalues: Complex  # of the closed system [rad/s]; empty where it is too large for all of them
-    values: dict[str, float]  # of all outputs at the operating point
-    homes: dict[str, str]
-    fed: dict[str, str]
-    warnings: tuple[str, ...]
-
-    def cut(self, bus: str | None, names: tuple[str, ...]) -> Cut:
-        devices = _devices(self.homes, bus, names)
-        places = {self.homes[name] for name in devices}
-        device, network = _sides(self.blocks, self.model, devices)
-        voltages = {d: complex(*(self.values[self.fed[f"{d}.{v}"]] for v in _PORT[0])) for d in devices}
-        currents = {d: complex(*(self.values[f"{d}.{i}"] for i in _PORT[1])) for d in devices}
-        return Cut(devices, device, network, self.stable, voltages, currents, rated_frequency(self.prepared),
-                   self.warnings, self.eigenvalues, places.pop() if len(places) == 1 else "")  # fmt: skip
-
-
-def linear_case(prepared: PreparedScenario) -> LinearCase:
+def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) -> Cut:
     with running(prepared) as master:
         said = sentences(misfits_of(master))
         homes = buses_of(master)
-        _devices(homes, None, ())
+        devices = _devices(homes, bus, names)
         find_operating_point(master)
         blocks = Blocks(master, without_step=True)
         model = continuous(blocks)
         spectrum = whole_spectrum(model)
-        found = np.zeros(0, dtype=complex) if spectrum is None else spectrum.eigenvalues
+        device, network = _sides(blocks, model, devices)
         values = dict(zip(master.output_names, master.y.tolist(), strict=True))
         fed = {str(c.target): str(c.source) for c in master.system.connections}
-        return LinearCase(prepared, blocks, model, judge(model, spectrum).stable, found, values, homes, fed, said)
-
-
-def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) -> Cut:
-    return linear_case(prepared).cut(bus, names)
+        voltages = {d: complex(*(values[fed[f"{d}.{v}"]] for v in _PORT[0])) for d in devices}
+        currents = {d: complex(*(values[f"{d}.{i}"] for i in _PORT[1])) for d in devices}
+    places, found = {homes[name] for name in devices}, np.zeros(0, dtype=complex)
+    return Cut(devices, device, network, judge(model, spectrum).stable, voltages, currents, rated_frequency(prepared),
+               said, spectrum.eigenvalues if spectrum else found, places.pop() if len(places) == 1 else "")  # fmt: skip
 
 
 def buses_of(master: Master) -> dict[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from orchestrator.arrays import Complex, Numbers, Vector
 from orchestrator.immittance.judgement import encirclements
 from orchestrator.immittance.loop import LoopPath, followed
-from orchestrator.immittance.margins import crossings_of, margins_of
+from orchestrator.immittance.margins import crossings_of, gains_of, margins_of
 from orchestrator.immittance.poles import fits
 
 _TURN = np.deg2rad(4.0)  # turn of det(1 + L) between two of the frequencies that are kept of a scan
@@ -44,7 +44,7 @@ def figures_of(path: LoopPath, growing: int | None, rated: float) -> LoopFigures
     m = margins_of(path, crossings)
     sign = _sign(growing)
     mode = next((p for p in light_modes(path) if abs(p.imag - rated) > _DIRECT * rated), None)
-    beyond = [-1 / c.real for c in crossings if c.real < -1]
+    beyond = [gain.value for gain in gains_of(path, crossings) if gain.value < 1]
     weaker = (m.gain_up.value if m.gain_up else math.inf) if sign > 0 else min(beyond, default=math.nan)
     return LoopFigures(sign * m.distance.value, m.distance.frequency_hz, mode, weaker)
 
@@ -89,7 +89,7 @@ class Family:
 
     def at(self, value: float) -> LoopPath:
         here = np.flatnonzero(self.nodes == value)
-        return self._path(self.loops[here[0]]) if len(here) else self._path(self._between(value))
+        return self._path(self.loops[here[0]] if len(here) else self._mixed(value, *self._fitted))
 
     def distance(self, value: float) -> float:
         """From −1, as `LoopFigures` has it."""
@@ -123,10 +123,6 @@ class Family:
 
     def _path(self, L: Complex) -> LoopPath:
         return LoopPath(self.s, L, followed(np.linalg.eigvals(L)))
-
-    def _between(self, value: float) -> Complex:
-        support, weights = self._fitted
-        return self._mixed(value, support, weights)
 
     def _mixed(self, value: float, support: list[int], weights: Complex) -> Complex:
         shares = weights / (value - self.nodes[support])

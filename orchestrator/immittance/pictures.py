@@ -33,30 +33,22 @@ def _retuned(shown: Sequence[Retuned], goal: float, scr: float | None) -> Figure
     figure = Figure(figsize=(2.7 * max(len(shown), 3) + 0.6, 2.0 * rows + 0.6), layout="constrained")
     axes = figure.subplots(rows, len(shown), squeeze=False, sharex="col", sharey="row")
     for column, one in zip(axes.T, shown, strict=True):
-        x, d = one.values, one.distances
-        column[0].plot(x, d, color=colour(1), label="from the scans' functions")
-        column[0].fill_between(x, d - one.error, d + one.error, color=colour(1), alpha=0.2)
-        column[0].plot(*zip(*((c.value, c.found) for c in one.checks), strict=True) if one.checks else ((), ()), "o",
-                       color="black", ms=3.5, label="scanned after it was predicted")  # fmt: skip
-        column[0].axhline(goal, color="#888888", linestyle="--", linewidth=0.8, label=f"wanted: {goal:g}")
-        column[0].axhspan(min(-0.02, np.nanmin(d)), 0, color="#a11d1d", alpha=0.08, label="unstable")
-        column[1].plot(x, [f.damping for f in one.figures], color=colour(2))
-        column[1].axhline(0, color="#a11d1d", linewidth=0.8)
-        if scr is not None:
-            column[2].plot(x, [scr / f.weaker for f in one.figures], color=colour(3))
-            column[2].axhline(scr, color="#888888", linestyle="--", linewidth=0.8)
-        for axis in column:
-            axis.axvline(one.setting.now, color="#888888", linewidth=0.8, linestyle=":")
-            axis.set_xscale("log" if x[0] > 0 else "linear")
-            axis.set_xticks([x[0], one.setting.now, x[-1]], [f"{v:.3g}" for v in (x[0], one.setting.now, x[-1])])
-            axis.minorticks_off()
-        if one.needed is not None:
-            column[0].plot([one.needed], [np.interp(one.needed, x, d)], "D", color=colour(3), ms=6, label="needed")
+        x, now = one.values, one.setting.now
+        curves = [one.distances, [f.damping for f in one.figures], [(scr or 0) / f.weaker for f in one.figures]]
+        for k, (axis, y, line) in enumerate(zip(column, curves, (goal, 0.0, scr), strict=False)):
+            axis.plot(x, y, color=colour(k + 1), label=None if k else "from the scans' functions")
+            axis.axhline(line, color="#888888", linestyle="--", linewidth=0.8, label=None if k else f"wanted: {goal:g}")
+            axis.axvline(now, color="#888888", linewidth=0.8, linestyle=":")
+        column[0].plot([c.value for c in one.checks], [c.found for c in one.checks], "o", color="black", ms=3.5,
+                       label="scanned after it was predicted")  # fmt: skip
+        column[0].axhspan(min(-0.02, np.nanmin(curves[0])), 0, color="#a11d1d", alpha=0.08, label="unstable")
+        column[-1].set_xscale("log" if x[0] > 0 else "linear")
+        column[-1].set_xticks([x[0], now, x[-1]], [f"{v:.3g}" for v in (x[0], now, x[-1])], minor=False)
+        column[-1].minorticks_off()
         column[-1].set_xlabel(one.setting.name + (f" [{one.setting.unit}]" if one.setting.unit != "1" else ""))
     for axis, label in zip(axes[:, 0], ("Distance from −1", "Least damping [%]", "Lost below SCR"), strict=False):
         axis.set_ylabel(label)
-    unique = {label: h for a in axes[0] for h, label in zip(*a.get_legend_handles_labels(), strict=True)}
-    add_legend(figure, list(unique.values()), list(unique))
+    add_legend(figure, *axes[0, 0].get_legend_handles_labels())
     return figure
 
 

@@ -5,7 +5,7 @@ such functions differ most, and checks what was predicted there before it is use
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -72,35 +72,17 @@ class Retuned:
 
     @property
     def error(self) -> float:
-        """Largest error that a check found of those after the last that was too large; NaN without a check."""
-        return max((abs(c.found - c.predicted) for c in self.checks[-2:]), default=math.nan)
+        """Largest error of the last two checks; 1 where nothing could be predicted."""
+        return float(np.nan_to_num([abs(c.found - c.predicted) for c in self.checks[-2:]] or [1.0], nan=1.0).max())
 
     @property
     def effort(self) -> float:
-        """Change that is needed, by the logarithm; infinite where none is enough."""
-        if self.needed is None:
-            return math.inf
-        ratio = self.needed / self.setting.now if self.setting.now else 0.0
-        return abs(math.log(ratio)) if ratio > 0 else 1e6
+        """Relative change that is needed; infinite where none is enough."""
+        now = self.setting.now
+        return math.inf if self.needed is None else abs(self.needed - now) / max(abs(now), abs(self.needed))
 
-    def coupled_mode(self, mode: complex | None) -> complex | None:
-        """The eigenvalue of the coupled system, with the value that is needed, that a mode stands for."""
-        cut = self.confirmed and self.confirmed.cut
-        if not cut or mode is None or not len(cut.eigenvalues) or cut.modes_stable is None:
-            return None
-        return complex(cut.eigenvalues[np.argmin(np.abs(cut.eigenvalues - mode))])
-
-    def best(self) -> int:
-        return int(np.nanargmax(self.distances))
-
-    def kept(self, goal: float) -> tuple[float, float] | None:
-        """Values around the present one that meet the goal."""
-        meets = np.append(self.distances >= goal, False)
-        k = int(np.searchsorted(self.values, self.setting.now))
-        if not meets[k]:
-            return None
-        first = k - int(np.argmin(np.append(meets[k::-1], False))) + 1
-        return float(self.values[first]), float(self.values[k + int(np.argmin(meets[k:])) - 1])
+    def met(self, goal: float) -> bool:
+        return bool(self.distances[np.searchsorted(self.values, self.setting.now)] >= goal)
 
 
 Study = Callable[[Mapping[str, float]], CutResult]
@@ -117,13 +99,12 @@ def retune(
     out = Retuned(setting, {setting.now: base})
     try:
         low, high = (_end(study, out, end, report) for end in (setting.low, setting.high))
-        setting = out.setting = Tunable(setting.name, setting.unit, setting.now, low, high)
+        setting = out.setting = replace(setting, low=low, high=high)
         ends = _family(out, [low, high])
         if np.abs(ends.loops[-1] - ends.loops[0]).max() < _SAME * np.abs(ends.loops[0]).max():
             out.remark = "changes nothing at the cut"
             return out
-        middle = min(setting.grid.tolist(), key=lambda x: abs(x - (low * high) ** 0.5 if low * high > 0 else x))
-        for value in (middle, *setting.grid[[GRID // 4, 3 * GRID // 4]].tolist()):
+        for value in setting.grid[[GRID // 2, GRID // 4]].tolist():
             if len(out.scans) < _FIRST:
                 _scan(study, out, value, report)
         while len(out.scans) < _MOST and not _settled(out):
@@ -155,8 +136,7 @@ def _end(study: Study, out: Retuned, end: float, report: Callable[[str], None]) 
             _scan(study, out, end, report)
         except CosimError as error:
             out.remark = f"not scanned at {end:.4g}: {error}"
-            now = out.setting.now
-            end = math.copysign((end * now) ** 0.5, now) if end * now > 0 else (end + now) / 2
+            end = (end + out.setting.now) / 2
         else:
             return end
     return out.setting.now
@@ -195,6 +175,8 @@ def _tell(out: Retuned) -> None:
     family = _family(out)
     out.values = np.unique(np.r_[out.setting.grid, family.nodes])
     out.figures = [family.figures(value) for value in out.values.tolist()]
+    if open_ := [f"{value:.4g}" for value, result in sorted(out.scans.items()) if result.judgement.reasons]:
+        out.remark = f"scans at {', '.join(open_)} give no verdict by themselves"
 
 
 def _meet(study: Study, out: Retuned, goal: float, report: Callable[[str], None]) -> None:

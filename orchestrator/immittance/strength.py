@@ -2,11 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from orchestrator.arrays import Complex, Numbers, Vector
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.short_circuit import ShortCircuit
 from orchestrator.immittance.sides import Side
 
@@ -37,16 +37,7 @@ class SourceBehind:
         return np.zeros(len(s))
 
 
-def source_behind(scr: float, rating_mva: float, x_r: float, omega: float, base: float) -> SourceBehind:
-    """The source that gives a device a short-circuit ratio; ``base``: V² [kV²], or 100 MVA for per unit."""
-    size = base / (scr * rating_mva)
-    R = size / math.hypot(1.0, x_r)
-    return SourceBehind(f"a source of SCR {scr:g}", R, x_r * R, omega)
-
-
-def short_circuit_mva(
-    network: Side, hertz: float, base: float | None, prepared: PreparedScenario | None, bus: str
-) -> float | None:
+def short_circuit_mva(network: Side, hertz: float, base: float | None, prepared: Any, bus: str) -> float | None:
     """Short-circuit power at a cut; of a case with a power flow as `gfor scr` has it, else of the impedance that the
     network has up to the rated frequency. None where it has no one impedance, or its base is not known."""
     if prepared is not None and prepared.network is not None and prepared.power_flow is not None:

@@ -1,5 +1,6 @@
 """A study at a cut: which two sides, in which units and frames, and what is found."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,22 +14,16 @@ from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.black_box.port import start_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
+from orchestrator.immittance.belonging import check_pair, check_place
 from orchestrator.immittance.cut import Cut, cut_of
 from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.margins import Margin
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.scan import PER_UNIT, SIEMENS, PortPoint, Scan, check_sign
+from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
-from orchestrator.immittance.strength import SourceBehind, short_circuit_mva, source_behind
-
-_UNLIKE = (0.003, 30.0)
-"""Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
-
-_OTHER_POINT = 0.01
-"""Relative difference of the voltage, and of the power over the larger one, from which on an operating point is another
-one."""
+from orchestrator.immittance.strength import SourceBehind, short_circuit_mva
 
 
 @dataclass(frozen=True)
@@ -164,7 +159,10 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     known = _in_one_frame(request, scans, cut)
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
     device: Side | None = _sampled(scans["device"]) if "device" in scans else cut.device if cut else None
-    rating, base = _rating(request, cut), _base(request, scans, unit)
+    rating, kilovolt = _rating(request, cut), request.kilovolt
+    for scan in scans.values():
+        kilovolt = kilovolt or next((point.kilovolt for point in scan.points.values() if point.kilovolt), None)
+    base = SYSTEM_BASE_MVA if unit == PER_UNIT else kilovolt**2 if kilovolt else None
     network: Side | None = (
         _sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
     )
@@ -173,9 +171,9 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     assert device is not None
     assert network is not None
     if cut is not None and "device" in scans:
-        _check_place(scans["device"], cut, request.kilovolt)
+        check_place(scans["device"], cut, request.kilovolt)
     if len(scans) == 2:
-        _check_pair(request, scans["device"], scans["network"])
+        check_pair(scans["device"], scans["network"], units_checked=request.units_checked)
     loop = CutLoop(device, network)
     if request.compensation:
         loop = replace(loop, capacitors=_capacitors(loop, request))
@@ -206,29 +204,22 @@ def _side(request: CutRequest, side: str, path: Path, cut: Cut | None, report: C
 
 def _rating(request: CutRequest, cut: Cut | None) -> float | None:
     """Of the device [MVA], as it is given or as the device has it."""
-    if request.rating_mva is not None or (request.device is None and cut is None):
-        return request.rating_mva
-    if cut is not None and isinstance(request.network, PreparedScenario):
+    if request.rating_mva is None and cut is not None and isinstance(request.network, PreparedScenario):
         plans = [request.network.system.components[name] for name in cut.devices]
         return sum(plan.number("S_n") for plan in plans if "S_n" in plan.description.variables) or None
-    if request.device is None or request.device.suffix.lower() in ENDINGS:
-        return None
-    description = bound_fmu(request.device, request.binding)
-    return float(request.values.get("S_n", start_of(description, "S_n"))) or None
-
-
-def _base(request: CutRequest, scans: Mapping[str, Scan], unit: str) -> float | None:
-    """What a power is divided by for an impedance: 100 MVA in per unit, else the square of the voltage [kV]."""
-    stated = [point.kilovolt for scan in scans.values() for point in scan.points.values() if point.kilovolt]
-    kilovolt = request.kilovolt or next(iter(stated), None)
-    return SYSTEM_BASE_MVA if unit == PER_UNIT else kilovolt**2 if kilovolt else None
+    if request.rating_mva is None and request.device and request.device.suffix.lower() not in ENDINGS:
+        return float(request.values.get("S_n", start_of(bound_fmu(request.device, request.binding), "S_n"))) or None
+    return request.rating_mva
 
 
 def _source(request: CutRequest, rating: float | None, base: float | None) -> SourceBehind:
+    if not (request.scr and request.scr > 0 and request.x_r > 0):
+        raise InputError(f"--scr {request.scr:g}, --x-r {request.x_r:g}: both must exceed 0")
     if rating is None or base is None:
         missing = "its rating by --rating '100 MVA'" if rating is None else "the rated voltage by --voltage '230 kV'"
         raise InputError(f"--scr: a scan states no rating; give {missing}, to which the short-circuit ratio relates")
-    return source_behind(request.scr or 0.0, rating, request.x_r, 2 * np.pi * request.frequency, base)
+    X = base / (request.scr * rating) / math.hypot(1.0, 1 / request.x_r)
+    return SourceBehind(f"a source of SCR {request.scr:g}", X / request.x_r, X, 2 * np.pi * request.frequency)
 
 
 def _common_unit(scans: Any) -> str:
@@ -267,50 +258,6 @@ def _sampled(scan: Scan, *, inverse: bool = False) -> Sampled:
         return Sampled(scan.source, scan.frequencies, scan.values, scan.bounds)
     Z = scan.impedance
     return Sampled(scan.source, scan.frequencies, Z, scan.bounds * np.linalg.norm(Z, ord=2, axis=(1, 2)) ** 2)
-
-
-def _check_pair(request: CutRequest, device: Scan, network: Scan) -> None:
-    if len(device.ports) != len(network.ports):
-        raise InputError(f"{device.source} has the ports {', '.join(device.ports)}, {network.source} has "
-                         f"{', '.join(network.ports)}; they must be the same")  # fmt: skip
-    low, high = (f(s.frequencies[k] for s in (device, network)) for f, k in ((max, 0), (min, -1)))
-    if low * 1.5 >= high:
-        raise InputError(f"{device.source} and {network.source} have no common range of frequencies")
-    sizes = [np.interp(np.geomspace(low, high, 50), s.frequencies, np.linalg.norm(M, ord=2, axis=(1, 2)))
-             for s, M in ((device, device.values), (network, network.impedance))]  # fmt: skip
-    ratio = float(np.median(sizes[0] * sizes[1]))
-    if not _UNLIKE[0] < ratio < _UNLIKE[1] and not request.units_checked:
-        raise InputError(
-            f"{device.source} times the impedance of {network.source} is {ratio:.2g} at most frequencies: is one of "
-            "them in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; "
-            "if the units are right, give --units-checked"
-        )
-    for one, other in zip(device.ports, network.ports, strict=True):
-        if one in device.points and other in network.points:
-            _check_point(f"port {one}: {device.source}", device.points[one], network.source, network.points[other])
-
-
-def _check_point(what: str, a: PortPoint, other: str, b: PortPoint) -> None:
-    """Refuse two operating points that differ; signs of powers are anybody's."""
-    power = max(abs(complex(p.megawatt or 0, p.megavar or 0)) for p in (a, b))
-    for name, x, y, size in (
-        ("voltage [kV]", a.kilovolt, b.kilovolt, a.kilovolt),
-        ("active power [MW]", a.megawatt, b.megawatt, power),
-        ("reactive power [Mvar]", a.megavar, b.megavar, power),
-    ):
-        if x is not None and y is not None and abs(abs(x) - abs(y)) > _OTHER_POINT * (size or 1):
-            raise InputError(
-                f"{what} was scanned at another operating point than {other}: {name} {x:g} and {y:g}; scan both at one"
-            )
-
-
-def _check_place(scan: Scan, cut: Cut, kilovolt: float | None) -> None:
-    """Refuse a scan at another operating point than the case's."""
-    (name,) = cut.devices
-    power = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_BASE_MVA
-    here = PortPoint(abs(cut.voltages[name]) * kilovolt if kilovolt else None, power.real, power.imag)
-    for point in scan.points.values():
-        _check_point(scan.source, point, f"{name} in the case", here)
 
 
 def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:

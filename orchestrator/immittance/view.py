@@ -51,18 +51,14 @@ class Nyquist:
         return self.result.judgement.reasons
 
     def retune(
-        self,
-        parameters: Sequence[str] = (),
-        *,
-        distance: float = GOAL,
-        report: Callable[[str], None] = lambda text: None,
+        self, parameters: Sequence[str] = (), *, distance: float = GOAL, report: Callable[[str], None] = str
     ) -> list[Retuned]:
         """Follow the distance from −1 over parameters of the device, and find the least change of each that is enough.
 
         Parameters
         ----------
         parameters
-            Names, patterns or ``NAME=LOW:HIGH``; all tunable ones by default.
+            Names or patterns; all tunable ones by default.
         distance
             From −1, that is wanted.
         report
