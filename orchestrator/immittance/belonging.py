@@ -5,6 +5,7 @@ import numpy as np
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.errors import InputError
 from orchestrator.immittance.cut import Cut
+from orchestrator.immittance.loop import CutLoop
 from orchestrator.immittance.scan import PortPoint, Scan
 
 _UNLIKE = (0.003, 30.0)
@@ -15,23 +16,26 @@ _OTHER_POINT = 0.01
 one."""
 
 
-def check_pair(device: Scan, network: Scan, *, units_checked: bool) -> None:
-    """Refuse a device and a network that do not belong together: ports, frequencies, units, operating points."""
+def check_size(loop: CutLoop, low: float, high: float) -> None:
+    """Refuse two sides whose loop is so large or small that one is in other units."""
+    sizes = np.linalg.norm(loop.values(2j * np.pi * np.geomspace(low, high, 50)), ord=2, axis=(1, 2))
+    ratio = float(np.median(sizes))
+    if not _UNLIKE[0] < ratio < _UNLIKE[1]:
+        raise InputError(
+            f"{loop.device.name} times the impedance of {loop.network.name} is {ratio:.2g} at most frequencies: is one "
+            "of them in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; "
+            "if the units are right, give --units-checked"
+        )
+
+
+def check_pair(device: Scan, network: Scan) -> None:
+    """Refuse a device and a network that do not belong together: ports, frequencies, operating points."""
     if len(device.ports) != len(network.ports):
         raise InputError(f"{device.source} has the ports {', '.join(device.ports)}, {network.source} has "
                          f"{', '.join(network.ports)}; they must be the same")  # fmt: skip
     low, high = (f(s.frequencies[k] for s in (device, network)) for f, k in ((max, 0), (min, -1)))
     if low * 1.5 >= high:
         raise InputError(f"{device.source} and {network.source} have no common range of frequencies")
-    sizes = [np.interp(np.geomspace(low, high, 50), s.frequencies, np.linalg.norm(M, ord=2, axis=(1, 2)))
-             for s, M in ((device, device.values), (network, network.impedance))]  # fmt: skip
-    ratio = float(np.median(sizes[0] * sizes[1]))
-    if not _UNLIKE[0] < ratio < _UNLIKE[1] and not units_checked:
-        raise InputError(
-            f"{device.source} times the impedance of {network.source} is {ratio:.2g} at most frequencies: is one of "
-            "them in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; "
-            "if the units are right, give --units-checked"
-        )
     for one, other in zip(device.ports, network.ports, strict=True):
         if one in device.points and other in network.points:
             _check_point(f"port {one}: {device.source}", device.points[one], network.source, network.points[other])

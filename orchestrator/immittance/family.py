@@ -43,7 +43,9 @@ def figures_of(path: LoopPath, growing: int | None, rated: float) -> LoopFigures
     crossings = crossings_of(path)
     m = margins_of(path, crossings)
     sign = _sign(growing)
-    mode = next((p for p in light_modes(path) if abs(p.imag - rated) > _DIRECT * rated), None)
+    modes = [p for p in light_modes(path) if abs(p.imag - rated) > _DIRECT * rated]
+    modes = [p for p in modes if p.real < 0 or not sign > 0]  # the count knows better what grows
+    mode = None if not modes or (sign < 0 and modes[0].real < 0) else modes[0]
     beyond = [gain.value for gain in gains_of(path, crossings) if gain.value < 1]
     weaker = (m.gain_up.value if m.gain_up else math.inf) if sign > 0 else min(beyond, default=math.nan)
     return LoopFigures(sign * m.distance.value, m.distance.frequency_hz, mode, weaker)
@@ -55,7 +57,7 @@ def _sign(growing: int | None) -> float:
 
 def light_modes(path: LoopPath, centres: Numbers = _EVERYWHERE) -> list[complex]:
     """Zeros of det(1 + L) near the axis [rad/s], least damped first, sought around some frequencies [rad/s]."""
-    on_axis = path.on_axis & (path.s.imag > 0)
+    on_axis = np.logical_and(path.on_axis, path.s.imag > 0)
     s, inverse = path.s[on_axis], 1 / path.det[on_axis][:, None]
     found: list[complex] = []
     for w in centres.tolist():

@@ -41,7 +41,7 @@ def _retuned(shown: Sequence[Retuned], goal: float, scr: float | None) -> Figure
             axis.axvline(now, color="#888888", linewidth=0.8, linestyle=":")
         column[0].plot([c.value for c in one.checks], [c.found for c in one.checks], "o", color="black", ms=3.5,
                        label="scanned after it was predicted")  # fmt: skip
-        column[0].axhspan(min(-0.02, np.nanmin(curves[0])), 0, color="#a11d1d", alpha=0.08, label="unstable")
+        column[0].axhspan(min(-0.02, np.nanmin(one.distances)), 0, color="#a11d1d", alpha=0.08, label="unstable")
         column[-1].set_xscale("log" if x[0] > 0 else "linear")
         column[-1].set_xticks([x[0], now, x[-1]], [f"{v:.3g}" for v in (x[0], now, x[-1])], minor=False)
         column[-1].minorticks_off()

@@ -14,10 +14,10 @@ from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.black_box.port import start_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
-from orchestrator.immittance.belonging import check_pair, check_place
+from orchestrator.immittance.belonging import check_pair, check_place, check_size
 from orchestrator.immittance.cut import Cut, cut_of
 from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judge_loop
-from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
+from orchestrator.immittance.loop import CutLoop, SeriesCapacitors, common_range
 from orchestrator.immittance.margins import Margin
 from orchestrator.immittance.measured import scan_fmu
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
@@ -173,8 +173,10 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     if cut is not None and "device" in scans:
         check_place(scans["device"], cut, request.kilovolt)
     if len(scans) == 2:
-        check_pair(scans["device"], scans["network"], units_checked=request.units_checked)
+        check_pair(scans["device"], scans["network"])
     loop = CutLoop(device, network)
+    if (len(scans) == 2 or (scans and request.scr)) and not request.units_checked:
+        check_size(loop, *common_range(device, network, (0.0, 0.0)))
     if request.compensation:
         loop = replace(loop, capacitors=_capacitors(loop, request))
     judgement = judge_loop(loop, frames_known=known)

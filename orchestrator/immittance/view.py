@@ -24,6 +24,12 @@ _MARGINS = (
 )  # fmt: skip
 
 
+Report = Callable[[str], None]
+
+
+def _silent(text: str) -> None: ...
+
+
 class Nyquist:
     """What was found at a cut. `nyquist` makes it.
 
@@ -51,7 +57,7 @@ class Nyquist:
         return self.result.judgement.reasons
 
     def retune(
-        self, parameters: Sequence[str] = (), *, distance: float = GOAL, report: Callable[[str], None] = str
+        self, parameters: Sequence[str] = (), *, distance: float = GOAL, report: Report = _silent
     ) -> list[Retuned]:
         """Follow the distance from −1 over parameters of the device, and find the least change of each that is enough.
 
