@@ -1,21 +1,30 @@
 """Whether a device is stable at a network, by the generalised Nyquist criterion."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
+from orchestrator.binding.binding import bound_fmu
+from orchestrator.black_box.port import start_of
 from orchestrator.cases.given import case_values, plain
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import InputError
+from orchestrator.immittance.retune import REACH, Tunable
 from orchestrator.immittance.scan_files import ENDINGS
-from orchestrator.immittance.study import CutRequest, study_cut
+from orchestrator.immittance.study import CutRequest, CutResult, study_cut
 from orchestrator.immittance.view import Nyquist
+from orchestrator.sensitivities.parameters import Parameter, parameters_in
 from orchestrator.units import to_unit
+
+_FMU = "device."  # before the names of an FMU's own parameters
 
 
 def nyquist(
     device: str | Path, network: str | Path | None = None, *, frequency: float | str = 50.0, compensation: float = 0.0,
     angle: float | None = None, voltage: float | str | None = None, bus: str | None = None,
     components: Sequence[str] = (), scenario: str | None = None, values: Mapping[str, Any] | None = None,
+    scr: float | None = None, rating: float | str | None = None,
 ) -> Nyquist:  # fmt: skip
     """Judge a device at a network.
 
@@ -39,6 +48,10 @@ def nyquist(
         Of the case; its first by default.
     values
         ``component.parameter`` of the case, or variables of the FMU.
+    scr
+        Short-circuit ratio of an ideal source that stands for the network.
+    rating
+        Of the device [MVA], where it states none.
 
     Returns
     -------
@@ -56,17 +69,83 @@ def nyquist(
     >>> gfor.nyquist("two_area", components=["gfor"], scenario="gfor").verdict
     'stable'
     """
-    case = device if network is None else network
-    given = plain(values)
-    of_case = {name: value for name, value in given.items() if network is None or "." in name}
-    is_scan = Path(case).suffix.lower() in ENDINGS
-    other = Path(case) if is_scan else network_of(str(case), scenario, of_case)
-    request = CutRequest(
-        None if network is None else Path(device), other, to_unit(frequency, "Hz"), compensation / 100, angle, bus,
-        tuple(components), None if voltage is None else to_unit(voltage, "kV"),
-        values={n: v for n, v in given.items() if is_scan or n not in of_case},
-    )  # fmt: skip
-    return Nyquist(study_cut(request))
+    rated = None if rating is None else to_unit(rating, "MVA")
+    return Asked(
+        str(device), None if network is None else str(network), scenario, plain(values),
+        frequency=to_unit(frequency, "Hz"), compensation=compensation / 100, angle=angle, bus=bus,
+        components=tuple(components), scr=scr, rating_mva=rated,
+        kilovolt=None if voltage is None else to_unit(voltage, "kV"),
+    ).judged()  # fmt: skip
+
+
+class Asked:
+    """What is judged, as it was given, and the same with other values.
+
+    Parameters
+    ----------
+    device, network, scenario, given
+        As `nyquist` has them, ``given`` for ``values``.
+    trust_fmus
+        As for `load`.
+    rest
+        Further fields of the request.
+    """
+
+    def __init__(
+        self, device: str, network: str | None, scenario: str | None, given: Mapping[str, Any], *,
+        trust_fmus: bool = False, **rest: Any,
+    ) -> None:  # fmt: skip
+        self._of_case = is_case(device) if network is None else is_case(network)
+        if network is None and not is_case(device) and rest.get("scr") is None:
+            raise InputError(
+                f"{device}: give its network as well: a scan, a short-circuit ratio by --scr, or a case with --bus or "
+                "--component"
+            )
+        self._device = Path(device) if network is not None or not self._of_case else None
+        self._case, self._scenario, self._given, self._trust = network or device, scenario, dict(given), trust_fmus
+        self._rest = rest
+
+    def request(self, changed: Mapping[str, Any] = MappingProxyType({})) -> CutRequest:
+        """The request, with some values changed."""
+        values = self._given | dict(changed)
+        of_case = {name: v for name, v in values.items() if self._of_case and (self._device is None or "." in name)}
+        network: Path | PreparedScenario | None = None if self._rest.get("scr") is not None else Path(self._case)
+        if self._of_case:
+            network = network_of(self._case, self._scenario, of_case, trust_fmus=self._trust)
+        of_fmu = {name: v for name, v in values.items() if name not in of_case}
+        return CutRequest(self._device, network, values=of_fmu, **self._rest)
+
+    def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
+        """Judge it."""
+        result = study_cut(self.request(), report)
+        return Nyquist(result, lambda values: study_cut(self.request(values)), lambda x: self._settings(result, x))
+
+    def _settings(self, result: CutResult, given: Sequence[str]) -> list[Tunable]:
+        """Parameters of the device that are not 0: all tunable ones, or those that are named."""
+        if self._device is None and isinstance(result.request.network, PreparedScenario) and result.cut is not None:
+            plans = {name: result.request.network.system.components[name] for name in result.cut.devices}
+            found = parameters_in({n: p.description for n, p in plans.items()}, lambda n, v: plans[n].number(v), given)
+        elif self._device is not None and self._device.suffix.lower() not in ENDINGS:
+            fmu, values = bound_fmu(self._device, result.request.binding), result.request.values
+            patterns = [f"{_FMU}{name}" for name in given]
+            found = parameters_in({_FMU[:-1]: fmu}, lambda _, v: float(values.get(v, start_of(fmu, v))), patterns)
+        else:
+            raise InputError(
+                f"--retune: {self._device} is a scan and has no parameters; give the FMU, DLL or case itself"
+            )
+        return [_range(x) for x in found if x.value]
+
+
+def _range(x: Parameter) -> Tunable:
+    """A quarter to four times its value, within its bounds."""
+    low, high = sorted((x.value / REACH, x.value * REACH))
+    low, high = low if x.minimum is None else max(low, x.minimum), high if x.maximum is None else min(high, x.maximum)
+    return Tunable(x.name.removeprefix(_FMU), x.unit, x.value, low, high)
+
+
+def is_case(text: str) -> bool:
+    """Whether a side is a case, and no scan, FMU or DLL."""
+    return Path(text).suffix.lower() not in (*ENDINGS, ".fmu", ".so", ".dll")
 
 
 def network_of(

@@ -5,16 +5,13 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.api.nyquist import network_of
+from orchestrator.api.nyquist import Asked
 from orchestrator.asked import read_part
 from orchestrator.black_box.frequency_response import Excitation
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import add_json_argument, option, quantity, repeatable, seconds, setting, switch
 from orchestrator.cli.terminal import make_console, print_json, print_parts, said_stages, say
 from orchestrator.errors import NOT_MET, InputError
-from orchestrator.immittance.scan_files import ENDINGS
-from orchestrator.immittance.study import CutRequest, study_cut
-from orchestrator.immittance.view import Nyquist, parts
+from orchestrator.immittance.view import GOAL, parts
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 
@@ -35,6 +32,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--units-checked", "two scans of very different size are meant so")
     option(parser, "--bus", "B", "cut a case between the devices of this bus and all else")
     repeatable(parser, "--component", "NAME", "cut a case at this component (repeatable)")
+    option(parser, "--scr", "SCR", "an ideal source of this short-circuit ratio is the network", read=quantity("1"))
+    option(parser, "--x-r", "RATIO", "its X/R (10)", read=quantity("1"), default=10.0)
+    option(parser, "--rating", "S", "of the device, for its SCR, where it states none", read=quantity("MVA"))
+    switch(parser, "--retune", "which parameters of the device would keep it farther from −1, from a few scans each")
+    repeatable(parser, "--parameter", "NAME", "only this one, tunable or fixed; also a pattern (repeatable; "
+               "default: all tunable ones, from a quarter to four times)")  # fmt: skip
+    option(parser, "--distance", "D", "from −1, that --retune is to reach (0.3)", read=quantity("1"))
     option(parser, "--scenario", "NAME", "of a case (default: its first)")
     repeatable(parser, "--set", "NAME=VALUE", "a value of the FMU, or COMPONENT.PARAMETER=VALUE of the case "
                "(repeatable)", read=setting)  # fmt: skip
@@ -50,36 +54,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Judge, draw, and say what was found."""
-    request = _request(options)
+    if (options.parameter or options.distance) and not options.retune:
+        raise InputError("--parameter and --distance belong to --retune, which is not given; add it, or leave them out")
+    asked = Asked(
+        options.device, options.network, options.scenario, dict(options.set), trust_fmus=options.trust_fmus,
+        frequency=options.frequency, compensation=options.compensation, angle=options.angle, bus=options.bus,
+        components=tuple(options.component), kilovolt=options.voltage, generator=frozenset(options.generator),
+        per_unit=frozenset(options.per_unit), units_checked=options.units_checked, binding=options.binding,
+        scr=options.scr, x_r=options.x_r, rating_mva=options.rating, step_size=options.step,
+        excitation=Excitation(lowest_hz=options.from_hz, highest_hz=options.to_hz, lines=160),
+    )  # fmt: skip
     folder = made_folder(options.out or Path("results") / f"nyquist_{Path(options.device).stem}", "--out")
     with said_stages() as report:
-        result = study_cut(request, report)
-    say("question", result.questions)
+        found = asked.judged(report)
+        say("question", found.result.questions)
+        if options.retune:
+            found.retune(options.parameter, distance=options.distance or GOAL, report=report)
     with staged(folder, new_run_id()) as staging:
-        Nyquist(result).save(staging)
+        found.save(staging)
     if options.json:
-        print_json(result.as_json())
+        print_json(found.as_json())
     else:
-        print_parts(make_console(), [*parts(result), escape(f"Results in {folder}")])
-    return NOT_MET if options.fail_unstable and result.verdict != "stable" else 0
-
-
-def _request(options: argparse.Namespace) -> CutRequest:
-    device, network = options.device, options.network
-    if network is None and Path(device).suffix.lower() in (*ENDINGS, ".fmu", ".so", ".dll"):
-        raise InputError(f"{device}: give its network as well: a scan, or a case with --bus or --component")
-    case = device if network is None else network
-    given = dict(options.set)
-    other: Path | PreparedScenario
-    if Path(case).suffix.lower() in ENDINGS:
-        of_fmu, other = given, Path(case)
-    else:
-        of_case = {name: value for name, value in given.items() if network is None or "." in name}
-        of_fmu = {name: value for name, value in given.items() if name not in of_case}
-        other = network_of(case, options.scenario, of_case, trust_fmus=options.trust_fmus)
-    return CutRequest(
-        Path(device) if network is not None else None, other, options.frequency, options.compensation, options.angle,
-        options.bus, tuple(options.component), options.voltage, frozenset(options.generator),
-        frozenset(options.per_unit), options.units_checked, of_fmu, options.binding,
-        options.step, Excitation(lowest_hz=options.from_hz, highest_hz=options.to_hz, lines=160),
-    )  # fmt: skip
+        print_parts(make_console(), [*parts(found), escape(f"Results in {folder}")])
+    return NOT_MET if options.fail_unstable and found.verdict != "stable" else 0

@@ -8,8 +8,9 @@ import scipy.linalg
 from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous
-from orchestrator.analysis.stability import judge
+from orchestrator.analysis.stability import judge, whole_spectrum
 from orchestrator.analysis.steady_state import find_operating_point
+from orchestrator.arrays import Complex
 from orchestrator.cases.facts import rated_frequency
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
@@ -34,22 +35,27 @@ class Cut:
     currents: dict[str, complex]
     rated_hz: float | None  # None where no component has one
     warnings: tuple[str, ...]
+    eigenvalues: Complex  # of the closed system [rad/s]; empty where it is too large for all of them
+    bus: str  # where the devices stand; "" where at several
 
 
 def cut_of(prepared: PreparedScenario, bus: str | None, names: tuple[str, ...]) -> Cut:
     with running(prepared) as master:
         said = sentences(misfits_of(master))
-        devices = _devices(master, bus, names)
+        homes = buses_of(master)
+        devices = _devices(homes, bus, names)
         find_operating_point(master)
         blocks = Blocks(master, without_step=True)
         model = continuous(blocks)
-        stability = judge(model)
+        spectrum = whole_spectrum(model)
         device, network = _sides(blocks, model, devices)
         values = dict(zip(master.output_names, master.y.tolist(), strict=True))
         fed = {str(c.target): str(c.source) for c in master.system.connections}
         voltages = {d: complex(*(values[fed[f"{d}.{v}"]] for v in _PORT[0])) for d in devices}
         currents = {d: complex(*(values[f"{d}.{i}"] for i in _PORT[1])) for d in devices}
-    return Cut(devices, device, network, stability.stable, voltages, currents, rated_frequency(prepared), said)
+    places, found = {homes[name] for name in devices}, np.zeros(0, dtype=complex)
+    return Cut(devices, device, network, judge(model, spectrum).stable, voltages, currents, rated_frequency(prepared),
+               said, spectrum.eigenvalues if spectrum else found, places.pop() if len(places) == 1 else "")  # fmt: skip
 
 
 def buses_of(master: Master) -> dict[str, str]:
@@ -62,8 +68,7 @@ def buses_of(master: Master) -> dict[str, str]:
     }
 
 
-def _devices(master: Master, bus: str | None, names: tuple[str, ...]) -> tuple[str, ...]:
-    homes = buses_of(master)
+def _devices(homes: dict[str, str], bus: str | None, names: tuple[str, ...]) -> tuple[str, ...]:
     if not homes:
         raise InputError(
             "the case has no device that takes a voltage (v_re, v_im) and gives a current (i_re, i_im); phasor models "

@@ -54,7 +54,7 @@ def judge_loop(
     nodes = nodes_of(loop.device, loop.network, low, high)
     path = loop.path(nodes)
     crossings = crossings_of(path)
-    count, by_loci = _by_determinant(path, loop), _by_crossings(path, loop)
+    count, by_loci = encirclements(path, exact=loop.is_exact)
     reasons = [*_open_loop(loop), *_resolution(loop, path), *_ends(loop, path)]
     if count != by_loci:
         reasons.append(
@@ -82,16 +82,21 @@ def _principal(path: LoopPath, k: int) -> float:
     return float(np.angle(1 + path.loci[k]).sum())
 
 
-def _by_determinant(path: LoopPath, loop: CutLoop) -> int:
+def encirclements(path: LoopPath, *, exact: bool) -> tuple[int, int]:
+    """Of −1, clockwise, by the determinant and by the eigenloci; ``exact`` where the path goes on to infinity."""
+    return _by_determinant(path, exact), _by_crossings(path, exact)
+
+
+def _by_determinant(path: LoopPath, exact: bool) -> int:
     """Clockwise encirclements of the whole axis, of which the path is the upper half."""
     first, last = _principal(path, 0), _principal(path, -1)
     begin = np.pi * round(first / np.pi)
-    end = np.pi * round(last / np.pi) if loop.is_exact else 0.0
+    end = np.pi * round(last / np.pi) if exact else 0.0
     around = float(first - begin + path.turns.sum() - (last - end))
     return -round(around / np.pi)
 
 
-def _by_crossings(path: LoopPath, loop: CutLoop) -> int:
+def _by_crossings(path: LoopPath, exact: bool) -> int:
     """The same, by crossings of the ray from −1 to −∞."""
     found: int = 0
     for locus in path.loci.T:
@@ -100,7 +105,7 @@ def _by_crossings(path: LoopPath, loop: CutLoop) -> int:
         beyond = locus.real[i] + t * (locus.real[i + 1] - locus.real[i]) < -1
         found += 2 * int(np.where(locus.imag[i + 1] > locus.imag[i], 1, -1)[beyond].sum())
         found += _on_the_ray(locus[0])
-        found -= _on_the_ray(locus[-1]) if loop.is_exact else 0
+        found -= _on_the_ray(locus[-1]) if exact else 0
     return found
 
 
@@ -182,7 +187,7 @@ def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:
     for angle in np.linspace(0, np.pi, _FRAMES, endpoint=False)[1:]:  # half a turn changes nothing
         T = block_rotation([angle] * (device.values.shape[-1] // 2))
         turned = replace(loop, device=replace(device, values=T @ device.values @ T.T))
-        if _by_determinant(turned.path(nodes), loop) != count:
+        if _by_determinant(turned.path(nodes), loop.is_exact) != count:
             return [
                 "the verdict depends on the angle between the frames of the two scans, which neither states: give it "
                 f"by --angle, or the files _angles.txt (turned by {np.rad2deg(angle):.0f}° it would be another)"

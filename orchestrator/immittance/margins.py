@@ -8,6 +8,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.immittance.loop import LoopPath
 
 _LEAST = 1e-4  # loci that cross the axis nearer to 0 tell nothing
+_LEVEL, _FLAT = 0.05, 0.5  # parts by which a locus that begins on the real axis may leave it, and change up to thrice f
 _SLOWEST = 0.05  # least frequency of a distance [Hz]: below, a free angle moves as far as one likes
 
 
@@ -60,8 +61,20 @@ def crossings_of(path: LoopPath) -> list[Crossing]:
     return sorted(found, key=lambda c: c.frequency_hz)
 
 
+def gains_of(path: LoopPath, crossings: list[Crossing]) -> list[Margin]:
+    """Factors on the loop that put a locus on −1; at 0 Hz where it begins on the negative real axis and is level there,
+    so that what grows does not swing."""
+    later = int(np.argmax(path.on_axis & (path.hertz >= 3 * path.hertz[path.on_axis][0])))
+    begins = [
+        Margin(float(-1 / a.real), 0.0)
+        for a, b in zip(path.loci[0], path.loci[later], strict=True)
+        if a.real < -_LEAST and abs(a.imag) < _LEVEL * abs(a) and abs(b - a) < _FLAT * abs(a)
+    ]
+    return [*begins, *(Margin(-1 / c.real, c.frequency_hz) for c in crossings)]
+
+
 def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
-    gains = [Margin(-1 / c.real, c.frequency_hz) for c in crossings]
+    gains = gains_of(path, crossings)
     up = min((m for m in gains if m.value > 1), key=lambda m: m.value, default=None)
     down = max((m for m in gains if m.value <= 1), key=lambda m: m.value, default=None)
     turned, delayed = [], []

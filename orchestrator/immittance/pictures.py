@@ -1,5 +1,6 @@
 """Pictures of a cut: eigenloci with the unit circle and the margins, the matrices over frequency, the active bands."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -7,17 +8,48 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestrator.immittance.judgement import CutJudgement
+from orchestrator.immittance.retune import Retuned
 from orchestrator.immittance.study import CutResult
-from orchestrator.report.plot_style import STYLE, colour, save_figure
+from orchestrator.report.plot_style import STYLE, add_legend, colour, save_figure
+
+_PANELS = 4  # parameters in a picture
 
 
-def draw(result: CutResult, folder: Path) -> list[Path]:
-    """Write ``eigenloci.png`` and ``matrices.png``."""
+def draw(result: CutResult, folder: Path, retuned: Sequence[Retuned] = (), goal: float = 0.0) -> list[Path]:
+    """Write ``eigenloci.png``, ``matrices.png``, and what parameters do as ``retune.png``."""
     loci, matrices = folder / "eigenloci.png", folder / "matrices.png"
     with mpl.rc_context(STYLE):
         save_figure(_eigenloci(result.judgement, f"{result.verdict}: {result.loop.device.name}"), loci)
         save_figure(_matrices(result), matrices)
-    return [loci, matrices]
+        shown = [one for one in retuned if one.figures][:_PANELS]
+        if shown:
+            save_figure(_retuned(shown, goal, result.scr), folder / "retune.png")
+    return [loci, matrices, *([folder / "retune.png"] if shown else [])]
+
+
+def _retuned(shown: Sequence[Retuned], goal: float, scr: float | None) -> Figure:
+    """Distance, damping and the ratio at which stability is lost, a column for each parameter."""
+    rows = 2 if scr is None else 3
+    figure = Figure(figsize=(2.7 * max(len(shown), 3) + 0.6, 2.0 * rows + 0.6), layout="constrained")
+    axes = figure.subplots(rows, len(shown), squeeze=False, sharex="col", sharey="row")
+    for column, one in zip(axes.T, shown, strict=True):
+        x, now = one.values, one.setting.now
+        curves = [one.distances, [f.damping for f in one.figures], [(scr or 0) / f.weaker for f in one.figures]]
+        for k, (axis, y, line) in enumerate(zip(column, curves, (goal, 0.0, scr), strict=False)):
+            axis.plot(x, y, color=colour(k + 1), label=None if k else "from the scans' functions")
+            axis.axhline(line, color="#888888", linestyle="--", linewidth=0.8, label=None if k else f"wanted: {goal:g}")
+            axis.axvline(now, color="#888888", linewidth=0.8, linestyle=":")
+        column[0].plot([c.value for c in one.checks], [c.found for c in one.checks], "o", color="black", ms=3.5,
+                       label="scanned after it was predicted")  # fmt: skip
+        column[0].axhspan(min(-0.02, np.nanmin(one.distances)), 0, color="#a11d1d", alpha=0.08, label="unstable")
+        column[-1].set_xscale("log" if x[0] > 0 else "linear")
+        column[-1].set_xticks([x[0], now, x[-1]], [f"{v:.3g}" for v in (x[0], now, x[-1])], minor=False)
+        column[-1].minorticks_off()
+        column[-1].set_xlabel(one.setting.name + (f" [{one.setting.unit}]" if one.setting.unit != "1" else ""))
+    for axis, label in zip(axes[:, 0], ("Distance from −1", "Least damping [%]", "Lost below SCR"), strict=False):
+        axis.set_ylabel(label)
+    add_legend(figure, *axes[0, 0].get_legend_handles_labels())
+    return figure
 
 
 def _eigenloci(judgement: CutJudgement, title: str) -> Figure:

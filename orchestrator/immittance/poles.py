@@ -24,8 +24,8 @@ def unstable_poles(frequencies: Numbers, values: Vector) -> tuple[complex, ...]:
     frequencies, values = frequencies[::every], values[::every]
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
     size = size / size.max()
-    fits = _fits(2j * np.pi * frequencies, (values / np.abs(values).max()).reshape(len(size), -1))
-    found = [_growing(frequencies, size, *fit) for fit in fits]
+    fitted = fits(2j * np.pi * frequencies, (values / np.abs(values).max()).reshape(len(size), -1))
+    found = [_growing(frequencies, size, *fit) for fit in fitted]
     kept: list[complex] = []
     for coarse, fine in pairwise(found):
         for p in fine:
@@ -48,7 +48,7 @@ def _growing(f: Numbers, size: Numbers, poles: Vector, residues: Vector) -> list
     return found
 
 
-def _fits(s: Vector, G: Vector) -> list[tuple[Complex, Complex]]:
+def fits(s: Vector, G: Vector) -> list[tuple[Complex, Complex]]:
     """Poles and residues of rational functions through the values, at each of the tolerances."""
     support: list[int] = []
     error = np.abs(G - G.mean(axis=0)).max(axis=1)

@@ -17,8 +17,7 @@ _TOP = 5.0  # frequencies down to this part of the highest tell signs: there a d
 _ACTIVE = 0.5
 """Part of those frequencies at which both resistances must be negative for the sign to be called the generator's."""
 
-_SURE = 0.02
-"""Reactance at the rated frequency over the size of the impedance from which on its sign tells the axes' order."""
+_SURE = 0.3  # part of the other order's misfit from which on that of one order of the axes is the right one
 
 _HOLE, _BESIDE = 3.0, 8
 """A step of the frequency this many times as long as each of so many to either side may be a hole."""
@@ -120,20 +119,17 @@ def in_own_form(source: str, frequencies: Numbers, values: Vector, rated_hz: flo
 
 
 def _reactance_sign(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
-    """1 if ωL in the dq and qd elements of the impedance is that of a leading q axis, −1 of a lagging; 0 if unclear."""
-    top = frequencies >= frequencies[-1] / _TOP
-    size = np.linalg.norm(values[top], ord=2, axis=(1, 2))
-    if (size == 0).any():
-        return 0.0
-    Z = np.linalg.pinv(values[top])
-    cross = (Z[:, 1, 0] - Z[:, 0, 1]).real / 2
-    along = (Z[:, 0, 0] + Z[:, 1, 1]).imag / 2  # ωL where the cross elements have ω₀L
-    agrees = cross / np.where(along == 0, 1.0, along) * frequencies[top] / rated_hz
-    sure = np.abs(cross) > _SURE * np.linalg.norm(Z, ord=2, axis=(1, 2))
-    if sure.mean() < 0.5:
-        return 0.0
-    near_one = np.abs(np.abs(agrees[sure]) - 1) < 0.3
-    return float(np.sign(np.median(agrees[sure]))) if near_one.mean() > 0.8 else 0.0
+    """1 for a leading q axis, −1 for a lagging one; 0 if unclear. At high frequencies a device is a circuit Z(jω), that
+    dq shows at ω + ω₀ in the one sequence and at ω − ω₀ in the other: the same 2ω₀ further on."""
+    Z = np.linalg.pinv(values)
+    along, cross = (Z[:, 0, 0] + Z[:, 1, 1]) / 2, 0.5j * (Z[:, 1, 0] - Z[:, 0, 1])
+    top = (frequencies >= frequencies[-1] / _TOP) & (frequencies <= frequencies[-1] - 2 * rated_hz)
+    f, found = frequencies[top], []
+    for here, there in ((along + cross, along - cross), (along - cross, along + cross)):
+        apart = np.abs(np.interp(f + 2 * rated_hz, frequencies, there) - here[top])
+        found.append(float(np.median(apart / np.maximum(np.abs(here[top]), 1e-300))) if len(f) else 1.0)
+    leads, lags = found
+    return 1.0 if leads < _SURE * lags else -1.0 if lags < _SURE * leads else 0.0
 
 
 def is_active(scan: Scan) -> bool:

@@ -1,5 +1,6 @@
 """A study at a cut: which two sides, in which units and frames, and what is found."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,32 +9,29 @@ from typing import Any
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.frequency_response import Excitation
+from orchestrator.black_box.port import start_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
+from orchestrator.immittance.belonging import check_pair, check_place, check_size
 from orchestrator.immittance.cut import Cut, cut_of
 from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judge_loop
-from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
+from orchestrator.immittance.loop import CutLoop, SeriesCapacitors, common_range
 from orchestrator.immittance.margins import Margin
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.scan import PER_UNIT, SIEMENS, PortPoint, Scan, check_sign
+from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
-
-_UNLIKE = (0.003, 30.0)
-"""Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
-
-_OTHER_POINT = 0.01
-"""Relative difference of the voltage, and of the power over the larger one, from which on an operating point is another
-one."""
+from orchestrator.immittance.strength import SourceBehind, short_circuit_mva
 
 
 @dataclass(frozen=True)
 class CutRequest:
     # device, network: A scan's file, an FMU or DLL; for the network a scan's file or a scenario. The network of a
-    # scenario alone is what remains of it.
+    # scenario alone is what remains of it; None where a short-circuit ratio stands for it.
     device: Path | None
-    network: Path | PreparedScenario
+    network: Path | PreparedScenario | None
     frequency: float = 50.0
     compensation: float = 0.0  # series capacitors, as share of the network's reactance at the rated frequency
     # of the device's frame before the network's [rad]; None where the files or the sides state it.
@@ -44,6 +42,10 @@ class CutRequest:
     generator: frozenset[str] = frozenset()  # sides whose files count currents out of them: ``device``, ``network``
     per_unit: frozenset[str] = frozenset()  # sides whose files are in per unit of the system base
     units_checked: bool = False
+    # scr, x_r: of the source behind R + jX that stands for the network; rating_mva: of the device, whose SCR is asked.
+    scr: float | None = None
+    x_r: float = 10.0
+    rating_mva: float | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
     binding: Path | None = None
     step_size: float = 1e-4
@@ -61,6 +63,21 @@ class CutResult:
     cut: Cut | None
     unit: str
     questions: tuple[str, ...]
+    # short_circuit, rating: of the network at the cut and of the device [MVA]; None where they are not known
+    short_circuit: float | None = None
+    rating: float | None = None
+
+    @property
+    def scr(self) -> float | None:
+        return self.short_circuit / self.rating if self.short_circuit and self.rating else None
+
+    @property
+    def scr_limit(self) -> float | None:
+        """SCR at which a stable loop is lost as the whole impedance of the network grows; 0 where it never is."""
+        up = self.judgement.margins.gain_up
+        if self.scr is None or self.verdict is not NyquistVerdict.STABLE:
+            return None
+        return 0.0 if up is None else self.scr / up.value
 
     @property
     def verdict(self) -> NyquistVerdict:
@@ -115,6 +132,7 @@ class CutResult:
                 "phase_deg": margin(m.phase_deg), "delay_s": margin(m.delay_s),
                 "distance": margin(m.distance), "disk": margin(m.disk),
             },
+            "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit},
             "difference_from_case": self.difference,
             "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
             "small_gain_hz": [list(band) for band in j.small_gain],
@@ -141,22 +159,32 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     known = _in_one_frame(request, scans, cut)
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
     device: Side | None = _sampled(scans["device"]) if "device" in scans else cut.device if cut else None
+    rating, kilovolt = _rating(request, cut), request.kilovolt
+    for scan in scans.values():
+        kilovolt = kilovolt or next((point.kilovolt for point in scan.points.values() if point.kilovolt), None)
+    base = SYSTEM_BASE_MVA if unit == PER_UNIT else kilovolt**2 if kilovolt else None
     network: Side | None = (
         _sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
     )
+    if request.scr is not None:
+        network = _source(request, rating, base)
     assert device is not None
     assert network is not None
     if cut is not None and "device" in scans:
-        _check_place(scans["device"], cut, request.kilovolt)
+        check_place(scans["device"], cut, request.kilovolt)
     if len(scans) == 2:
-        _check_pair(request, scans["device"], scans["network"])
+        check_pair(scans["device"], scans["network"])
     loop = CutLoop(device, network)
+    if (len(scans) == 2 or (scans and request.scr)) and not request.units_checked:
+        check_size(loop, *common_range(device, network, (0.0, 0.0)))
     if request.compensation:
         loop = replace(loop, capacitors=_capacitors(loop, request))
     judgement = judge_loop(loop, frames_known=known)
-    if cut is not None and request.device is None and not request.compensation:
+    if cut is not None and request.device is None and not request.compensation and request.scr is None:
         judgement = _beside_modes(judgement, cut)
-    return CutResult(request, loop, judgement, scans, cut, unit, questions)
+    prepared = request.network if isinstance(request.network, PreparedScenario) and request.scr is None else None
+    short = short_circuit_mva(network, request.frequency, base, prepared, cut.bus if cut else "")
+    return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating)
 
 
 def _side(request: CutRequest, side: str, path: Path, cut: Cut | None, report: Callable[[str], None] | None) -> Scan:
@@ -174,6 +202,26 @@ def _side(request: CutRequest, side: str, path: Path, cut: Cut | None, report: C
         v = cut.voltages[name]
         values = {"v_0": abs(v), "theta_0": float(np.angle(v))} | values
     return scan_fmu(path, request.binding, values, request.step_size, request.excitation, report)
+
+
+def _rating(request: CutRequest, cut: Cut | None) -> float | None:
+    """Of the device [MVA], as it is given or as the device has it."""
+    if request.rating_mva is None and cut is not None and isinstance(request.network, PreparedScenario):
+        plans = [request.network.system.components[name] for name in cut.devices]
+        return sum(plan.number("S_n") for plan in plans if "S_n" in plan.description.variables) or None
+    if request.rating_mva is None and request.device and request.device.suffix.lower() not in ENDINGS:
+        return float(request.values.get("S_n", start_of(bound_fmu(request.device, request.binding), "S_n"))) or None
+    return request.rating_mva
+
+
+def _source(request: CutRequest, rating: float | None, base: float | None) -> SourceBehind:
+    if not (request.scr and request.scr > 0 and request.x_r > 0):
+        raise InputError(f"--scr {request.scr:g}, --x-r {request.x_r:g}: both must exceed 0")
+    if rating is None or base is None:
+        missing = "its rating by --rating '100 MVA'" if rating is None else "the rated voltage by --voltage '230 kV'"
+        raise InputError(f"--scr: a scan states no rating; give {missing}, to which the short-circuit ratio relates")
+    X = base / (request.scr * rating) / math.hypot(1.0, 1 / request.x_r)
+    return SourceBehind(f"a source of SCR {request.scr:g}", X / request.x_r, X, 2 * np.pi * request.frequency)
 
 
 def _common_unit(scans: Any) -> str:
@@ -212,50 +260,6 @@ def _sampled(scan: Scan, *, inverse: bool = False) -> Sampled:
         return Sampled(scan.source, scan.frequencies, scan.values, scan.bounds)
     Z = scan.impedance
     return Sampled(scan.source, scan.frequencies, Z, scan.bounds * np.linalg.norm(Z, ord=2, axis=(1, 2)) ** 2)
-
-
-def _check_pair(request: CutRequest, device: Scan, network: Scan) -> None:
-    if len(device.ports) != len(network.ports):
-        raise InputError(f"{device.source} has the ports {', '.join(device.ports)}, {network.source} has "
-                         f"{', '.join(network.ports)}; they must be the same")  # fmt: skip
-    low, high = (f(s.frequencies[k] for s in (device, network)) for f, k in ((max, 0), (min, -1)))
-    if low * 1.5 >= high:
-        raise InputError(f"{device.source} and {network.source} have no common range of frequencies")
-    sizes = [np.interp(np.geomspace(low, high, 50), s.frequencies, np.linalg.norm(M, ord=2, axis=(1, 2)))
-             for s, M in ((device, device.values), (network, network.impedance))]  # fmt: skip
-    ratio = float(np.median(sizes[0] * sizes[1]))
-    if not _UNLIKE[0] < ratio < _UNLIKE[1] and not request.units_checked:
-        raise InputError(
-            f"{device.source} times the impedance of {network.source} is {ratio:.2g} at most frequencies: is one of "
-            "them in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; "
-            "if the units are right, give --units-checked"
-        )
-    for one, other in zip(device.ports, network.ports, strict=True):
-        if one in device.points and other in network.points:
-            _check_point(f"port {one}: {device.source}", device.points[one], network.source, network.points[other])
-
-
-def _check_point(what: str, a: PortPoint, other: str, b: PortPoint) -> None:
-    """Refuse two operating points that differ; signs of powers are anybody's."""
-    power = max(abs(complex(p.megawatt or 0, p.megavar or 0)) for p in (a, b))
-    for name, x, y, size in (
-        ("voltage [kV]", a.kilovolt, b.kilovolt, a.kilovolt),
-        ("active power [MW]", a.megawatt, b.megawatt, power),
-        ("reactive power [Mvar]", a.megavar, b.megavar, power),
-    ):
-        if x is not None and y is not None and abs(abs(x) - abs(y)) > _OTHER_POINT * (size or 1):
-            raise InputError(
-                f"{what} was scanned at another operating point than {other}: {name} {x:g} and {y:g}; scan both at one"
-            )
-
-
-def _check_place(scan: Scan, cut: Cut, kilovolt: float | None) -> None:
-    """Refuse a scan at another operating point than the case's."""
-    (name,) = cut.devices
-    power = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_BASE_MVA
-    here = PortPoint(abs(cut.voltages[name]) * kilovolt if kilovolt else None, power.real, power.imag)
-    for point in scan.points.values():
-        _check_point(scan.source, point, f"{name} in the case", here)
 
 
 def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:

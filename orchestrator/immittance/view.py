@@ -1,6 +1,6 @@
 """What was found at a cut: as Python has it, as files, and in words."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,15 +8,26 @@ from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.immittance.margins import Margin
+from orchestrator.immittance.retune import Retuned, Study, Tunable, retune
+from orchestrator.immittance.retune_view import retuned_json, retuned_table
 from orchestrator.immittance.study import CutResult
 from orchestrator.report.tables import make_table
 from orchestrator.report.verdict import VerdictSentence
 from orchestrator.results.storage import save_json
 
+GOAL = 0.3
+"""Distance from −1 that a retuning is to reach: all of L may be off by so much of 1."""
+
 _MARGINS = (
     ("gain up", "gain_up", "× {:.3f}"), ("gain down", "gain_down", "× {:.3f}"), ("phase", "phase_deg", "{:.1f}°"),
     ("delay", "delay_s", "{:.2e} s"), ("distance from −1", "distance", "{:.3f}"), ("disk", "disk", "{:.3f}"),
 )  # fmt: skip
+
+
+Report = Callable[[str], None]
+
+
+def _silent(text: str) -> None: ...
 
 
 class Nyquist:
@@ -26,10 +37,14 @@ class Nyquist:
     ----------
     result
         Loop, judgement and scans.
+    retuned
+        What `retune` found, by parameter.
     """
 
-    def __init__(self, result: CutResult) -> None:
-        self.result = result
+    def __init__(self, result: CutResult, study: Study, settings: Callable[[Sequence[str]], list[Tunable]]) -> None:
+        self.result, self._study, self._settings = result, study, settings
+        self.retuned: list[Retuned] = []
+        self.goal = GOAL
 
     @property
     def verdict(self) -> str:
@@ -41,15 +56,40 @@ class Nyquist:
         """Why the verdict is not known."""
         return self.result.judgement.reasons
 
+    def retune(
+        self, parameters: Sequence[str] = (), *, distance: float = GOAL, report: Report = _silent
+    ) -> list[Retuned]:
+        """Follow the distance from −1 over parameters of the device, and find the least change of each that is enough.
+
+        Parameters
+        ----------
+        parameters
+            Names or patterns; all tunable ones by default.
+        distance
+            From −1, that is wanted.
+        report
+            Called with a sentence before each scan.
+
+        Returns
+        -------
+        list
+            What each does, those that are enough first, by the size of the change.
+        """
+        self.goal = distance
+        found = [retune(self._study, setting, self.result, distance, report) for setting in self._settings(parameters)]
+        self.retuned = sorted(found, key=lambda one: one.effort)
+        return self.retuned
+
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor fmu nyquist --json`` prints, as JSON's types."""
-        return self.result.as_json()
+        more = {"retune": retuned_json(self.retuned, self.goal)} if self.retuned else {}
+        return self.result.as_json() | more
 
     def save_pictures(self, folder: str | Path) -> list[Path]:
         """Write the eigenloci and the matrices as PNG into a folder that exists; returns the paths."""
         from orchestrator.immittance.pictures import draw  # noqa: PLC0415 - a second to import
 
-        return draw(self.result, Path(folder))
+        return draw(self.result, Path(folder), self.retuned, self.goal)
 
     def save(self, folder: Path) -> None:
         """Write ``nyquist.json``, the pictures, and scans that were measured in Z-tool's form."""
@@ -65,18 +105,31 @@ class Nyquist:
         return f"<Nyquist {self.verdict}: {self.result.because}>"
 
 
-def parts(result: CutResult) -> Iterator[RenderableType]:
+def parts(found: Nyquist) -> Iterator[RenderableType]:
     """What a terminal shows: verdict, margins, where a side is not passive, how far a scan is from the case's own."""
+    result = found.result
     good = {"stable": True, "unstable": False}.get(str(result.verdict))
     yield VerdictSentence(good, str(result.verdict), result.because).markup()
     rows = [(name, *_cells(getattr(result.judgement.margins, key), text)) for name, key, text in _MARGINS]
     yield make_table("Margins", "Margin", "Value", "at [Hz]", rows=rows)
+    if result.scr is not None:
+        yield _strength(result)
     for side, bands in result.judgement.active.items():
         said = ", ".join(f"{a:.4g}–{b:.4g} Hz" for a, b in bands) or "nowhere"
         yield escape(f"{side} ({getattr(result.loop, side).name}) not passive: {said}")
     if (far := result.difference) is not None:
         yield (f"The device differs from the case's own by {100 * far['largest_relative']:.2g} % at most, at "
                f"{far['frequency_hz']:.4g} Hz")  # fmt: skip
+    if found.retuned:
+        yield from retuned_table(found.retuned, found.goal)
+
+
+def _strength(result: CutResult) -> str:
+    limit, d = result.scr_limit, result.judgement.margins.distance
+    lost = f"; stability is lost below {limit:.3g}" if limit else ""
+    said = "; no smaller one loses stability" if limit == 0 else lost
+    what = f"Short-circuit ratio {result.scr:.3g}{said}. It is no margin: devices and settings differ at one ratio"
+    return f"{what}; the distance of {d.value:.3g} counts"
 
 
 def _cells(margin: Margin | None, text: str) -> tuple[str, str]:

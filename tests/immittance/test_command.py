@@ -88,6 +88,22 @@ def test_per_unit_where_siemens_are_due(tmp_path):
         gfor.nyquist(*given)
 
 
+def test_at_a_short_circuit_ratio(tmp_path, capsys):
+    """The limit is that of the line whose impedance grows; per unit for siemens, and no rating, are asked for."""
+    device, _ = files(tmp_path)
+    found = gfor.nyquist(device, scr=1.5, rating="100 MVA", voltage="100 kV").as_json()["strength"]
+    R, X = (1 / found["scr_limit"] / (1 + k * k) ** 0.5 for k in (10, 0.1))
+    for k, stable in ((0.99, True), (1.01, False)):
+        assert is_stable(PLANT, Line(k * R, k * X / OMEGA)) == stable
+    with pytest.raises(InputError, match="a scan states no rating"):
+        gfor.nyquist(device, scr=1.5, voltage="100 kV")
+    (given, _) = files(tmp_path, device=PLANT.admittance(F) * 5)
+    with pytest.raises(InputError, match="is one of them in per unit"):
+        gfor.nyquist(given, scr=1.5, rating="100 MVA", voltage="100 kV")
+    assert main(["fmu", "nyquist", device, "--distance", "0.2"]) == 2
+    assert "belong to --retune" in capsys.readouterr().err
+
+
 def test_generator_sign(tmp_path):
     given = files(tmp_path, device=-0.01 * PLANT.admittance(F))
     with pytest.raises(InputError, match="Then give --generator device"):

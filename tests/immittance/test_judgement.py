@@ -198,3 +198,13 @@ def test_bounds_of_a_measurement_that_reach_the_critical_point_leave_it_open():
     assert judge_loop(CutLoop(sure, a_side(Z))).verdict == "stable"
     unsure = replace(sure, bounds=0.9 * np.linalg.norm(Y, axis=(1, 2)))
     assert judge_loop(CutLoop(unsure, a_side(Z))).verdict == "not known"
+
+
+def test_a_gain_at_which_it_grows_without_a_swing_is_a_margin():
+    """A locus begins on the negative real axis: nothing crosses it there, and the eigenvalue that grows is real."""
+    plant, line = constant_power(g=0.9, h=0.6, T=0.003, G=0.2), Line(0.05, 1.2 / OMEGA)
+    margin = judged(plant, line).margins.gain_up
+    assert margin.frequency_hz == 0
+    for k, stable in ((0.995, True), (1.005, False)):
+        scaled = replace(line, R=k * margin.value * line.R, L=k * margin.value * line.L)
+        assert is_stable(plant, scaled) == stable

@@ -70,6 +70,24 @@ def test_a_file_with_the_other_q_axis_is_refused(tmp_path):
         read_scan(tmp_path / "a.txt", 50.0)
 
 
+def test_the_axes_are_known_behind_a_filter_that_resonates(tmp_path):
+    """The capacitor of an LC filter turns the sign of the reactance around its resonance."""
+    f = np.geomspace(1, 1000, 300)
+    z = {}
+    for sign in (1, -1):
+        s = 2j * np.pi * (f + sign * 50)
+        inner = 1 / (s * 4.8e-4 + 1 / (0.02 + s * 4.8e-4))
+        z[sign] = s * 4.8e-4 + inner
+    along, cross = (z[1] + z[-1]) / 2, (z[1] - z[-1]) / 2j
+    Z = np.stack([np.stack([along, -cross], -1), np.stack([cross, along], -1)], -2)
+    right = Scan("filter", f, np.linalg.inv(Z), ("P",))
+    write_ztool(right, tmp_path / "right.txt")
+    write_ztool(Scan("filter", f, other_q_axis(right.values), ("P",)), tmp_path / "wrong.txt")
+    assert read_scan(tmp_path / "right.txt", 50.0).values == pytest.approx(right.values, rel=1e-9)
+    with pytest.raises(InputError, match="q axis leads the d axis"):
+        read_scan(tmp_path / "wrong.txt", 50.0)
+
+
 def test_alpha_beta_impedances_are_those_of_the_sequences(tmp_path):
     """Z₊₊ at f + 50 Hz and Z₋₋ at f − 50 Hz, from the definitions of both sequences."""
     f = np.linspace(1, 300, 90)

@@ -3,6 +3,7 @@ judged, and its figures."""
 
 import json
 import re
+from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -211,6 +212,28 @@ def _identified(file: Path, modes: Any) -> Chapter:
                    table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0))  # fmt: skip
 
 
+def _nyquist(file: Path, c: Content) -> Chapter:
+    rows = [[name, f"{m['value']:.4g}", f"{m['frequency_hz']:.4g}"] for name, m in c["margins"].items() if m]
+    content = table("Margins", ["Margin", "Value", "at [Hz]"], rows)
+    if found := c.get("retune"):
+        made = [[escape(x["name"]), f"{x['now']:.4g}", "" if x["needed"] is None else f"{x['needed']:.4g}",
+                 "" if (said := x["confirmed"]) is None else f"{said['verdict']}, {said['distance']:.4f}",
+                 escape(x["remark"])] for x in found["parameters"]]  # fmt: skip
+        wanted = f"What to retune for a distance of {found['distance_wanted']:g} from −1"
+        content += table(wanted, ["Parameter", "Now", "Needed", "Confirmed", "Remark"], made)
+    for picture in (file.with_name(name) for name in ("eigenloci.png", "matrices.png", "retune.png")):
+        if picture.is_file():
+            data = b64encode(picture.read_bytes()).decode()
+            content += f'<p><img alt="{picture.stem}" style="max-width: 100%" src="data:image/png;base64,{data}"></p>'
+    good = {"stable": True, "unstable": False}.get(c["verdict"])
+    sure = "determinant and eigenloci count alike; " + (
+        "modes agree" if c["modes_stable"] is not None else "no modes asked"
+    )
+    return Chapter(
+        file, f"Is {c['device']} stable at {c['network']}?", c["sentence"], good, sure, c["reasons"], content
+    )
+
+
 _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"device", "buses", "confirmed", "answer"}, _site), ({"holds_at", "beyond", "sentence"}, _limits),
     ({"counted_at_all_frequencies", "failures", "modes"}, _screening),
@@ -218,7 +241,7 @@ _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"settings", "verdict", "met", "ranking"}, _coordinated), ({"cells", "codes", "sentence"}, _matrix),
     ({"sentence", "verdict", "files", "seal"}, _certificate), ({"trusted", "checks", "faults"}, _check),
     ({"scenarios", "facts", "step_size_s"}, _modes), ({"expression", "deviations", "rms"}, _comparison),
-    ({"amplitude", "doubts"}, _identified),
+    ({"amplitude", "doubts"}, _identified), ({"crossings", "margins", "sentence"}, _nyquist),
 )  # fmt: skip
 """What the JSON of each study has, the first that fits."""
 

@@ -22,7 +22,7 @@ from orchestrator.report.html.elements import Figures, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
 from orchestrator.safe_files import write_text
 
-_USED = "run, modes, screen, sweep, site, design, certify, check and compare (both as JSON)"
+_USED = "run, modes, screen, sweep, site, design, certify, check, nyquist and compare (both as JSON)"
 
 Sections = list[tuple[str, str]]
 

@@ -1,0 +1,64 @@
+"""Whether two sides belong together, or a scan to its place in a case."""
+
+import numpy as np
+
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from orchestrator.errors import InputError
+from orchestrator.immittance.cut import Cut
+from orchestrator.immittance.loop import CutLoop
+from orchestrator.immittance.scan import PortPoint, Scan
+
+_UNLIKE = (0.003, 30.0)
+"""Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
+
+_OTHER_POINT = 0.01
+"""Relative difference of the voltage, and of the power over the larger one, from which on an operating point is another
+one."""
+
+
+def check_size(loop: CutLoop, low: float, high: float) -> None:
+    """Refuse two sides whose loop is so large or small that one is in other units."""
+    sizes = np.linalg.norm(loop.values(2j * np.pi * np.geomspace(low, high, 50)), ord=2, axis=(1, 2))
+    ratio = float(np.median(sizes))
+    if not _UNLIKE[0] < ratio < _UNLIKE[1]:
+        raise InputError(
+            f"{loop.device.name} times the impedance of {loop.network.name} is {ratio:.2g} at most frequencies: is one "
+            "of them in per unit where the other is in siemens? Then give --per-unit device or network, and --voltage; "
+            "if the units are right, give --units-checked"
+        )
+
+
+def check_pair(device: Scan, network: Scan) -> None:
+    """Refuse a device and a network that do not belong together: ports, frequencies, operating points."""
+    if len(device.ports) != len(network.ports):
+        raise InputError(f"{device.source} has the ports {', '.join(device.ports)}, {network.source} has "
+                         f"{', '.join(network.ports)}; they must be the same")  # fmt: skip
+    low, high = (f(s.frequencies[k] for s in (device, network)) for f, k in ((max, 0), (min, -1)))
+    if low * 1.5 >= high:
+        raise InputError(f"{device.source} and {network.source} have no common range of frequencies")
+    for one, other in zip(device.ports, network.ports, strict=True):
+        if one in device.points and other in network.points:
+            _check_point(f"port {one}: {device.source}", device.points[one], network.source, network.points[other])
+
+
+def _check_point(what: str, a: PortPoint, other: str, b: PortPoint) -> None:
+    """Refuse two operating points that differ; signs of powers are anybody's."""
+    power = max(abs(complex(p.megawatt or 0, p.megavar or 0)) for p in (a, b))
+    for name, x, y, size in (
+        ("voltage [kV]", a.kilovolt, b.kilovolt, a.kilovolt),
+        ("active power [MW]", a.megawatt, b.megawatt, power),
+        ("reactive power [Mvar]", a.megavar, b.megavar, power),
+    ):
+        if x is not None and y is not None and abs(abs(x) - abs(y)) > _OTHER_POINT * (size or 1):
+            raise InputError(
+                f"{what} was scanned at another operating point than {other}: {name} {x:g} and {y:g}; scan both at one"
+            )
+
+
+def check_place(scan: Scan, cut: Cut, kilovolt: float | None) -> None:
+    """Refuse a scan at another operating point than the case's."""
+    (name,) = cut.devices
+    power = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_BASE_MVA
+    here = PortPoint(abs(cut.voltages[name]) * kilovolt if kilovolt else None, power.real, power.imag)
+    for point in scan.points.values():
+        _check_point(scan.source, point, f"{name} in the case", here)

@@ -1,0 +1,51 @@
+"""System strength beside the margin: the short-circuit ratio at a cut, and a network that is no more than one."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orchestrator.arrays import Complex, Numbers, Vector
+from orchestrator.cases.short_circuit import ShortCircuit
+from orchestrator.immittance.sides import Side
+
+_ALIKE = 0.2  # relative change of the reactance up to the rated frequency from which on no one impedance is meant
+
+
+@dataclass(frozen=True)
+class SourceBehind:
+    """An ideal source behind R + jX, as the impedance that a device sees, in a frame whose q axis leads."""
+
+    name: str
+    resistance: float
+    reactance: float  # at the rated frequency
+    omega: float  # rated frequency [rad/s]
+    is_exact: bool = True
+    unstable: tuple[complex, ...] = ()
+
+    @property
+    def frequencies(self) -> Numbers:
+        return np.zeros(0)
+
+    def at(self, s: Vector) -> Complex:
+        along = self.resistance + s * (self.reactance / self.omega)
+        cross = np.full(len(s), self.reactance, dtype=complex)
+        return np.stack([np.stack([along, -cross], -1), np.stack([cross, along], -1)], -2)
+
+    def error(self, s: Vector) -> Numbers:
+        return np.zeros(len(s))
+
+
+def short_circuit_mva(network: Side, hertz: float, base: float | None, prepared: Any, bus: str) -> float | None:
+    """Short-circuit power at a cut; of a case with a power flow as `gfor scr` has it, else of the impedance that the
+    network has up to the rated frequency. None where it has no one impedance, or its base is not known."""
+    if prepared is not None and prepared.network is not None and prepared.power_flow is not None:
+        found = {b.bus: b.s_sc_mva for b in ShortCircuit.of(prepared).strengths()}
+        return found.get(bus.rpartition(".")[2])
+    low = network.frequencies[:1] if not network.is_exact else np.array([1e-3])
+    Z = network.at(2j * np.pi * np.append(low, max(0.9 * hertz, low[0])))
+    if base is None or Z.shape[1] != 2:
+        return None
+    X, R = (Z[:, 1, 0] - Z[:, 0, 1]).real / 2, (Z[0, 0, 0] + Z[0, 1, 1]).real / 2
+    return base / math.hypot(R, X[0]) if X[0] > 0 and abs(X[1] - X[0]) < _ALIKE * X[0] else None
