@@ -43,7 +43,11 @@ def checked(path, binding=None, only=()):
         ("base_of_own_rating", "ratings"),
         ("limit_of_own_rating", "ratings"),
         ("resonance", "signs"),
-        ("droop_while_charging", "signs"),
+        ("droop_while_charging", "evenness"),
+        ("undamped_while_charging", "evenness"),
+        ("damping_off_while_charging", "evenness"),
+        ("sign_of_q_at_high_voltage", "signs"),
+        ("angle_of_another_turn", "angles"),
         ("droop_of_q_while_charging", "signs"),
         ("refused_in_the_run", "tunables"),
         ("ignored_in_the_run", "tunables"),
@@ -98,6 +102,7 @@ def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
         ("held", "sample_time", "its outputs change every 1 ms only: 90% of all steps of 100 µs do nothing"),
         ("sixty_hertz", "rated_frequency", "so it is made for 60 Hz where 50 Hz is bound"),
         ("crash_in_dip", "limits", "s: its process died with SIGSEGV in fmi2DoStep"),
+        ("limit_of_a_short_time", "limits", " s at 0.1"),
     ],
 )
 def test_the_verdict_says_what_happened(name, only, words, gallery):

@@ -18,10 +18,9 @@ from orchestrator.acceptance.checks.port import (
     rating_of,
     voltage_rows,
 )
-from orchestrator.acceptance.checks.ride_through import NO_LIMIT
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
-from orchestrator.binding.misfits import BALANCE
+from orchestrator.binding.misfits import BALANCE, NO_LIMIT
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 

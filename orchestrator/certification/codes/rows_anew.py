@@ -103,7 +103,8 @@ def _compared(row: CodeRow, content: dict[str, Any], data: xr.Dataset, again: Be
         worst += [f"{signal}: {fault}"] if fault else []
     if worst:
         return "; ".join(worst), ""
-    criteria = [(f.criterion, bool(f.accepted)) for f in judge_row(row, again, content["f_n"]).findings]
+    judged = judge_row(row, again, content["f_n"], stated["criteria"])
+    criteria = [(f.criterion, bool(f.accepted)) for f in judged.findings]
     if criteria != [(entry["criterion"], bool(entry["accepted"])) for entry in stated["criteria"]]:
         return "its criteria come out otherwise than certified", ""
     said = "its response" if until == np.inf else f"its response to t = {until:g} s, from where on it fails"
