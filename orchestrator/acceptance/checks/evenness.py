@@ -21,6 +21,7 @@ _MOST = 0.4  # what a switch does beyond that is no small change [pu, S_n]: it c
 _LATE, _MORE = 0.05, 5.0
 """Swing in the second half of the time, in parts of the answer, that counts; how many times that of elsewhere."""
 
+_LARGER, _MILD = 5, OperatingAt(1.0, 0.0, 0.3, 0.05)  # how much more of the frequency changes, and where
 _GIVES, _TAKES = OperatingAt(1.0, 0.0, 0.6, 0.1), OperatingAt(1.0, 0.0, -0.6, 0.1)
 
 
@@ -32,9 +33,7 @@ def _points(subject: Subject) -> list[OperatingAt]:
     return [_GIVES, *(p for p in (_TAKES, *more) if not cannot_import(subject, p))]
 
 
-@check(
-    "evenness", "Does it answer the frequency alike at other points?", needs=(*SAME, "steady_state", "power_balance")
-)
+@check("evenness", "Does it answer alike at other points?", needs=(*SAME, "steady_state", "power_balance"))
 def evenness(subject: Subject) -> CheckResult:
     """The course of its active power after a small change, at several points, and with each of its switches at two."""
     if not subject.starts:
@@ -48,9 +47,15 @@ def evenness(subject: Subject) -> CheckResult:
                 raise
             continue  # which 'power_balance' and 'operating_points' tell
         if fault := _other(found[_GIVES].real, found[point].real):
-            size = np.abs(found[_GIVES].real).max()
             says = f"{fault[1]} from P_0 = {point.P:g}, Q_0 = {point.Q:g}, v_0 = {point.v:g}"
-            return failed("evenness", fault[0], f"{says}, and not from P_0 = {_GIVES.P:g}", size=size)
+            return failed("evenness", fault[0], f"{says}, and not from P_0 = {_GIVES.P:g}")
+    for larger, word in ((_LARGER, "less"), (-_LARGER, "more")):
+        end = np.sign(larger) * _course(subject, _MILD, {}, larger).real[-len(found[_GIVES]) // 10 :]
+        if end.mean() < -_SOME and np.ptp(end) < 0.1 * abs(end.mean()):
+            says = f"with {100 * _LARGER * FREQUENCY:g} % {word} frequency its active power goes the wrong way, "
+            return failed(
+                "evenness", "wrong sign", f"{says}by {abs(end.mean()):.2g} pu, as it does not with less of it"
+            )
     if _TAKES not in found:
         return passed("evenness", f"its answers at {len(found)} points are alike; it was not tried with imported power")
     for (gives, takes), words in with_each_setting(subject, lambda s: _effects(subject, s, found)):
@@ -59,22 +64,18 @@ def evenness(subject: Subject) -> CheckResult:
             for kind, a, b in (("active", gives.real, takes.real), ("reactive", gives.imag, takes.imag))
         )
         if _SOME < size < _MOST and np.abs(one - other).max() > _ACTS * size:
-            says = (
-                f"after less frequency{words} its {power} power differs by {np.abs(one).max():.2g} pu while it gives "
-            )
-            says += f"power, and by {np.abs(other).max():.2g} pu, in another course, while it takes some"
-            return failed("evenness", "uneven damping", says, size=size)
-    return passed(
-        "evenness", f"its answers to the frequency at {len(found)} points, giving and taking power, are alike"
-    )
+            sizes = " and ".join(f"{np.abs(course).max():.2g} pu" for course in (one, other))
+            says = f"after less frequency{words} its {power} power differs by {sizes} while it gives and takes power"
+            return failed("evenness", "uneven damping", says)
+    return passed("evenness", f"its answers at {len(found)} points, giving and taking power, are alike")
 
 
-def _course(subject: Subject, point: OperatingAt, setting: Setting) -> Complex:
-    """Change of the power [pu, S_n] after each step with less frequency."""
+def _course(subject: Subject, point: OperatingAt, setting: Setting, times: float = 1.0) -> Complex:
+    """Change of the power [pu, S_n] after each step with less frequency, so many times `FREQUENCY`."""
     h = subject.step_size
     steps = max(2, round(scale(subject, 3 * _LASTS) * _LASTS / h))
     with subject.running(point=point, parameters=setting) as running:
-        turned = np.exp(-100j * pi * FREQUENCY * h * np.arange(steps))
+        turned = np.exp(-100j * pi * times * FREQUENCY * h * np.arange(steps))
         current = of_current(running, running.hold(voltage_rows(running, turned), steps, h))
     power: Complex = point.voltage * turned * current.conj() - complex(point.P, point.Q)
     return power
@@ -92,10 +93,7 @@ def _other(usual: Numbers, here: Numbers) -> tuple[str, str] | None:
         return None
     late, before = np.ptp(here[len(here) // 2 :]), np.ptp(usual[len(usual) // 2 :])
     if max(late, before) > _LATE * size and max(late, before) > _MORE * min(late, before):
-        return (
-            "uneven damping",
-            f"its active power still moves by {late:.2g} pu, not {before:.2g} pu, after a small change",
-        )
+        return "uneven damping", f"its power still moves by {late:.2g} pu, not {before:.2g} pu, after a small change"
     if np.abs(here - usual).max() > _EVEN * size:
         return "uneven droop", f"its active power answers the frequency by {np.abs(here).max():.2g} pu"
     return None

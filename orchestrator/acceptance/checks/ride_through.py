@@ -23,7 +23,7 @@ _LASTS = 0.15  # duration of a disturbance [s]; a fault is cleared within it
 _LONG = ((0.8, 0.9), 1.0, 2.0)  # A dip that stays: to what voltage [pu], when [s], how long [s]
 _DEEP = ((0.17, 0.21), 1.0, 0.5)  # A deep dip that outlasts a fault that is cleared in time
 
-_OVERLOADS = ((0.2, 0.35), None), ((0.5, 0.65), None), ((0.2, 0.35), IMPORTING[0])
+_OVERLOADS = ((0.2, 0.35), None), ((0.42, 0.55), None), ((0.2, 0.35), IMPORTING[0])
 """Dips that last so long [s] that a limit of a time of its own has passed: to what voltage [pu], from which point."""
 
 _OVERLOAD = 10.0

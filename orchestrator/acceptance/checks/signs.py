@@ -51,7 +51,7 @@ _OMEGA_APART = 2e-4
 """Deviation of a settled omega from the network's [pu]: a fifth of the change; a wrong sign or base leaves 0.6 or more
 of the change, a frequency meter's own error far less."""
 
-_HIGH, _LOW = (1.085, 1.1), (0.9, 0.915)  # voltages [pu] of which one is drawn: the ends of what is usual
+_HIGH, _LOW = (1.095, 1.105), (0.895, 0.905)  # voltages [pu] of which one is drawn: the ends of what is usual
 _DROOP_OF_Q = "the sign of its droop of reactive power"
 _SIGNS, _WORDS = (1.0, -1.0), ("less", "more")  # of the changes of voltage and frequency
 
