@@ -7,7 +7,7 @@ import numpy as np
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed
 from orchestrator.acceptance.checks.droop import FREQUENCY
 from orchestrator.acceptance.checks.events import scale
-from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current, voltage_rows
+from orchestrator.acceptance.checks.port import WHY, cannot_import, followed
 from orchestrator.acceptance.checks.settings import Setting, with_each_setting
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex, Numbers
@@ -76,8 +76,7 @@ def _course(subject: Subject, point: OperatingAt, setting: Setting, times: float
     steps = max(2, round(scale(subject, 3 * _LASTS) * _LASTS / h))
     with subject.running(point=point, parameters=setting) as running:
         turned = np.exp(-100j * pi * times * FREQUENCY * h * np.arange(steps))
-        current = of_current(running, running.hold(voltage_rows(running, turned), steps, h))
-    power: Complex = point.voltage * turned * current.conj() - complex(point.P, point.Q)
+        power: Complex = point.voltage * turned * followed(running, turned).conj() - complex(point.P, point.Q)
     return power
 
 

@@ -7,16 +7,7 @@ import numpy as np
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed
 from orchestrator.acceptance.checks.comparing import difference, scales
 from orchestrator.acceptance.checks.events import scale
-from orchestrator.acceptance.checks.port import (
-    ANSWER,
-    IMPORTING,
-    POINTS,
-    WHY,
-    of_current,
-    present_current,
-    rating_of,
-    voltage_rows,
-)
+from orchestrator.acceptance.checks.port import ANSWER, IMPORTING, POINTS, WHY, followed, present_current, rating_of
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.errors import ComponentError, EndedError
@@ -72,18 +63,15 @@ def angles(subject: Subject) -> CheckResult:
     turned = np.exp(100j * np.pi * h * np.cumsum(rates))
     for theta in (0.0, subject.random("angles").uniform(0.8, 2.4)):
         with subject.running(point=OperatingAt(1.0, theta, 0.3, 0.05)) as running:
-            current = of_current(running, running.hold(voltage_rows(running, turned), steps, h))
-        found.append(current * np.exp(-1j * theta) / turned)
+            found.append(followed(running, turned) * np.exp(-1j * theta) / turned)
     apart = np.abs(found[1] - found[0])
     at = int(np.argmax(apart > _TURNED))
-    reached = 100 * np.pi * h * steps / 3 * _FASTER
     if not apart.max() <= _TURNED:
         says = f"turned by {100 * _FASTER:g} % of frequency, its current from theta_0 = {theta:.3g} rad differs from "
         says += f"that from 0 by {apart.max():.2g} pu, first at t = {at * h:.3g} s"
         return failed("angles", "jumps with its angle", says, apart=float(apart.max()))
-    return passed(
-        "angles", f"turned by {reached:.3g} rad forth and back, from two angles, it differs by {apart.max():.2g} pu"
-    )
+    says = f"turned by {100 * np.pi * _FASTER * h * steps / 3:.3g} rad forth and back, from two angles, it differs by "
+    return passed("angles", f"{says}{apart.max():.2g} pu")
 
 
 @check("shown_power", "Do its outputs of power show what it gives?", needs=(*SAME, "power_balance"))

@@ -20,13 +20,14 @@ _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
 """When something happens [s]: a timer or a counter in an FMU may run out between two of them."""
 
 _LASTS = 0.15  # duration of a disturbance [s]; a fault is cleared within it
-_LONG = ((0.8, 0.9), 1.0, 2.0)  # A dip that stays: to what voltage [pu], when [s], how long [s]
-_DEEP = ((0.17, 0.21), 1.0, 0.5)  # A deep dip that outlasts a fault that is cleared in time
+_RIDDEN, _OVERLOAD = 2.0, 10.0
+"""Longest dip [s] after which it is asked to be back; one in which a limit that dies with time has died."""
 
-_OVERLOADS = ((0.2, 0.35), None), ((0.42, 0.55), None), ((0.2, 0.35), IMPORTING[0])
-"""Dips that last so long [s] that a limit of a time of its own has passed: to what voltage [pu], from which point."""
-
-_OVERLOAD = 10.0
+_STAY = (
+    ((0.8, 0.9), 1.0, _RIDDEN, None), ((0.17, 0.21), 1.0, 0.5, None), ((0.2, 0.35), 0.1, _OVERLOAD, None),
+    ((0.42, 0.55), 0.1, _OVERLOAD, None), ((0.2, 0.35), 0.1, _OVERLOAD, IMPORTING[0]),
+)  # fmt: skip
+"""Dips that stay: to what voltage [pu], when [s], how long [s], from which point."""
 
 _BLOCKED, _GIVES = 0.02, 0.1  # current [pu, S_n] of a device that blocks, and of one that gives any
 
@@ -74,12 +75,10 @@ class Answer:
     gone: bool  # whether it gives no current in the end
 
 
-def _runs(draw: np.random.Generator, overload: float) -> Iterator[list[Disturbance]]:
+def _runs(draw: np.random.Generator, longest: float) -> Iterator[list[Disturbance]]:
     """Every kind of event at every time, one at each time of a run; the first run has the most telling ones.
 
-    Depths, angles and times are drawn, so that no device knows them; a bolted fault has no voltage at all.
-
-    ``overload``: how long the longest dips last [s]."""
+    Depths, angles and times are drawn, so that no device knows them; a bolted fault has no voltage at all."""
 
     def dip(least: float, most: float) -> tuple[str, complex]:
         to = round(draw.uniform(least, most), 3)
@@ -95,14 +94,11 @@ def _runs(draw: np.random.Generator, overload: float) -> Iterator[list[Disturban
     times = [round(float(at), 3) for at in np.array(_TIMES) + jitter * np.minimum(1, _TIMES)]
     for k in range(len(kinds)):
         if k == 1:
-            for bounds, at, lasts in (_LONG, _DEEP):
-                words, to = dip(*bounds)
-                yield [Disturbance(f"{words} for {lasts:g} s", to, at, lasts)]
+            for bounds, at, lasts, point in _STAY:
+                (words, to), lasting = dip(*bounds), min(lasts, longest)
+                yield [Disturbance(f"{words} for {lasting:.3g} s", to, at, lasting, point)]
             some = zip((kinds[8], kinds[6], kinds[5]), times, strict=False)
             yield [Disturbance(*kind, at, point=IMPORTING[0]) for kind, at in some]
-            for bounds, point in _OVERLOADS:
-                words, to = dip(*bounds)
-                yield [Disturbance(f"{words} for {overload:.3g} s", to, times[0], overload, point)]
         yield [Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(times)]
 
 
@@ -115,8 +111,8 @@ def limits(subject: Subject) -> CheckResult:
     answers: list[Answer] = []
     refused: list[str] = []
     left_out, other_way = 0, ""
-    overload = _OVERLOAD * scale(subject, _OVERLOAD)
-    for number, run in enumerate(_runs(subject.random("limits"), overload)):
+    longest = max(_RIDDEN, _OVERLOAD * scale(subject, _OVERLOAD))
+    for number, run in enumerate(_runs(subject.random("limits"), longest)):
         rest = list(run)
         if rest[0].point is not None:
             other_way = cannot_import(subject, rest[0].point) if subject.starts else ""
@@ -166,7 +162,7 @@ def _disturbed(
             means = np.convolve(late, np.full(min(cycle, len(late)), 1 / min(cycle, len(late))), "valid")
             healthy = during if abs(event.factor) >= _HEALTHY else during[:0]
             blocked, gone = _blocked(before[-1], np.concatenate([healthy, after]), h)
-            if event.lasts > _LONG[2]:  # nobody asks it to ride that through
+            if event.lasts > _RIDDEN:  # nobody asks it to ride that through
                 away, blocked, gone = 0.0, 0.0, False
             answers.append(Answer(event, float(size.max()), float(means.max()), float(away), blocked, gone))
             if away > _BACK:
