@@ -145,6 +145,18 @@ def test_an_angle_that_turns_back_by_less_than_a_turn_is_told(tmp_path):
     assert "theta_0 = 3 rad" in found.evidence
 
 
+def test_a_swing_that_is_the_same_everywhere_is_not_uneven(tmp_path):
+    path = build(converter("swings", UNDAMPED_WHERE=1), tmp_path)
+    assert check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results[-1].verdict == "pass"
+
+
+def test_a_sign_that_turns_with_larger_changes_of_the_frequency_is_found(tmp_path):
+    path = build(converter("turns", FAULT_TURNS_BELOW=-0.004), tmp_path)
+    (*_, found) = check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results
+    assert found.fault == "wrong sign"
+    assert "with 0.5 % less frequency its active power goes the wrong way" in found.evidence
+
+
 def test_power_that_moves_in_steps_is_told(tmp_path):
     path = build(converter("coarse", FAULT_COARSE_POWER=0.01), tmp_path)
     found = check_fmu(path, None, LIMITS, ("steady_state", "power_balance", "operating_points"), run_for=0.3)

@@ -54,7 +54,7 @@ def evenness(subject: Subject) -> CheckResult:
         if end.mean() < -_SOME and np.ptp(end) < 0.1 * abs(end.mean()):
             says = f"with {100 * _LARGER * FREQUENCY:g} % {word} frequency its active power goes the wrong way, "
             return failed(
-                "evenness", "wrong sign", f"{says}by {abs(end.mean()):.2g} pu, as it does not with less of it"
+                "evenness", "wrong sign", f"{says}by {abs(end.mean()):.2g} pu, and not after a smaller change"
             )
     if _TAKES not in found:
         return passed("evenness", f"its answers at {len(found)} points are alike; it was not tried with imported power")

@@ -172,6 +172,9 @@ static double slip(const double *z, const double *m, double p_f) {
     if (m[P_REF] > 0)
 #endif
     if (m[ON]) wanted -= 20 * (m[QUICK] - m[SLOW]);
+#ifdef FAULT_TURNS_BELOW /* deviation of the frequency from which on it gives less power, not more */
+    wanted -= 0.5 * m[PENDING];
+#endif
     double gain = z[GAIN];
 #ifdef FAULT_GAIN_OF_DIPS
     gain *= pow(FAULT_GAIN_OF_DIPS, m[DIPS]);
@@ -184,8 +187,8 @@ static double slip(const double *z, const double *m, double p_f) {
     if (m[P_REF] < 0) gain *= FAULT_CHARGING_DROOP;
 #endif
     double w = gain * (wanted - p_f);
-#ifdef FAULT_CHARGING_UNDAMPED /* what damps it is taken away */
-    if (m[P_REF] < 0) w += FAULT_CHARGING_UNDAMPED * (m[P_NOW] - p_f);
+#ifdef UNDAMPED_WHERE /* most of what damps it is taken away, everywhere in a good one */
+    if (UNDAMPED_WHERE) w += 0.006 * (m[P_NOW] - p_f);
 #endif
 #ifdef FAULT_ONE_WAY
     return w > 0 ? 0 : w; /* it never turns faster */
@@ -318,6 +321,9 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #endif
     m[QUICK] += h / 0.02 * (slip(z, m, m[P_F]) - m[QUICK]);
     m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);
+#ifdef FAULT_TURNS_BELOW
+    if (m[QUICK] < FAULT_TURNS_BELOW) m[PENDING] = 1;
+#endif
 #ifdef FAULT_OMEGA_LAGS
     m[LAGGED] += h / FAULT_OMEGA_LAGS * (slip(z, m, m[P_F]) - m[LAGGED]);
 #endif

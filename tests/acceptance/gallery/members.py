@@ -371,7 +371,7 @@ def points_and_ratings():
         one("base_of_own_rating", "base of another rating", "ratings", FAULT_BASE_OF_START=1),
         one("limit_of_own_rating", "limit of another rating", "ratings", FAULT_BASE_OF_LIMIT=1),
         one("droop_while_charging", "uneven droop", "evenness", FAULT_CHARGING_DROOP=4),
-        one("undamped_while_charging", "uneven damping", "evenness", FAULT_CHARGING_UNDAMPED=0.006),
+        one("undamped_while_charging", "uneven damping", "evenness", UNDAMPED_WHERE="(m[P_REF] < 0)"),
         Member(
             converter("damping_off_while_charging", switch=True, FAULT_CHARGING_SWITCH=1),
             "uneven damping",
