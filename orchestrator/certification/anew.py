@@ -247,7 +247,8 @@ def _fault_of_row(content: Content, row: CodeRow, again: BenchResult, data: xr.D
         if kept is not None:
             fault, _ = _differ_signal(kept.values[:part], values[:before])
         worst += [f"{signal}: {fault}"] if fault else []
-    criteria = [(f.criterion, bool(f.accepted)) for f in judge_row(row, again, content["f_n"]).findings]
+    judged = judge_row(row, again, content["f_n"], stated["criteria"])
+    criteria = [(f.criterion, bool(f.accepted)) for f in judged.findings]
     if not worst and criteria != [(entry["criterion"], bool(entry["accepted"])) for entry in stated["criteria"]]:
         return "its criteria come out otherwise than certified"
     return "; ".join(worst)

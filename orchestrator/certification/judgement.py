@@ -22,6 +22,7 @@ from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.motion import motion_faults, not_judged
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
 from orchestrator.certification.swings import LARGEST_RATIO, SwingTest, slow_part, swing_test
+from orchestrator.watch.declared_current import told_of
 
 SETTLING = 0.5  # time after the event [s] from which the signal counts as a free response and is decomposed into modes
 RATED_POWER = 1350.0  # active power of the converter in the norm's study [MW]
@@ -169,6 +170,8 @@ def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
         if not np.isfinite(values).all():
             at = having.times[int(np.argmax(~np.isfinite(values)))]
             wrong.append(f"{name} is not finite from t = {at:g} s on")
+    if told := told_of(having.findings, CONVERTER):
+        wrong.append(str(told["message"]))
     wrong += motion_faults(having.times, having.signals, event_time, having.findings)
     return wrong + [text for letter in "pq" if (text := _idle(having, pod, letter))]
 

@@ -53,7 +53,9 @@ def _bench_test(folder: Path, content: dict[str, Any], responses: xr.Dataset) ->
     stated = {row["row"]: row for row in content["rows"]}
     rows = [row for row in code.rows if row.name in stated or f"time_{row.name}" in responses.coords]
     results = {row.name: _response(row.name, stated.get(row.name), responses) for row in rows}
-    verdicts = [judge_row(row, results[row.name], content["f_n"]) for row in rows]
+    verdicts = [
+        judge_row(row, results[row.name], content["f_n"], stated.get(row.name, {}).get("criteria")) for row in rows
+    ]
     description = bound_fmu(request.fmu, request.binding)
     return CodeCertificate(request, description, verdicts, code, content["f_n"], results)
 

@@ -43,7 +43,11 @@ def checked(path, binding=None, only=()):
         ("base_of_own_rating", "ratings"),
         ("limit_of_own_rating", "ratings"),
         ("resonance", "signs"),
-        ("droop_while_charging", "signs"),
+        ("droop_while_charging", "evenness"),
+        ("undamped_while_charging", "evenness"),
+        ("damping_off_while_charging", "evenness"),
+        ("sign_of_q_at_high_voltage", "signs"),
+        ("angle_of_another_turn", "angles"),
         ("droop_of_q_while_charging", "signs"),
         ("refused_in_the_run", "tunables"),
         ("ignored_in_the_run", "tunables"),
@@ -98,6 +102,7 @@ def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
         ("held", "sample_time", "its outputs change every 1 ms only: 90% of all steps of 100 µs do nothing"),
         ("sixty_hertz", "rated_frequency", "so it is made for 60 Hz where 50 Hz is bound"),
         ("crash_in_dip", "limits", "s: its process died with SIGSEGV in fmi2DoStep"),
+        ("limit_of_a_short_time", "limits", " s at 0.1"),
     ],
 )
 def test_the_verdict_says_what_happened(name, only, words, gallery):
@@ -138,6 +143,18 @@ def test_an_angle_that_turns_back_by_less_than_a_turn_is_told(tmp_path):
     assert found.verdict == "remark"
     assert "pu away" in found.evidence
     assert "theta_0 = 3 rad" in found.evidence
+
+
+def test_a_swing_that_is_the_same_everywhere_is_not_uneven(tmp_path):
+    path = build(converter("swings", UNDAMPED_WHERE=1), tmp_path)
+    assert check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results[-1].verdict == "pass"
+
+
+def test_a_sign_that_turns_with_larger_changes_of_the_frequency_is_found(tmp_path):
+    path = build(converter("turns", FAULT_TURNS_BELOW=-0.004), tmp_path)
+    (*_, found) = check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results
+    assert found.fault == "wrong sign"
+    assert "with 0.5 % less frequency its active power goes the wrong way" in found.evidence
 
 
 def test_power_that_moves_in_steps_is_told(tmp_path):

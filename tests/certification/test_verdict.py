@@ -82,6 +82,8 @@ def test_less_than_thirteen_are_incomplete(certified, reactances, judged):
 
 
 UNSTABLE = {"growth": 104.6}
+OVER = {"kind": "misfit", "component": "converter", "message": "6.41 pu of its rating over a cycle", "time": 12.0,
+        "declared": 1.2, "mean": 6.41}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -98,6 +100,7 @@ UNSTABLE = {"growth": 104.6}
             "no mode",
         ),
         ({"signals": {}}, "no response"),
+        ({"findings": [OVER]}, "6.41 pu of its rating"),
     ],
 )
 def test_a_point_whose_judged_modes_are_fine_fails_for_what_else_is_wrong(certified, changes, fault):

@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.events import factor, in_words, scale
-from orchestrator.acceptance.checks.port import WHY, current_limit, currents, of_current, voltage_rows
+from orchestrator.acceptance.checks.port import WHY, current_limit, currents, followed, voltage_rows
 from orchestrator.acceptance.checks.running import RUN_FOR, spent_since
 from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject
 from orchestrator.arrays import Complex
@@ -149,8 +149,7 @@ class _Look:
         turning = np.exp(-2j * pi * 0.05 * time)  # 0.1 % of 50 Hz
         found = []
         for change in (np.full(steps, 0.985 + 0j), np.full(steps, np.exp(1j * pi / 120)), turning):
-            values = running.hold(voltage_rows(running, change), steps, self._subject.step_size)
-            found.append(of_current(running, values) * np.abs(change) / change)
+            found.append(followed(running, change) * np.abs(change) / change)
         return found
 
     def after(self, voltage: complex, lasts: float) -> _After:

@@ -3,6 +3,7 @@
 from orchestrator.acceptance.checks import (
     aftermath,
     base,
+    evenness,
     extremes,
     file,
     initialisation,
@@ -23,7 +24,7 @@ from orchestrator.acceptance.checks import (
 
 MODULES = (
     *(file, loading, running, initialisation, instances, state, sampling, timing, tuning),
-    *(port, late, points, signs, ride_through, aftermath, extremes, resources),
+    *(port, late, points, signs, evenness, ride_through, aftermath, extremes, resources),
 )
 """Importing them enters their checks."""
 
@@ -33,8 +34,8 @@ ORDER = (
     "reset", "reinstantiation",
     "state", "settable_states", "state_size", "tunables", "feedthrough", "sample_time", "delay", "step_invariance",
     "internal_step",
-    "steady_state", "later_times", "rated_frequency", "power_balance", "shown_power", "operating_points", "ratings",
-    "signs", "limits", "after_dips",
+    "steady_state", "later_times", "angles", "rated_frequency", "power_balance", "shown_power", "operating_points",
+    "ratings", "signs", "evenness", "limits", "after_dips",
     "nan_input", "extreme_inputs", "memory",
 )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """The droop from reactive power to voltage of a converter, found from what it settles to at a stiff bus."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ _GOOD = 0.2  # largest error of the law, in parts of what the droop does where t
 
 def further(point: OperatingAt) -> tuple[OperatingAt, ...]:
     """Points with other powers at which a law is looked for, all with reactive power of the same sign."""
-    return _FURTHER if point.Q >= 0 else _FURTHER_ABSORBING
+    return tuple(replace(p, v=point.v) for p in (_FURTHER if point.Q >= 0 else _FURTHER_ABSORBING))
 
 
 @dataclass(frozen=True)
@@ -92,11 +92,11 @@ def _errors(
     resistance, reactance, slope = x
     errors = []
     for point, *answers in found:
-        i_0 = complex(point.P, -point.Q)
-        e_0 = 1 + (resistance + 1j * reactance) * i_0
+        i_0 = complex(point.P, -point.Q) / point.v
+        e_0 = point.v + (resistance + 1j * reactance) * i_0
         for answer, fall, slower in zip(answers, (VOLTAGE, 0.0), (0.0, FREQUENCY), strict=True):
-            v, i = 1 - fall, i_0 + answer.i
+            v, i = point.v * (1 - fall), i_0 + answer.i
             e = v + (resistance + 1j * reactance * (1 - slower)) * i
-            q_0, q = ((e_0 if inside else 1.0) * i_0.conjugate()).imag, ((e if inside else v) * i.conjugate()).imag
+            q_0, q = ((e_0 if inside else point.v) * i_0.conjugate()).imag, ((e if inside else v) * i.conjugate()).imag
             errors.append(abs(e) - abs(e_0) + slope * (q - q_0))
     return np.array(errors)

@@ -69,11 +69,13 @@ REMEDIES = {
     "base of another rating": "its start values must follow the rating that it is given: check [start.S_n] and 'base'",
     "limit of another rating": "have its current limit follow the rating that it is given, or remove [start.S_n]",
     "uneven droop": "ask whether it means to answer frequency or voltage otherwise while it takes power",
+    "uneven damping": "look for damping that its operating point switches off; ask whether it means that",
     "keeps moving": "look for an oscillation that nothing damps; ask at which network impedance it is damped",
     "changed by a disturbance": "look for gains, integrators and counters that a dip moves and nothing sets back",
     "rests elsewhere": "look for integrators that wind up in a dip, and for references that are not set back after it",
     "does not start": "it must start from a power flow within its ratings",
     "no steady state": "it must compute its states from the power flow; otherwise let it settle before linearising",
     "counts time": "look for a clock in single precision, or for what acts at a time of its own; it must be a double",
+    "jumps with its angle": "look for an angle that is set back by another amount than a turn",
     "leaves its steady state": "something in it counts time, or adds up what never ends; ask the author",
 }

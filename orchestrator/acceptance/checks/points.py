@@ -13,15 +13,13 @@ from orchestrator.acceptance.checks.port import (
     cannot_import,
     current_limit,
     currents,
-    of_current,
+    followed,
     present_current,
     rating_of,
-    voltage_rows,
 )
-from orchestrator.acceptance.checks.ride_through import NO_LIMIT
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
-from orchestrator.binding.misfits import BALANCE
+from orchestrator.binding.misfits import BALANCE, NO_LIMIT
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
@@ -168,5 +166,5 @@ def _answer(subject: Subject, rating: float) -> complex:
     with subject.running(parameters={"S_n": rating}) as running:
         begin = present_current(running)
         change = (1 - VOLTAGE) * np.exp(-100j * np.pi * FREQUENCY * h * np.arange(steps))
-        current = of_current(running, running.hold(voltage_rows(running, change), steps, h))
+        current = followed(running, change)
     return complex((current * np.abs(change) / change)[-max(1, round(_CYCLE / h)) :].mean() - begin)

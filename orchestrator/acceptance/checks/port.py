@@ -72,6 +72,11 @@ def currents(running: Running, deviation: complex, steps: int) -> Complex:
     return of_current(running, running.hold(change, steps, running.subject.step_size))
 
 
+def followed(running: Running, factors: Complex) -> Complex:
+    """Step with the voltage at the start multiplied by one factor after another; the injected current [pu, S_n]."""
+    return of_current(running, running.hold(voltage_rows(running, factors), len(factors), running.subject.step_size))
+
+
 def of_current(running: Running, values: Numbers) -> Complex:
     """The injected current [pu, S_n] in rows of outputs."""
     names = running.subject.outputs

@@ -9,17 +9,25 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
+from orchestrator.acceptance.checks.events import scale
 from orchestrator.acceptance.checks.port import IMPORTING, WHY, cannot_import, current_limit, currents
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex
+from orchestrator.binding.misfits import NO_LIMIT
 from orchestrator.errors import ComponentError
 
 _TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
 """When something happens [s]: a timer or a counter in an FMU may run out between two of them."""
 
 _LASTS = 0.15  # duration of a disturbance [s]; a fault is cleared within it
-_LONG = ((0.8, 0.9), 1.0, 2.0)  # A dip that stays: to what voltage [pu], when [s], how long [s]
-_DEEP = ((0.17, 0.21), 1.0, 0.5)  # A deep dip that outlasts a fault that is cleared in time
+_RIDDEN, _OVERLOAD = 2.0, 10.0
+"""Longest dip [s] after which it is asked to be back; one in which a limit that dies with time has died."""
+
+_STAY = (
+    ((0.8, 0.9), 1.0, _RIDDEN, None), ((0.17, 0.21), 1.0, 0.5, None), ((0.2, 0.35), 0.1, _OVERLOAD, None),
+    ((0.42, 0.55), 0.1, _OVERLOAD, None), ((0.2, 0.35), 0.1, _OVERLOAD, IMPORTING[0]),
+)  # fmt: skip
+"""Dips that stay: to what voltage [pu], when [s], how long [s], from which point."""
 
 _BLOCKED, _GIVES = 0.02, 0.1  # current [pu, S_n] of a device that blocks, and of one that gives any
 
@@ -29,21 +37,13 @@ _BLOCKS_FOR = 0.06
 _HEALTHY = 0.9  # voltage [pu] at which a device has to stay on
 _CYCLE = 0.02  # time [s] over which a current is averaged: what heats the semiconductors and what protection sees
 
-NO_LIMIT = 3.3
-"""Current [pu, S_n] over the last cycle of a disturbance that no converter with a current limit gives.
-
-Semiconductors carry 1.0 to 1.5 times the rated current, 2 where they are overrated; ours, with limits of 1.1 in either
-axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff bus up to 3.1. More must be declared
-(`I_max` of the binding).
-"""
-
 _UNEVEN, _MUCH = 1.6, 2.2
 """Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only."""
 
 _BACK = 0.3
 """Distance of the current from where it was [pu, S_n], from which the next disturbance begins with a new instance."""
 
-_AT_LEAST = 4
+_AT_LEAST = 7
 """Runs that are made however long they take: at all times, dips that stay, and while power flows the other way."""
 
 _PART = 1.5  # wall-clock time to spend, in parts of the time for which an FMU is made to run
@@ -75,7 +75,7 @@ class Answer:
     gone: bool  # whether it gives no current in the end
 
 
-def _runs(draw: np.random.Generator) -> Iterator[list[Disturbance]]:
+def _runs(draw: np.random.Generator, longest: float) -> Iterator[list[Disturbance]]:
     """Every kind of event at every time, one at each time of a run; the first run has the most telling ones.
 
     Depths, angles and times are drawn, so that no device knows them; a bolted fault has no voltage at all."""
@@ -94,9 +94,9 @@ def _runs(draw: np.random.Generator) -> Iterator[list[Disturbance]]:
     times = [round(float(at), 3) for at in np.array(_TIMES) + jitter * np.minimum(1, _TIMES)]
     for k in range(len(kinds)):
         if k == 1:
-            for bounds, at, lasts in (_LONG, _DEEP):
-                words, to = dip(*bounds)
-                yield [Disturbance(f"{words} for {lasts:g} s", to, at, lasts)]
+            for bounds, at, lasts, point in _STAY:
+                (words, to), lasting = dip(*bounds), min(lasts, longest)
+                yield [Disturbance(f"{words} for {lasting:.3g} s", to, at, lasting, point)]
             some = zip((kinds[8], kinds[6], kinds[5]), times, strict=False)
             yield [Disturbance(*kind, at, point=IMPORTING[0]) for kind, at in some]
         yield [Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(times)]
@@ -111,7 +111,8 @@ def limits(subject: Subject) -> CheckResult:
     answers: list[Answer] = []
     refused: list[str] = []
     left_out, other_way = 0, ""
-    for number, run in enumerate(_runs(subject.random("limits"))):
+    longest = max(_RIDDEN, _OVERLOAD * scale(subject, _OVERLOAD))
+    for number, run in enumerate(_runs(subject.random("limits"), longest)):
         rest = list(run)
         if rest[0].point is not None:
             other_way = cannot_import(subject, rest[0].point) if subject.starts else ""
@@ -161,6 +162,8 @@ def _disturbed(
             means = np.convolve(late, np.full(min(cycle, len(late)), 1 / min(cycle, len(late))), "valid")
             healthy = during if abs(event.factor) >= _HEALTHY else during[:0]
             blocked, gone = _blocked(before[-1], np.concatenate([healthy, after]), h)
+            if event.lasts > _RIDDEN:  # nobody asks it to ride that through
+                away, blocked, gone = 0.0, 0.0, False
             answers.append(Answer(event, float(size.max()), float(means.max()), float(away), blocked, gone))
             if away > _BACK:
                 return None

@@ -6,10 +6,14 @@ finding says that it is this program's reading."""
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.certification.codes.measured import MeasuredRow
+from orchestrator.binding.misfits import NO_LIMIT
+from orchestrator.certification.codes.bench_case import PLANT
+from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.certification.codes.row import Band, Bounded, Judge, RowFinding
+from orchestrator.watch.declared_current import ABOVE, LASTS, told_of
 
 CODE, READING = "code", "reading"
+CURRENT = "current"  # name of the criterion that every row has, whatever its code asks
 
 SETTLED = 0.02
 """Largest movement of a power or a voltage, peak to peak over the last half second of a hold, that counts as settled
@@ -59,6 +63,22 @@ def holds_together() -> Judge:
         text = "; ".join(faults or ["nothing was found", *row.undecided])
         return RowFinding("stable", "no loss of synchronism, growth, lasting oscillation or trip", READING,
                           float(len(faults)), 0.0, None, not faults, text)  # fmt: skip
+
+    return judge
+
+
+def carries() -> Judge:
+    """The current stays below what the converter's binding declares; where it declares none, what any limit gives."""
+
+    def judge(row: MeasuredRow) -> RowFinding:
+        rule = f"for no more than {1e3 * LASTS:g} ms is the current over a period above its limit"
+        if told := told_of(row.findings, PLANT):
+            return _finding(CURRENT, rule, READING, told["mean"], ABOVE * told["declared"], str(told["message"]))
+        size = np.hypot(row.p, row.signals["q"]) / np.maximum(row.signals["v"], 1e-3)
+        mean = over_a_period(size, row.times, row.f_n)[row.within(row.events[0], np.inf)]
+        lasts = min(len(mean), round(LASTS / float(row.times[1] - row.times[0])))
+        held = float(np.lib.stride_tricks.sliding_window_view(mean, lasts).min(axis=1).max())
+        return _finding(CURRENT, rule, READING, held, NO_LIMIT, f"{held:.3g} pu of its rating")
 
     return judge
 

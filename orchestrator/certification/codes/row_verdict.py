@@ -1,9 +1,11 @@
 """The verdict on one row: what its criteria say of the response, and what none of them can say."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.criteria import CURRENT, carries
 from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.row import CodeRow, RowFinding
 from orchestrator.certification.margins import CriterionMargin
@@ -44,8 +46,13 @@ class RowVerdict:
         return {True: "accepted", False: "not accepted", None: NOT_JUDGED}[finding.accepted]
 
 
-def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
-    """Apply a row's criteria to its response.
+def judge_row(
+    row: CodeRow, result: BenchResult, f_n: float, stated: Sequence[Mapping[str, Any]] | None = None
+) -> RowVerdict:
+    """Apply a row's criteria to its response, and that of the current.
+
+    ``stated``: Criteria of a certificate; where it was issued without that of the current, a current that is within its
+    limit is left out, and one that is not contradicts it.
 
     A converter that does not hold together answers nothing else: what its other criteria meet is not judged, and what
     they miss stays missed."""
@@ -61,6 +68,9 @@ def judge_row(row: CodeRow, result: BenchResult, f_n: float) -> RowVerdict:
         found: Sequence[RowFinding] = [RowFinding("runs", rule, "reading", ended, programme.stop, None, False, text)]
     else:
         found = [judge(measured) for judge in row.criteria]
+        current = carries()(measured) if {"q", "v"} <= set(result.signals) else None
+        if current and (not current.accepted or stated is None or any(c["criterion"] == CURRENT for c in stated)):
+            found.append(current)
         if reason := measured.broken:
             found = [_without_meaning(finding, reason) if finding.accepted else finding for finding in found]
     if row.shown_only:

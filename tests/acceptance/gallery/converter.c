@@ -3,7 +3,7 @@
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       LAGGED, TRIPLED, MEMORY };
+       LAGGED, TRIPLED, VOLT, P_NOW, MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout */
 #define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= SHOWN)
 #define DIVERGED 1e12
@@ -133,7 +133,7 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
-    m[TRIPLED] = 0;
+    m[TRIPLED] = 0, m[VOLT] = v, m[P_NOW] = m[P_F];
 #ifdef METER_BEGINS
     m[LAGGED] = METER_BEGINS - 1.0;
 #else
@@ -144,6 +144,10 @@ static void initialise(double *z, double *m) {
 /* The voltage behind its impedance, by its droop. */
 static double emf(const double *m) {
     double droop = Q_DROOP;
+#ifdef FAULT_Q_SIGN_WHERE /* v: the voltage at its port */
+    const double v = m[VOLT];
+    if (FAULT_Q_SIGN_WHERE) droop = -droop;
+#endif
 #ifdef FAULT_ABSORBING
     if (m[Q_F] < -0.02) droop *= FAULT_ABSORBING;
 #endif
@@ -164,7 +168,13 @@ static double slip(const double *z, const double *m, double p_f) {
     static double shared; /* one for all instances, and with the damping on only */
     if (m[ON]) shared += 1e-3 * (m[P_F] - shared), wanted += 0.1 * shared;
 #endif
+#ifdef FAULT_CHARGING_SWITCH
+    if (m[P_REF] > 0)
+#endif
     if (m[ON]) wanted -= 20 * (m[QUICK] - m[SLOW]);
+#ifdef FAULT_TURNS_BELOW /* deviation of the frequency from which on it gives less power, not more */
+    wanted -= 0.5 * m[PENDING];
+#endif
     double gain = z[GAIN];
 #ifdef FAULT_GAIN_OF_DIPS
     gain *= pow(FAULT_GAIN_OF_DIPS, m[DIPS]);
@@ -176,7 +186,10 @@ static double slip(const double *z, const double *m, double p_f) {
 #ifdef FAULT_CHARGING_DROOP
     if (m[P_REF] < 0) gain *= FAULT_CHARGING_DROOP;
 #endif
-    const double w = gain * (wanted - p_f);
+    double w = gain * (wanted - p_f);
+#ifdef UNDAMPED_WHERE /* most of what damps it is taken away, everywhere in a good one */
+    if (UNDAMPED_WHERE) w += 0.006 * (m[P_NOW] - p_f);
+#endif
 #ifdef FAULT_ONE_WAY
     return w > 0 ? 0 : w; /* it never turns faster */
 #else
@@ -294,6 +307,8 @@ static void sample(const double *z, double *m, double *hidden) {
 static void substep(const double *z, double *m, double *hidden, phasor v, double h) {
     enum { N = 5 };
     double k[4][N], x[MEMORY];
+    m[VOLT] = hypot(v.re, v.im);
+    m[P_NOW] = P_MEASURED * emf(m) * (cos(m[DELTA]) * m[I_RE] + sin(m[DELTA]) * m[I_IM]);
     memcpy(x, m, sizeof x);
     for (int s = 0; s < 4; ++s) {
         if (s)
@@ -306,6 +321,9 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #endif
     m[QUICK] += h / 0.02 * (slip(z, m, m[P_F]) - m[QUICK]);
     m[SLOW] += h / 5.0 * (m[QUICK] - m[SLOW]);
+#ifdef FAULT_TURNS_BELOW
+    if (m[QUICK] < FAULT_TURNS_BELOW) m[PENDING] = 1;
+#endif
 #ifdef FAULT_OMEGA_LAGS
     m[LAGGED] += h / FAULT_OMEGA_LAGS * (slip(z, m, m[P_F]) - m[LAGGED]);
 #endif

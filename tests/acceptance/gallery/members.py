@@ -201,6 +201,8 @@ def good():
         Member(converter("converter_with_damping", switch=True)),
         Member(_open_lag("open_lag")),
         Member(converter("converter_with_dip_memory", DIP_MEMORY=1)),
+        Member(converter("converter_that_wraps", WRAPS_BY="(2 * 3.14159265358979323846)")),
+        Member(converter("converter_of_two_droops", FAULT_CHARGING_DROOP=2)),
     ]  # fmt: skip
     for form in ("polar", "abc", "qd", "power"):
         value, current = _si(form)
@@ -368,7 +370,17 @@ def points_and_ratings():
         one("clips_its_start", "power not as asked", "operating_points", FAULT_CLIPS_START=0.8),
         one("base_of_own_rating", "base of another rating", "ratings", FAULT_BASE_OF_START=1),
         one("limit_of_own_rating", "limit of another rating", "ratings", FAULT_BASE_OF_LIMIT=1),
-        one("droop_while_charging", "uneven droop", "signs", FAULT_CHARGING_DROOP=4),
+        one("droop_while_charging", "uneven droop", "evenness", FAULT_CHARGING_DROOP=4),
+        one("undamped_while_charging", "uneven damping", "evenness", UNDAMPED_WHERE="(m[P_REF] < 0)"),
+        Member(
+            converter("damping_off_while_charging", switch=True, FAULT_CHARGING_SWITCH=1),
+            "uneven damping",
+            only=("runs", "independence", "repeatability", "steady_state", "power_balance", "evenness"),
+        ),
+        one("sign_of_q_at_high_voltage", "wrong sign", "signs", FAULT_Q_SIGN_WHERE="(v > 1.07)"),
+        one("sign_of_q_at_low_voltage", "wrong sign", "signs", FAULT_Q_SIGN_WHERE="(v < 0.94)"),
+        one("angle_of_another_turn", "jumps with its angle", "angles", WRAPS_BY="(2 * 3.14159265358979 - 0.003)"),
+        one("limit_of_a_short_time", "no current limit", "limits", FAULT_LIMIT_TIRES=1.5),
         one("droop_of_q_while_charging", "uneven droop", "signs", FAULT_CHARGING_Q_DROOP=-1),
         one("refused_in_the_run", "parameter not taken", "tunables", FAULT_REFUSES_IN_RUN=1),
         one("ignored_in_the_run", "parameter not taken", "tunables", FAULT_IGNORES_IN_RUN=1),

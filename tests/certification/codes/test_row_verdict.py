@@ -164,3 +164,39 @@ def test_a_row_with_a_criterion_that_is_not_judged_is_not_accepted(words, accept
     row = CODES["aemo"].rows[0]
     findings = tuple(RowFinding(f"c{k}", "rule", "code", 1.0, 1.0, None, word, "") for k, word in enumerate(words))
     assert RowVerdict(row, findings).accepted is accepted
+
+
+def over_rating(lasts, times=TIMES):
+    """Six times its rating for a while, from 12 s on."""
+    return np.where((times > 12.0) & (times < 12.0 + lasts), 6.0, 0.1)
+
+
+def test_a_limit_that_dies_late_is_missed_in_every_row():
+    current = judged(opposing(), q=over_rating(2.0)).findings[-1]
+    assert (current.criterion, current.accepted, current.limit) == ("current", False, 3.3)
+    assert current.value == pytest.approx(6.0, rel=0.02)
+    assert judged(opposing(), q=over_rating(0.05)).findings[-1].accepted
+
+
+def test_a_declared_limit_takes_the_place_of_the_widest():
+    row = next(row for row in CODES["aemo"].rows if row.name == "jump_30")
+    signals = {"p": opposing(), "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)}
+    told = {
+        "kind": "misfit",
+        "time": 12.0,
+        "component": "converter",
+        "message": "too much",
+        "declared": 1.2,
+        "mean": 1.6,
+    }
+    current = judge_row(row, BenchResult(row.name, TIMES, signals, [told]), 50.0).findings[-1]
+    assert (current.accepted, current.value, current.limit) == (False, 1.6, pytest.approx(1.26))
+
+
+def test_a_certificate_without_that_criterion_holds_where_it_is_met():
+    row = next(row for row in CODES["aemo"].rows if row.name == "jump_30")
+    stated = [{"criterion": "stable"}]
+    for lasts, added in ((0.05, []), (2.0, ["current"])):
+        signals = {"p": opposing(), "q": over_rating(lasts), "v": np.ones(TIMES.shape)}
+        found = judge_row(row, BenchResult(row.name, TIMES, signals), 50.0, stated).findings
+        assert [f.criterion for f in found[len(row.criteria) :]] == added

@@ -1,0 +1,98 @@
+"""Whether a converter answers the frequency alike at other operating points, and its switches act alike there."""
+
+from math import pi
+
+import numpy as np
+
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed
+from orchestrator.acceptance.checks.droop import FREQUENCY
+from orchestrator.acceptance.checks.events import scale
+from orchestrator.acceptance.checks.port import WHY, cannot_import, followed
+from orchestrator.acceptance.checks.settings import Setting, with_each_setting
+from orchestrator.acceptance.checks.subject import OperatingAt, Subject
+from orchestrator.arrays import Complex, Numbers
+from orchestrator.errors import ComponentError
+
+_LASTS = 2.0  # time [s] for which its answer to 0.1 % less frequency is looked at
+_SOME = 5e-3  # answer [pu, S_n] from which it is compared
+_EVEN = 0.67  # part of an answer by which it may differ elsewhere: a third, or three times as much
+_ACTS = 0.5  # part by which what a switch does may differ while it takes power
+_MOST = 0.4  # what a switch does beyond that is no small change [pu, S_n]: it connects, or trips
+_LATE, _MORE = 0.05, 5.0
+"""Swing in the second half of the time, in parts of the answer, that counts; how many times that of elsewhere."""
+
+_LARGER, _MILD = 5, OperatingAt(1.0, 0.0, 0.3, 0.05)  # how much more of the frequency changes, and where
+_GIVES, _TAKES = OperatingAt(1.0, 0.0, 0.6, 0.1), OperatingAt(1.0, 0.0, -0.6, 0.1)
+
+
+def _points(subject: Subject) -> list[OperatingAt]:
+    draw = subject.random("evenness")
+    wide = ((1.07, 1.1, 0.3, 0.6), (0.9, 0.93, 0.3, 0.6), (1.0, 1.0, 0.75, 0.85), (1.0, 1.0, 0.05, 0.2))
+    more = [OperatingAt(*draw.uniform((v, 0.0, P, Q), (w, 0.0, R, Q + 0.1)).round(3))
+            for (v, w, P, R), Q in zip(wide, (0.0, 0.0, -0.1, -0.25), strict=True)]  # fmt: skip
+    return [_GIVES, *(p for p in (_TAKES, *more) if not cannot_import(subject, p))]
+
+
+@check("evenness", "Does it answer alike at other points?", needs=(*SAME, "steady_state", "power_balance"))
+def evenness(subject: Subject) -> CheckResult:
+    """The course of its active power after a small change, at several points, and with each of its switches at two."""
+    if not subject.starts:
+        return not_applicable("evenness", WHY["no start" if subject.port else "no port"])
+    found: dict[OperatingAt, Complex] = {}
+    for point in _points(subject):
+        try:
+            found[point] = _course(subject, point, {})
+        except ComponentError:
+            if point is _GIVES:
+                raise
+            continue  # which 'power_balance' and 'operating_points' tell
+        if fault := _other(found[_GIVES].real, found[point].real):
+            says = f"{fault[1]} from P_0 = {point.P:g}, Q_0 = {point.Q:g}, v_0 = {point.v:g}"
+            return failed("evenness", fault[0], f"{says}, and not from P_0 = {_GIVES.P:g}")
+    for larger, word in ((_LARGER, "less"), (-_LARGER, "more")):
+        end = np.sign(larger) * _course(subject, _MILD, {}, larger).real[-len(found[_GIVES]) // 10 :]
+        if end.mean() < -_SOME and np.ptp(end) < 0.1 * abs(end.mean()):
+            says = f"with {100 * _LARGER * FREQUENCY:g} % {word} frequency its active power goes the wrong way, "
+            return failed(
+                "evenness", "wrong sign", f"{says}by {abs(end.mean()):.2g} pu, and not after a smaller change"
+            )
+    if _TAKES not in found:
+        return passed("evenness", f"its answers at {len(found)} points are alike; it was not tried with imported power")
+    for (gives, takes), words in with_each_setting(subject, lambda s: _effects(subject, s, found)):
+        size, power, one, other = max(
+            (max(np.abs(a).max(), np.abs(b).max()), kind, a, b)
+            for kind, a, b in (("active", gives.real, takes.real), ("reactive", gives.imag, takes.imag))
+        )
+        if _SOME < size < _MOST and np.abs(one - other).max() > _ACTS * size:
+            sizes = " and ".join(f"{np.abs(course).max():.2g} pu" for course in (one, other))
+            says = f"after less frequency{words} its {power} power differs by {sizes} while it gives and takes power"
+            return failed("evenness", "uneven damping", says)
+    return passed("evenness", f"its answers at {len(found)} points, giving and taking power, are alike")
+
+
+def _course(subject: Subject, point: OperatingAt, setting: Setting, times: float = 1.0) -> Complex:
+    """Change of the power [pu, S_n] after each step with less frequency, so many times `FREQUENCY`."""
+    h = subject.step_size
+    steps = max(2, round(scale(subject, 3 * _LASTS) * _LASTS / h))
+    with subject.running(point=point, parameters=setting) as running:
+        turned = np.exp(-100j * pi * times * FREQUENCY * h * np.arange(steps))
+        power: Complex = point.voltage * turned * followed(running, turned).conj() - complex(point.P, point.Q)
+    return power
+
+
+def _effects(subject: Subject, setting: Setting, found: dict[OperatingAt, Complex]) -> tuple[Complex, Complex]:
+    gives, takes = (_course(subject, p, setting) - found[p] if setting else 0 * found[p] for p in (_GIVES, _TAKES))
+    return gives, takes
+
+
+def _other(usual: Numbers, here: Numbers) -> tuple[str, str] | None:
+    """The fault where an answer is another one than the usual, and what shows it."""
+    size = max(np.abs(usual).max(), np.abs(here).max())
+    if not np.isfinite(size) or size < _SOME:
+        return None
+    late, before = np.ptp(here[len(here) // 2 :]), np.ptp(usual[len(usual) // 2 :])
+    if max(late, before) > _LATE * size and max(late, before) > _MORE * min(late, before):
+        return "uneven damping", f"its power still moves by {late:.2g} pu, not {before:.2g} pu, after a small change"
+    if np.abs(here - usual).max() > _EVEN * size:
+        return "uneven droop", f"its active power answers the frequency by {np.abs(here).max():.2g} pu"
+    return None
