@@ -25,12 +25,8 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
     ):
         return
     where = _place(draft)
-    if not draft.data.solved:
-        text = (
-            "the file is not solved: every bus has VM = 1 and VA = 0. The power flow is computed here, and what PSS/E "
-            "takes from VM (parts of loads, some generators' voltages) is that of 1 pu; export the solved case"
-        )
-        yield UnusualValue(f"{draft.grid}.{SOLVED}", where, text)
+    if draft.data.misfit:
+        yield UnusualValue(f"{draft.grid}.{SOLVED}", where, draft.data.misfit)
     yield from _negative_loads(draft, draft.grid, where)
     yield from _hundredths(draft.grid, "shunt", "Mvar", draft.data.capacitors, where)
     loads = [load for load in draft.network.loads if load.p_mw > 0 and load.name.startswith("load_")]

@@ -34,6 +34,7 @@ class Transformer:
     # controlled, corrected: whether a tap changer acts on it, and whether its impedance depends on its tap
     controlled: bool
     corrected: bool
+    tiny_loss: bool  # whether a load loss is less than 1 W, as if it were in pu
 
 
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
@@ -74,6 +75,7 @@ def _transformer(
         _OPEN[state],
         any(line.whole(control, "COD", 0) for line in rest[1:] if len(line.fields) > 3),
         any(line.whole(table, "TAB", 0) for line in rest[1:] if len(line.fields) > 3),
+        codes["CZ"] == 3 and any(0 < rest[0].number(3 * k, "R", 0.0) < 1 for k in range(len(pairs))),
     )  # fmt: skip
 
 

@@ -1,11 +1,16 @@
 """Mistakes in RAW and DYR files that a power flow survives: each is one question, and an honest file has none."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.cases.file_solution import misfit_of
+from orchestrator.cases.network_import import import_network
+from orchestrator.cases.network_sources import read_pandapower
 from orchestrator.errors import CaseError
 
 FILES = Path(__file__).parents[3] / ".docs" / "tutorials" / "psse"
@@ -116,6 +121,49 @@ RAWS = {
     "transformer in percent": (
         changed(RAW, ("'T3', 1\n0.0, 0.15, 900.0", "'T3', 1\n0.0, 15, 900.0")),
         "is 15 pu on the 900 MVA behind it, and step-up transformers have 0.03 to 0.35 pu there; is it in percent?",
+    ),
+    "load at another bus": (
+        changed(RAW, (" 7, '1 ', 1, 1, 1,  967", " 6, '1 ', 1, 1, 1,  967")),
+        "beyond what the network takes away, +967 MW +99.99 Mvar at bus_7, -967 MW -99.99 Mvar at bus_6",
+    ),
+    "sign of a shunt": (
+        changed(RAW, ("0.0, 200.0", "0.0, -200.0")),
+        "-371.7 Mvar at bus_7; look at its load, its shunt",
+    ),
+    "branch out of service": (
+        changed(
+            RAW,
+            (
+                "8,  9, '2 ', 0.011, 0.11, 0.1925, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1",
+                "8,  9, '2 ', 0.011, 0.11, 0.1925, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0",
+            ),
+        ),
+        "Mvar at bus_8; look at a branch between these buses (its status",
+    ),
+    "shift of a transformer": (
+        changed(RAW, ("1.0, 230.0, 0.0, 0.0", "1.0, 230.0, 30.0, 0.0")),
+        "Mvar at bus_5; look at its load, its shunt, its unit's power or a branch",
+    ),
+    "shift in radians": (
+        changed(RAW, ("1.0, 230.0, 0.0, 0.0", "1.0, 230.0, 0.52, 0.0")),
+        "ANG is 0.52 degrees: is it in radians? 30",
+    ),
+    "load loss in pu": (
+        changed(
+            RAW, ("5,  1, 0, '1 ', 1, 2, 1", "5,  1, 0, '1 ', 1, 3, 1"), ("0.0, 0.15, 900.0", "0.003, 0.15, 900.0")
+        ),
+        "CZ = 3, so R is a load loss in W",
+    ),
+    "angles in radians": (
+        "\n".join(
+            ",".join([*line.split(",")[:8], f" {float(line.split(',')[8]) * 0.0174533:.4f}"]) if 3 < n < 15 else line
+            for n, line in enumerate(RAW.splitlines(), start=1)
+        ),
+        "look at voltages of another case, or angles that are not in degrees",
+    ),
+    "setpoint a little off": (
+        changed(RAW, ("-300.0, 1.03, 0, 900.0", "-300.0, 1.05, 0, 900.0")),
+        "VS is 1.05 pu, where the solved file has",
     ),
     "setpoint that the solution does not hold": (
         changed(RAW, ("719.000, 0.0, 500.0, -300.0, 1.03", "719.000, 0.0, 500.0, -300.0, 0.83")),
@@ -310,3 +358,16 @@ def test_a_unit_that_is_out_is_not_asked_to_start(questions, tmp_path, gfor, swi
         (tmp_path / "case.toml").write_text(text)
         (prepared,) = load_case(tmp_path / "case.toml").prepare((), values)
         assert prepared.system.components["sg4"].value("governor.V_MIN") == least
+
+
+def test_a_solution_is_compared_with_all_kinds_of_elements(tmp_path):
+    pytest.importorskip("pandapower")
+    tables = read_pandapower("case300", tmp_path)
+    network, rounded = import_network(tables), tables.bus.copy()
+    rounded[:, 7:9] = np.round(rounded[:, 7:9], 4)
+    assert misfit_of(network, rounded, tables.labels) == ""
+    most = max(network.shunts, key=lambda x: abs(x.b_mvar))
+    wrong = replace(
+        network, shunts=tuple(replace(x, b_mvar=-x.b_mvar if x is most else x.b_mvar) for x in network.shunts)
+    )
+    assert f"Mvar at {most.bus}; look at its load, its shunt" in misfit_of(wrong, rounded, tables.labels)
