@@ -135,7 +135,7 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
     if table.frequency is not None and own is not None and own != table.frequency:
         text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
         changes.append(Problem(f"{raw.tables.name}, line 1", text))
-    imported = import_network(raw.tables)
+    imported = import_network(raw.tables, joined=False)  # the machines are those of the file
     misfit = misfit_of(imported, raw.tables.bus, raw.tables.labels) if raw.solved else NOT_SOLVED
     ratings: dict[str, float] = {}
     for machine in raw.machines:

@@ -371,3 +371,43 @@ def test_a_solution_is_compared_with_all_kinds_of_elements(tmp_path):
         network, shunts=tuple(replace(x, b_mvar=-x.b_mvar if x is most else x.b_mvar) for x in network.shunts)
     )
     assert f"Mvar at {most.bus}; look at its load, its shunt" in misfit_of(wrong, rounded, tables.labels)
+
+
+def test_a_load_that_feeds_beside_a_machine_counts(questions, tmp_path):
+    line = " 7, '1 ', 1, 1, 1,  967.000"
+    beside = " 2, '1 ', 1, 1, 1, -100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1, 1, 0\n"
+    slack = []
+    for raw in (RAW, changed(RAW, (line, beside + line))):
+        asked = questions(raw=raw)
+        (prepared,) = load_case(tmp_path / "case.toml").prepare()
+        slack.append(900 * prepared.power_flow.powers["sg1"].real)
+    assert any("MW +0 Mvar at bus_2" in question for question in asked)
+    assert slack[0] - slack[1] == pytest.approx(100, abs=5)  # but for losses
+
+
+CONVERTER = """
+[components.gfor]
+model = "gfor_phasor"
+bus = "bus_8"
+parameters = { S_n = "300 MVA", P_0 = 0.666667, v_0 = 0.97 }
+[scenarios.less]
+set = { "sg3.P_0" = 0.576667 }
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("0.666667", "0.666667", None),
+        ("0.576667", "0.798889", None),  # the slack feeds less
+        ("0.576667", "0.687778", "the case's converters feed 200 MW, and the file's units 100 MW less"),
+        ("0.666667", "-0.666667", "P_0 = -0.666667 pu: it draws 200 MW; is it so?"),
+        ("300 MVA", "150 MVA", "the case's converters feed 100 MW, and the file's units 200 MW less than in the file"),
+        ("0.666667", "0.0067", "it feeds 2.01 MW with S_n = 300 MVA; is it so?"),
+        ("0.666667", "0.0", "converters feed 0 MW, and the file's units 200 MW less"),
+        ("0.666667", "1.2", "more than the rating of the converter"),
+    ],
+)
+def test_a_converters_power_is_compared_with_its_rating_and_the_files(questions, old, new, words):
+    asked = questions(case=CASE + changed(CONVERTER, (old, new)))
+    assert any(words in question for question in asked) if words else asked == [], asked
