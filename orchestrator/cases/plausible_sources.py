@@ -8,7 +8,9 @@ from orchestrator.coupling.system import ComponentPlan
 
 SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
 _STEP_UP = (0.03, 0.35)  # usual reactances of step-up transformers on the machine's rating [pu], widened
+_SHOWN = 3  # machines beyond which one is compared with the others
 _LITTLE, _SAME = 0.05, 0.05  # loading that is questioned [pu], and part by which two powers may differ
+_ALIKE, _UNLIKE = 2.0, 5.0  # factors within which machines are alike, and from which one is not
 _FAR = 20.0
 """A capacitor or a load that is smaller than the next one by this factor is questioned where 100 times as much is
 usual; a step-up transformer from this factor of the least usual on."""
@@ -30,11 +32,12 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
         yield UnusualValue(f"{draft.grid}.{SOLVED}", where, draft.data.misfit)
     yield from _negative_loads(draft, draft.grid, where)
     yield from _hundredths(draft.grid, "shunt", "Mvar", draft.data.capacitors, where)
-    loads = [load for load in draft.network.loads if load.p_mw > 0 and load.name.startswith("load_")]
-    yield from _hundredths(draft.grid, "load", "MW", {x.name[5:]: x.p_mw for x in loads}, where)
+    loads = {x.name[5:]: value_of(grid, f"{x.name}.P") for x in draft.network.loads if x.name.startswith("load_")}
+    yield from _hundredths(draft.grid, "load", "MW", {name: p for name, p in loads.items() if p and p > 0}, where)
     yield from _step_up(draft, draft.grid, grid, where)
     yield from _saturation(draft)
     yield from _own_converters(draft)
+    yield from _unlike_others(draft)
 
 
 def _place(draft: Draft) -> str:
@@ -117,6 +120,25 @@ def _saturation(draft: Draft) -> Iterator[UnusualValue]:
     )
     where = draft.given.place("units")
     yield from (UnusualValue(f"{name}.machine.s_10", where, text) for name in without)
+
+
+def _unlike_others(draft: Draft) -> Iterator[UnusualValue]:
+    """Values of a machine's records that are far from those of all others, which are alike."""
+    found: dict[str, dict[str, float]] = {}
+    for name, origin in draft.origins.items():
+        plan = draft.system.components.get(name)
+        for variable in origin.lines if plan else ():
+            usual, value = plan.description.variables[variable].usual, value_of(plan, variable)
+            if value is not None and value > 0 and (usual is None or usual.fits(value)):  # else its range asks
+                found.setdefault(variable, {})[name] = value
+    for variable, values in found.items():
+        for name, value in values.items() if len(values) > _SHOWN else ():
+            others = [other for machine, other in values.items() if machine != name]
+            low, high = min(others), max(others)
+            if high <= _ALIKE * low and (value > _UNLIKE * high or value < low / _UNLIKE):
+                beside = f"the {len(others)} other machines have {low:g} to {high:g}"
+                text = f"{variable} = {value:g}, where {beside}: is it so?"
+                yield UnusualValue(f"{name}.{variable}", place_of(draft, name, variable), text)
 
 
 def _own_converters(draft: Draft) -> Iterator[UnusualValue]:

@@ -82,6 +82,16 @@ DYRS = {
     "gain of a stabiliser": (changed(DYR, (STAB1, STAB1.replace("  1.0 ", "  1000 "))), "pss.K_S = 1000 pu"),
     "least droop of a governor": (changed(DYR, (TGOV1, TGOV1.replace("0.05", "0.005"))), "governor.R = 0.005 pu is"),
     "field's time constant": (changed(DYR, ("8.0 0.03", "0.8 0.03")), "machine.T_d10 = 0.8 s is outside"),
+    "gain of a tenth": (
+        changed(DYR, (EXST1, EXST1.replace("200.0", "20.0"))),
+        "exciter.K_A = 20, where the 3 other machines have 200 to 200: is it so?",
+    ),
+    "inertia of a tenth": (
+        changed(DYR, (" 6.5 ", " 0.65 ")),
+        "machine.H = 0.65, where the 3 other machines have 6.175 to",
+    ),
+    "lead for lag of a governor": (changed(DYR, (TGOV1, TGOV1.replace("2.1 7.0", "7.0 2.1"))), "are the two swapped?"),
+    "time constant of an exciter": (changed(DYR, (EXST1, SEXS.replace("0.05", "50"))), "exciter.T_E = 50 s is outside"),
     "lead for lag": (changed(DYR, (EXST1, SEXS.replace("0.1 10.0", "10.0 0.1"))), "are the two swapped?"),
     "no saturation": (changed(DYR, ("0.0392 0.2227", "0.0 0.0")), "sg1: the saturation is 0, where 3 of 4 machines"),
     "saturation in percent": (changed(DYR, ("0.0392 0.2227", "3.92 22.27")), "machine.s_10 = 3.92 is outside"),
