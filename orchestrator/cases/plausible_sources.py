@@ -8,6 +8,7 @@ from orchestrator.coupling.system import ComponentPlan
 
 SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
 _STEP_UP = (0.03, 0.35)  # usual reactances of step-up transformers on the machine's rating [pu], widened
+_PARTS = {"machine": "machine", "exciter": "exciter", "governor": "governor", "pss": "stabilizer"}
 _SHOWN = 3  # machines beyond which one is compared with the others
 _LITTLE, _SAME = 0.05, 0.05  # loading that is questioned [pu], and part by which two powers may differ
 _ALIKE, _UNLIKE = 2.0, 5.0  # factors within which machines are alike, and from which one is not
@@ -124,14 +125,16 @@ def _saturation(draft: Draft) -> Iterator[UnusualValue]:
 
 def _unlike_others(draft: Draft) -> Iterator[UnusualValue]:
     """Values of a machine's records that are far from those of all others, which are alike."""
-    found: dict[str, dict[str, float]] = {}
+    found: dict[tuple[str, str | None], dict[str, float]] = {}
     for name, origin in draft.origins.items():
         plan = draft.system.components.get(name)
         for variable in origin.lines if plan else ():
-            usual, value = plan.description.variables[variable].usual, value_of(plan, variable)
-            if value is not None and value > 0 and (usual is None or usual.fits(value)):  # else its range asks
-                found.setdefault(variable, {})[name] = value
-    for variable, values in found.items():
+            if (value := value_of(plan, variable)) is not None and value > 0:
+                usual = plan.description.variables[variable].usual
+                part = getattr(draft.tables[name], _PARTS.get(variable.partition(".")[0], ""), None)
+                if usual is None or usual.fits(value):  # else its range asks
+                    found.setdefault((variable, part), {})[name] = value
+    for (variable, _), values in found.items():
         for name, value in values.items() if len(values) > _SHOWN else ():
             others = [other for machine, other in values.items() if machine != name]
             low, high = min(others), max(others)

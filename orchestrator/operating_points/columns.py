@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from fmus.grid.network import Network
 from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -46,7 +45,7 @@ class Elements:
             table.grid, units, tuple(name for name in branches if f"{name}.connected" in switches),
             tuple(load.name for load in network.loads),
             tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches), units.get(wanted, wanted),
-            _step_ups(network, units),
+            _step_ups(prepared, units),
         )  # fmt: skip
 
     @property
@@ -54,8 +53,10 @@ class Elements:
         return (*self.units, *self.lines, *self.loads, *self.shunts)
 
 
-def _step_ups(network: Network, units: Mapping[str, str]) -> dict[str, str]:
+def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
     """Branches without charging that alone lead to a bus with one unit and nothing else."""
+    network = prepared.network
+    assert network is not None
     ends = Counter(bus for line in network.lines for bus in (line.from_bus, line.to_bus))
     ends.update(bus for x in network.transformers for bus in x.buses)
     only = {bus: unit for unit, bus in units.items() if ends[bus] == 1 and [*units.values()].count(bus) == 1}

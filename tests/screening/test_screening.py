@@ -218,6 +218,9 @@ def test_a_unit_and_its_transformer_are_one_outage(tmp_path):
     assert flows[0].power_flow.voltages == pytest.approx(flows[2].power_flow.voltages)
     assert flows[1].power_flow.voltages == pytest.approx(flows[2].power_flow.voltages)
     assert all("sg2" not in flow.system.components for flow in flows)
+    with PointBench() as bench:  # |v| that an exciter takes at once is curved where v_im = 0, and no limit
+        bench.master(case.prepare((), {"sg*.exciter.T_R": 0.0})[0])
+        assert bench.linear_model().doubts == ()
 
 
 @pytest.mark.parametrize(("text", "said"), [("sg9", "'sg9'"), ("L,L", "named twice"), ("units,sg1", "named twice")])

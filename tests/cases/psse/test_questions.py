@@ -360,6 +360,7 @@ def test_a_unit_that_is_out_is_not_asked_to_start(questions, tmp_path, gfor, swi
     assert code == 0, err
     assert json.loads(out)["scenarios"][0]["stable"] is True
     assert "3 machines" in json.loads(out)["facts"]
+    assert '"sg4.' not in out  # its own modes are none of the network's
     back = '[[events]]\ntype = "unit_reconnection"\ntime = "1 s"\nunit = "sg4"\n'
     (tmp_path / "case.toml").write_text(CASE + back)
     values = {"grid.load_9.P": 700.0, switch: False}
