@@ -26,15 +26,13 @@ NOT_SOLVED = (
 )
 
 
-def misfit_of(network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str]) -> str:
-    """What does not fit; "" where all does, or the file has no solution.
+def misfit_of(network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str], unsolved: str = "") -> str:
+    """What does not fit; "" where all does, and ``unsolved`` where the file has no solution.
 
     ``bus``: MATPOWER's table with the voltages [pu, degrees]; ``labels``: names of its buses by number."""
-    stated = {
-        bus_of(labels[int(row[0])]): cmath.rect(row[_VM], np.radians(row[_VA])) for row in bus if row[_VM] > 0
-    }  # fmt: skip
+    stated = {bus_of(labels[int(r[0])]): cmath.rect(r[_VM], np.radians(r[_VA])) for r in bus if r[_VM] > 0}
     if network.slack not in stated or not bus[:, _VA].any():
-        return ""
+        return unsolved
     places = [place for place in network.buses if place in stated]
     stars = [place for place in network.buses if place not in stated]  # of transformers with an open winding
     buses = [*places, *stars, *(inner for x in network.transformers for inner in inner_buses(x))]
@@ -51,10 +49,8 @@ def misfit_of(network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str]) 
         inside = matrix[known:]
         voltages[known:] = np.atleast_1d(spsolve(inside[:, known:].tocsc(), -inside[:, :known] @ voltages[:known]))
     left = SYSTEM_BASE_MVA * (equations.fed - equations.powers(voltages))
-    left[known:] = 0
-    for k, place in enumerate(places):
-        if place in network.generation:
-            left[k] = 0 if k == equations.slack else left[k].real
+    units = [k for k, place in enumerate(places) if place in network.generation]
+    left[units], left[[equations.slack, *range(known, len(buses))]] = left[units].real, 0
     rounding = _rounding(bus[:, _VM]) + np.radians(_rounding(bus[:, _VA]))
     noise = SYSTEM_BASE_MVA * rounding * abs(voltages) * (abs(matrix) @ np.ones(len(buses)))
     load = sum(x.p_mw for x in network.loads if x.p_mw > 0)

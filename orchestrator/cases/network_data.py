@@ -136,7 +136,7 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
         text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
         changes.append(Problem(f"{raw.tables.name}, line 1", text))
     imported = import_network(raw.tables, joined=False)  # the machines are those of the file
-    misfit = misfit_of(imported, raw.tables.bus, raw.tables.labels) if raw.solved else NOT_SOLVED
+    misfit = misfit_of(imported, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
     ratings: dict[str, float] = {}
     for machine in raw.machines:
         bus = bus_name(raw.tables.labels[machine.bus])

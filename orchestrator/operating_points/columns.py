@@ -55,13 +55,12 @@ class Elements:
 
 def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
     """Branches without charging that alone lead to a bus with one unit and nothing else."""
-    network = prepared.network
-    assert network is not None
+    if (network := prepared.network) is None:
+        return {}
     ends = Counter(bus for line in network.lines for bus in (line.from_bus, line.to_bus))
-    ends.update(bus for x in network.transformers for bus in x.buses)
-    only = {bus: unit for unit, bus in units.items() if ends[bus] == 1 and [*units.values()].count(bus) == 1}
-    for other in (*network.loads, *network.shunts):
-        only.pop(other.bus, None)
+    ends.update([*(bus for x in network.transformers for bus in x.buses), *units.values()])
+    ends.update(2 * [other.bus for other in (*network.loads, *network.shunts)])
+    only = {bus: unit for unit, bus in units.items() if ends[bus] == 2}  # itself and one branch
     return {
         line.name: only[bus]
         for line in network.lines for bus in (line.from_bus, line.to_bus) if bus in only and not line.B

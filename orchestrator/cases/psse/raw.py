@@ -52,14 +52,12 @@ class Machine:
 class RawNetwork:
     """A file's tables, its machines in service, and what was taken over in another form.
 
-    ``idle`` has bus and identifier of the machines that are out of service. ``solved``: the voltages are no flat start.
-    """
+    ``idle`` has bus and identifier of the machines that are out of service."""
 
     tables: SourceTables
     machines: tuple[Machine, ...]
     changes: tuple[Problem, ...]
     idle: frozenset[tuple[int, str]] = frozenset()
-    solved: bool = True
 
 
 def read_raw(path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False) -> RawNetwork:
@@ -101,8 +99,7 @@ class _Reading:
             np.array(self._branches).reshape(-1, _BRANCH_COLUMNS), gen,
             np.array(self._to_earth, dtype=complex).reshape(-1, 2), self._labels, self._raw.frequency, self._load_parts,
         )  # fmt: skip
-        flat = not any(row[_VA] for row in self._rows.values())
-        return RawNetwork(tables, machines, tuple(self._changes.listed()), frozenset(self._idle), not flat)
+        return RawNetwork(tables, machines, tuple(self._changes.listed()), frozenset(self._idle))
 
     def _bus(self, record: Record, index: int = 0) -> int:
         bus = abs(record.whole(index, "the bus' number"))
@@ -229,9 +226,6 @@ class _Reading:
         windings = t.windings
         if t.controlled:
             self._changes.note(t.record.line, "tap changer or phase-shift control: held at its position")
-        if t.tiny_loss:
-            text = "CZ = 3, so R is a load loss in W, and less than 1 W is none: is R in pu? Then CZ is 1 or 2"
-            self._changes.note(t.record.line, text)
         for turned in (w.shift / _RADIANS for w in windings if 0 < abs(w.shift) < 2 * math.pi):
             if abs(turned - round(turned)) < _NEAR * abs(turned):
                 text = f"ANG is {turned * _RADIANS:g} degrees: is it in radians? {round(turned) * 30} degrees are usual"

@@ -34,7 +34,6 @@ class Transformer:
     # controlled, corrected: whether a tap changer acts on it, and whether its impedance depends on its tap
     controlled: bool
     corrected: bool
-    tiny_loss: bool  # whether a load loss is less than 1 W, as if it were in pu
 
 
 def transformers(raw: RawFile, voltages: Mapping[int, float]) -> Iterator[Transformer]:
@@ -75,7 +74,6 @@ def _transformer(
         _OPEN[state],
         any(line.whole(control, "COD", 0) for line in rest[1:] if len(line.fields) > 3),
         any(line.whole(table, "TAB", 0) for line in rest[1:] if len(line.fields) > 3),
-        codes["CZ"] == 3 and any(0 < rest[0].number(3 * k, "R", 0.0) < 1 for k in range(len(pairs))),
     )  # fmt: skip
 
 
@@ -101,6 +99,8 @@ def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float
     if not base > 0:
         raise line.error(f"a winding's SBASE is {base:g} MVA; it must exceed 0")
     if code == 3:  # load loss [W], and the magnitude of the impedance
+        if 0 < resistance < 1:
+            raise line.error(f"R = {resistance:g} is a load loss in W by CZ = 3; write 0, or CZ = 2 if it is in pu")
         resistance *= 1e-6 / base
         if abs(resistance) > abs(reactance):
             raise line.error(f"the load loss gives R = {resistance:g} pu, more than the impedance of {reactance:g} pu")

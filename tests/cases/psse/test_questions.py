@@ -162,7 +162,7 @@ RAWS = {
         changed(
             RAW, ("5,  1, 0, '1 ', 1, 2, 1", "5,  1, 0, '1 ', 1, 3, 1"), ("0.0, 0.15, 900.0", "0.003, 0.15, 900.0")
         ),
-        "CZ = 3, so R is a load loss in W",
+        "R = 0.003 is a load loss in W by CZ = 3",
     ),
     "angles in radians": (
         "\n".join(
