@@ -59,7 +59,7 @@ def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str,
         return {}
     ends = Counter(bus for line in network.lines for bus in (line.from_bus, line.to_bus))
     ends.update([*(bus for x in network.transformers for bus in x.buses), *units.values()])
-    ends.update(2 * [other.bus for other in (*network.loads, *network.shunts)])
+    ends.update(2 * [*(x.bus for x in network.loads), *(x.bus for x in network.shunts)])
     only = {bus: unit for unit, bus in units.items() if ends[bus] == 2}  # itself and one branch
     return {
         line.name: only[bus]
