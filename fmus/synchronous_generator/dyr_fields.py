@@ -35,11 +35,12 @@ class DyrRecord:
 
     ``kind``: key of the component's table: ``machine``, ``exciter``, ``governor`` or ``stabilizer``; ``converter`` for
     a record that is a whole component; ``part``: its value, the name of our part; for a whole component, its model;
-    ``fields``: in the file's order."""
+    ``fields``: in the file's order; ``lacks``: parameters of our part that 0 leaves out, as the record has none."""
 
     kind: str
     part: str
     fields: tuple[DyrField, ...]
+    lacks: tuple[str, ...] = ()
 
 
 def _fields(scope: str, text: str) -> tuple[DyrField, ...]:
@@ -102,6 +103,7 @@ DYR_RECORDS: dict[str, DyrRecord] = {
         "exciter",
         "sexs",
         (DyrField("TA/TB", ("exciter.T_A",), times="TB"), *_x("TB:T_B K:K TE:T_E EMIN:E_MIN EMAX:E_MAX")),
+        ("exciter.T_R",),
     ),
     "IEEET1": DyrRecord(
         "exciter",

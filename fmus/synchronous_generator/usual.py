@@ -23,7 +23,7 @@ MACHINE = {
     "exciter.T_A": Usual(0.001, 1, _421, or_zero=True), "exciter.T_R": Usual(0.001, 0.2, _421, or_zero=True),
     "exciter.T_B": Usual(0.005, 60, _421, or_zero=True), "exciter.T_C": Usual(0.005, 60, _421, or_zero=True),
     "exciter.K_PR": Usual(0.01, 300, _421, or_zero=True), "exciter.K_IR": Usual(0.01, 300, _421),
-    "exciter.K_P": Usual(0.5, 20, _421),
+    "exciter.T_E": Usual(0.001, 5, _421, or_zero=True), "exciter.K_P": Usual(0.5, 20, _421),
     **{f"pss.{T}": Usual(0.5, 50, _PSS, or_zero=True) for T in ("T_w1", "T_w2", "T_w3", "T_w4", "T_7")},
     **{f"pss.T_{k}": Usual(0.005, 10, _PSS, or_zero=True) for k in (1, 2, 3, 4, 6, 8, 9)},
     "pss.K_s1": Usual(0.01, 100, _PSS, or_zero=True), "pss.limit": Usual(0.005, 0.5, _PSS, or_zero=True),

@@ -18,6 +18,8 @@ _SIZE = 1e-5  # of a perturbation, relative to max(1, |value|)
 _EVEN, _FLOOR = 0.1, 1e-2
 """An element's answers up and down may differ by this part of it, and of this rate [1/s]: beyond, a limit is near."""
 
+_OF_ROW = 1e-3  # part of an answer's largest slope that counts as this rate: |v| is curved, and a gain makes it large
+
 _MANY = 100  # from this number of states and inputs on, variables are perturbed together
 _HOLDS, _ROUNDING = 1e-3, 1e-9
 """A perturbation in all directions at once may differ by the first part of its answer from the sum of the single
@@ -48,7 +50,8 @@ def linearize_slopes(
     found = None if pattern is None else point.together(pattern)
     up, down = found or point.one_by_one()
     whole = (up + down) / 2
-    if (np.abs(up - down) > _EVEN * (np.abs(whole) + _FLOOR)).any():
+    floor = _FLOOR + _OF_ROW * np.abs(whole).max(axis=1, keepdims=True, initial=0.0)
+    if (np.abs(up - down) > _EVEN * (np.abs(whole) + floor)).any():
         return linearize_component(exchange, time, step_size, inputs, observed, derivatives=True)
     none = np.zeros((0, 0))
     return ComponentLinearization(

@@ -190,11 +190,16 @@ class Case(CaseDefinition):
         return Preparer(self, name, dict(overrides or {}), parameters)
 
 
+_FED = 1e-6  # power of a unit from which its loss is told [pu]
+
+
 def _told(
     prepared: PreparedScenario | None, lost: Collection[str], dispatch: Dispatch | None
 ) -> PreparedScenario | None:
     """The scenario, which says of units that values took out of service who feeds their power."""
-    if prepared is None or prepared.power_flow is None or dispatch is None or not lost:
+    if prepared is None or prepared.power_flow is None or dispatch is None:
+        return prepared
+    if not any(abs(dispatch.powers[unit].real) > _FED for unit in lost):
         return prepared
     plans = prepared.system.components
     drawn = sum(dispatch.powers[unit].real * plans[unit].number("S_n") for unit in lost) - dispatch.change

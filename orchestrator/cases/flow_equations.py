@@ -76,7 +76,7 @@ class FlowEquations:
         return np.flatnonzero(~self.held)
 
     @cached_property
-    def _matrix(self) -> csr_array:
+    def matrix(self) -> csr_array:
         return coo_array((self.admittances, (self.rows, self.columns)), shape=(len(self.buses),) * 2).tocsr()
 
     def powers(self, voltages: np.ndarray) -> np.ndarray:
@@ -99,7 +99,7 @@ class FlowEquations:
 
     def jacobian(self, voltages: NDArray[np.complex128]) -> csc_array:
         """Derivatives of the mismatch by the unknown angles [rad] and by the unknown magnitudes [pu]."""
-        matrix, unit = self._matrix, voltages / np.abs(voltages)
+        matrix, unit = self.matrix, voltages / np.abs(voltages)
         current, v, direction = diags_array(matrix @ voltages), diags_array(voltages), diags_array(unit)
         by_angle = 1j * (v @ (current - matrix @ v).conj())
         by_magnitude = v @ (matrix @ direction).conj() + current.conj() @ direction

@@ -6,6 +6,7 @@ from pathlib import Path
 from fmus.grid.network import Line, Load, Shunt, ThreeWinding
 from orchestrator.cases.cgmes.network import read_cgmes
 from orchestrator.cases.csv_rows import number, optional_number, place_of, rows_of
+from orchestrator.cases.file_solution import NOT_SOLVED, misfit_of
 from orchestrator.cases.load_models import with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
@@ -23,7 +24,7 @@ class _Source:
     changes: tuple[Problem, ...] = ()
     machines: tuple[Machine, ...] = ()
     idle: frozenset[tuple[int, str]] = frozenset()
-    solved: bool = True
+    misfit: str = ""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class NetworkData:
     # feeding, capacitors: by bus, as the source has them: loads below zero [MW] and capacitors [Mvar]
     feeding: dict[str, float] = field(default_factory=dict)
     capacitors: dict[str, float] = field(default_factory=dict)
-    solved: bool = True  # whether the source's voltages are no flat start
+    misfit: str = ""  # what is wrong with the voltages that the source has as its solution
 
 
 def network_data(table: NetworkTable, directory: Path) -> NetworkData:
@@ -82,7 +83,7 @@ def network_data(table: NetworkTable, directory: Path) -> NetworkData:
         (*source.shunts, *shunts), source.generation, source.slack,
         table.frequency if table.frequency is not None else source.frequency, table.stray_B,
         {line.name: place for line, place in in_file}, (*source.transformers, *transformers), found.changes,
-        found.machines, found.idle, source.feeding, source.capacitors, found.solved,
+        found.machines, found.idle, source.feeding, source.capacitors, found.misfit,
     )  # fmt: skip
 
 
@@ -109,11 +110,14 @@ def _source(table: NetworkTable, directory: Path) -> _Source:
         raise InputError("leave_out is for networks of PSS/E and CGMES; remove the key, or give 'raw' or 'cgmes'")
     if table.matpower is not None:
         path = seen_from_here(directory / table.matpower)
-        imported = import_network(read_matpower(path))
+        tables = read_matpower(path)
+        imported = import_network(tables)
+        misfit = misfit_of(imported, tables.bus, tables.labels)
         if table.frequency is None:
             text = "MATPOWER's cases hold no frequency: every model keeps its own, usually 50 Hz"
             text += '; write it in [network], such as frequency = "60 Hz"'
-            return _Source(imported, (Problem(str(path), text),))
+            return _Source(imported, (Problem(str(path), text),), misfit=misfit)
+        return _Source(imported, misfit=misfit)
     if table.pandapower is not None:
         imported = import_network(read_pandapower(table.pandapower, directory))
     return _Source(imported)
@@ -131,13 +135,14 @@ def _from_raw(path: Path, table: NetworkTable) -> _Source:
     if table.frequency is not None and own is not None and own != table.frequency:
         text = f"BASFRQ is {own:g} Hz, and the case's frequency = {table.frequency:g} Hz counts; one of them is wrong"
         changes.append(Problem(f"{raw.tables.name}, line 1", text))
-    imported = import_network(raw.tables)
+    imported = import_network(raw.tables, joined=False)  # the machines are those of the file
+    misfit = misfit_of(imported, raw.tables.bus, raw.tables.labels, NOT_SOLVED)
     ratings: dict[str, float] = {}
     for machine in raw.machines:
         bus = bus_name(raw.tables.labels[machine.bus])
         ratings[bus] = ratings.get(bus, 0.0) + machine.rating_mva
     generation = {bus: replace(g, rating_mva=ratings[bus]) for bus, g in imported.generation.items()}
-    return _Source(replace(imported, generation=generation), tuple(changes), raw.machines, raw.idle, raw.solved)
+    return _Source(replace(imported, generation=generation), tuple(changes), raw.machines, raw.idle, misfit)
 
 
 def _from_cgmes(path: Path, table: NetworkTable) -> _Source:

@@ -59,13 +59,15 @@ class ImportedNetwork:
     capacitors: dict[str, float] = field(default_factory=dict)
 
 
-def import_network(source: SourceTables) -> ImportedNetwork:
-    """Convert a source's tables to elements. Everything out of service is left out."""
+def import_network(source: SourceTables, *, joined: bool = True) -> ImportedNetwork:
+    """Convert a source's tables to elements. Everything out of service is left out.
+
+    ``joined``: whether a negative load at a generator's bus is a part of the generators."""
     rows = {int(row[0]): row for row in source.bus if int(row[1]) != _OUT}
     labels = {number: source.labels[number] for number in rows}
     lines, to_earth = _lines(source, labels)
     at_bus = _generators(source, labels)
-    loads = _loads(source, rows, at_bus)
+    loads = _loads(source, rows, at_bus if joined else {})
     earthed = {n for n, y in to_earth.items() if abs(y) > _NEGLIGIBLE} | {n for n, r in rows.items() if any(r[4:6])}
     kept = {load.bus for load in loads} | {bus_of(labels[n]) for n in (*at_bus, *earthed)}
     lines, merged = without_negative_reactances(lines, kept)

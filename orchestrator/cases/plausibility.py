@@ -25,6 +25,9 @@ _LONG = 0.01  # step of phasor models [s] above which it is questioned
 _OF_PARTS = ("machine", "exciter", "governor", "pss")
 """Begins of a generator's variables; another scenario may choose a part that has one which this one's has not."""
 
+_LEADS = (("exciter.K", "exciter.T_A", "exciter.T_B"), ("governor.D_t", "governor.T_2", "governor.T_3"))
+"""Of SEXS and of TGOV1: a parameter that only they have, their lead and their lag."""
+
 _SHOWN = 3  # largest number of components that a question names; the others are counted
 
 
@@ -69,10 +72,11 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
             wanted, value = plan.description.variables[variable].usual, value_of(plan, variable)
             if wanted is not None and value is not None:
                 yield from outside(draft, name, variable, value, wanted, scale=_to_rating(plan, variable))
-        lead, lag = value_of(plan, "exciter.T_A"), value_of(plan, "exciter.T_B")
-        if plan.kind == "machine" and lead and lag and lead > 2 * lag and value_of(plan, "exciter.K") is not None:
-            text = f"exciter.T_A = {lead:g} s, the lead, exceeds exciter.T_B = {lag:g} s, the lag; are the two swapped?"
-            yield UnusualValue(f"{name}.exciter.T_A", place_of(draft, name, "exciter.T_A", "exciter.T_B"), text)
+        for own, of_lead, of_lag in _LEADS:
+            lead, lag = value_of(plan, of_lead), value_of(plan, of_lag)
+            if plan.kind == "machine" and lead and lag and lead > 2 * lag and value_of(plan, own) is not None:
+                text = f"{of_lead} = {lead:g} s, the lead, exceeds {of_lag} = {lag:g} s, the lag; are the two swapped?"
+                yield UnusualValue(f"{name}.{of_lead}", place_of(draft, name, of_lead, of_lag), text)
         for resistance, reactance in RESISTANCES:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
             if R is not None and X is not None and R > X > 0:

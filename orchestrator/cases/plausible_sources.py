@@ -3,11 +3,15 @@
 from collections.abc import Iterator, Mapping
 
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.plausible_values import UnusualValue, value_of
+from orchestrator.cases.plausible_values import UnusualValue, place_of, unit_of, value_of
 from orchestrator.coupling.system import ComponentPlan
 
 SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
 _STEP_UP = (0.03, 0.35)  # usual reactances of step-up transformers on the machine's rating [pu], widened
+_PARTS = {"machine": "machine", "exciter": "exciter", "governor": "governor", "pss": "stabilizer"}
+_SHOWN = 3  # machines beyond which one is compared with the others
+_LITTLE, _SAME = 0.05, 0.05  # loading that is questioned [pu], and part by which two powers may differ
+_ALIKE, _UNLIKE = 2.0, 5.0  # factors within which machines are alike, and from which one is not
 _FAR = 20.0
 """A capacitor or a load that is smaller than the next one by this factor is questioned where 100 times as much is
 usual; a step-up transformer from this factor of the least usual on."""
@@ -25,18 +29,16 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
     ):
         return
     where = _place(draft)
-    if not draft.data.solved:
-        text = (
-            "the file is not solved: every bus has VM = 1 and VA = 0. The power flow is computed here, and what PSS/E "
-            "takes from VM (parts of loads, some generators' voltages) is that of 1 pu; export the solved case"
-        )
-        yield UnusualValue(f"{draft.grid}.{SOLVED}", where, text)
+    if draft.data.misfit:
+        yield UnusualValue(f"{draft.grid}.{SOLVED}", where, draft.data.misfit)
     yield from _negative_loads(draft, draft.grid, where)
     yield from _hundredths(draft.grid, "shunt", "Mvar", draft.data.capacitors, where)
-    loads = [load for load in draft.network.loads if load.p_mw > 0 and load.name.startswith("load_")]
-    yield from _hundredths(draft.grid, "load", "MW", {x.name[5:]: x.p_mw for x in loads}, where)
+    loads = {x.name[5:]: value_of(grid, f"{x.name}.P") for x in draft.network.loads if x.name.startswith("load_")}
+    yield from _hundredths(draft.grid, "load", "MW", {name: p for name, p in loads.items() if p and p > 0}, where)
     yield from _step_up(draft, draft.grid, grid, where)
     yield from _saturation(draft)
+    yield from _own_converters(draft)
+    yield from _unlike_others(draft)
 
 
 def _place(draft: Draft) -> str:
@@ -119,3 +121,55 @@ def _saturation(draft: Draft) -> Iterator[UnusualValue]:
     )
     where = draft.given.place("units")
     yield from (UnusualValue(f"{name}.machine.s_10", where, text) for name in without)
+
+
+def _unlike_others(draft: Draft) -> Iterator[UnusualValue]:
+    """Values of a machine's records that are far from those of all others, which are alike."""
+    found: dict[tuple[str, str | None], dict[str, float]] = {}
+    for name, origin in draft.origins.items():
+        if (plan := draft.system.components.get(name)) is None:
+            continue
+        for variable in origin.lines:
+            if (value := value_of(plan, variable)) is not None and value > 0:
+                usual = plan.description.variables[variable].usual
+                part = getattr(draft.tables[name], _PARTS.get(variable.partition(".")[0], ""), None)
+                if usual is None or usual.fits(value):  # else its range asks
+                    found.setdefault((variable, part), {})[name] = value
+    for (variable, _), values in found.items():
+        for name, value in values.items() if len(values) > _SHOWN else ():
+            others = [other for machine, other in values.items() if machine != name]
+            low, high = min(others), max(others)
+            if high <= _ALIKE * low and (value > _UNLIKE * high or value < low / _UNLIKE):
+                beside = f"the {len(others)} other machines have {low:g} to {high:g}"
+                text = f"{variable} = {value:g}, where {beside}: is it so?"
+                yield UnusualValue(f"{name}.{variable}", place_of(draft, name, variable), text)
+
+
+def _own_converters(draft: Draft) -> Iterator[UnusualValue]:
+    """Converters of the case in another program's network: their power beside their rating, and beside what the file's
+    units feed less than in the file. Values from outside are tried on purpose."""
+    if draft.network is None or draft.data is None or not draft.data.generation:
+        return
+    own, left = {}, {bus: g.p_mw for bus, g in draft.data.generation.items() if bus != draft.data.slack}
+    for port in draft.network.ports:
+        plan = draft.system.components.get(port.name)
+        P, S_n = (value_of(plan, v) if plan else None for v in ("P_0", "S_n"))
+        if plan is None or P is None or S_n is None or unit_of(plan, "P_0") != "pu":
+            continue
+        if port.name in draft.origins:
+            left[port.bus] = left.get(port.bus, 0.0) - P * S_n * (port.bus in left)
+        elif (
+            plan.kind == "converter" and "P_0" in plan.parameters and f"{port.name}.P_0" not in draft.given.from_outside
+        ):
+            own[port.name] = P * S_n
+            place = place_of(draft, port.name, "P_0")
+            if P < 0 or 0 < P < _LITTLE:
+                said = f"draws {-P * S_n:g} MW" if P < 0 else f"feeds {P * S_n:g} MW with S_n = {S_n:g} MVA"
+                yield UnusualValue(f"{port.name}.P_0", place, f"P_0 = {P:g} pu: it {said}; is it so?")
+    less, fed = sum(left.values()), sum(own.values())
+    if own and not draft.given.from_outside and abs(less) > _SAME * abs(fed) and abs(fed - less) > _SAME * abs(fed):
+        text = (
+            f"with P_0 and S_n the case's converters feed {fed:.4g} MW, and the file's units {less:.4g} MW less than "
+            "in the file; the slack takes the difference: is one of them wrong?"
+        )
+        yield from (UnusualValue(f"{name}.P_0", place_of(draft, name, "P_0"), text) for name in own)

@@ -28,7 +28,8 @@ _SAME, _NEAR, _OTHER = 0.01, 1.06, 2.0
 volts, and in general.
 """
 
-_NAMED = {name: re.compile(rf"(?:^|\.){of}_?(?:n|nom|rated)$", re.I) for name, of in (("S_n", "s"), ("V_n", "[vu]"))}
+_RATED = (("S_n", "s"), ("V_n", "[vu]"), ("f_n", "f"))
+_NAMED = {name: re.compile(rf"(?:^|\.){of}_?(?:n|nom|rated)$", re.I) for name, of in _RATED}
 
 Matrix2 = tuple[float, float, float, float]  # A real 2×2 matrix, by rows
 
@@ -149,7 +150,11 @@ class BoundDescription(FmuDescription):
     def _unlike_named(self) -> Iterator[tuple[str, str]]:
         """By the FMU's own parameters that are called as a rating is, and say something else."""
         own = [v for v in self.inner.variables.values() if v.causality == "parameter" and v.type == "Real"]
-        for name, unit, bound in (("S_n", "MVA", self.port.rating), ("V_n", "kV", self.port.V_n)):
+        for name, unit, bound in (
+            ("S_n", "MVA", self.port.rating),
+            ("V_n", "kV", self.port.V_n),
+            ("f_n", "Hz", self.port.f_n),
+        ):
             if bound is None:
                 continue
             for info in (v for v in own if v.unit and v.start and v.name not in self.port.taken):

@@ -1,6 +1,7 @@
 """What the columns of a file of operating points mean, for one scenario."""
 
 import fnmatch
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -26,6 +27,7 @@ class Elements:
     loads: tuple[str, ...]
     shunts: tuple[str, ...]
     slack: str
+    step_ups: Mapping[str, str] = field(default_factory=dict)  # branch whose loss is that of a unit alone → the unit
 
     @classmethod
     def of(cls, prepared: PreparedScenario) -> "Elements":
@@ -43,11 +45,26 @@ class Elements:
             table.grid, units, tuple(name for name in branches if f"{name}.connected" in switches),
             tuple(load.name for load in network.loads),
             tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches), units.get(wanted, wanted),
+            _step_ups(prepared, units),
         )  # fmt: skip
 
     @property
     def names(self) -> tuple[str, ...]:
         return (*self.units, *self.lines, *self.loads, *self.shunts)
+
+
+def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
+    """Branches without charging that alone lead to a bus with one unit and nothing else."""
+    if (network := prepared.network) is None:
+        return {}
+    ends = Counter(bus for line in network.lines for bus in (line.from_bus, line.to_bus))
+    ends.update([*(bus for x in network.transformers for bus in x.buses), *units.values()])
+    ends.update(2 * [*(x.bus for x in network.loads), *(x.bus for x in network.shunts)])
+    only = {bus: unit for unit, bus in units.items() if ends[bus] == 2}  # itself and one branch
+    return {
+        line.name: only[bus]
+        for line in network.lines for bus in (line.from_bus, line.to_bus) if bus in only and not line.B
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)

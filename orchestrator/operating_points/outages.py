@@ -32,8 +32,8 @@ class Outage:
 def read_outages(text: str | None, elements: Elements) -> list[Outage]:
     """The intact network, and the outages that a text names.
 
-    ``text``: ``n-1`` (each line, transformer and unit), ``lines``, ``units``, or names with commas between them, where
-    ``line_1_2+sg3`` loses two elements together; None for none."""
+    ``text``: ``n-1`` (each line, transformer and unit; a unit with its own transformer is one outage), ``lines``,
+    ``units``, or names with commas between them, where ``line_1_2+sg3`` loses two elements together; None for none."""
     names: list[str] = []
     for part in (part.strip() for part in (text or "").split(",") if part.strip()):
         names += _of_kind(part.lower(), elements) if part.lower() in _KINDS else [part]
@@ -51,8 +51,11 @@ def read_outages(text: str | None, elements: Elements) -> list[Outage]:
 
 
 def _of_kind(kind: str, elements: Elements) -> list[str]:
-    lines = list(elements.lines) if kind in ("n-1", "lines") else []
-    return lines + (list(elements.units) if kind in ("n-1", "units") else [])
+    if kind != "n-1":
+        return list(elements.lines if kind == "lines" else elements.units)
+    own = {unit: branch for branch, unit in elements.step_ups.items() if branch in elements.lines}
+    lines = [name for name in elements.lines if name not in elements.step_ups]
+    return lines + [f"{name}+{own[name]}" if name in own else name for name in elements.units]
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,14 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.service import without_units
 from orchestrator.cases.sharing import Dispatch, SharingRule, in_words, load_of, lost_load
 from orchestrator.coupling.system import System
 from orchestrator.errors import CosimError, ErrorKind, InputError, StartError
 from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.outages import Remains, what_remains
-from orchestrator.operating_points.service import switched_off, without_units
+from orchestrator.operating_points.service import switched_off
 from orchestrator.points.failure import Failure
 
 ACCEPT = 1e-9  # largest change of a state over a communication step with which the power flow's point is a steady state
@@ -78,7 +79,7 @@ class ItemPreparation:
         found = self._prepare(values, dispatch)
         if dispatch is not None:
             text = lost_and_shared(units, loads, valued, self.elements.grid, dispatch, found)
-        return PreparedItem(without_units(found, remains.units, self.elements), text)
+        return PreparedItem(without_units(found, remains.units), text)
 
     def live(self, item: Item) -> dict[str, Value]:
         """Values by which the case alone is at an item: what is off, and what units feed instead of what was lost.

@@ -194,9 +194,10 @@ def _cell(item: ScreenedItem | None) -> str | Marked:
     """The least damping at an item, or what became of it."""
     if item is None or item.record.status is not Status.COMPUTED:
         return "–" if item is None else str(item.record.status)
+    least = _least(item)
     if item.record.stable is False:
-        return Marked("UNSTABLE", "bad")
-    return "more" if (least := _least(item)) is None else damping(least.damping)
+        return Marked(f"{damping(least.damping)} UNSTABLE" if least else "UNSTABLE", "bad")
+    return "more" if least is None else damping(least.damping)
 
 
 def modes_table(summary: Summary, most: int = 12, *, whole: bool = False) -> ColumnTable[ScreenedMode]:

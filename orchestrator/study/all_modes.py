@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.threads import side_by_side
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.service import in_service
 from orchestrator.fmi.instance import is_ours
 from orchestrator.study.mode_identity import NamedSystem
 from orchestrator.study.modes import Linearised, ModesResult, compute_modes, linearised, running
@@ -30,7 +31,7 @@ def compute_all_modes(
         for prepared in scenarios:
             with ExitStack() as fmus:
                 try:
-                    master = fmus.enter_context(running(prepared))
+                    master = fmus.enter_context(running(in_service(prepared)))
                     begun = linearised(prepared, master, frequency_range, critical, directional=directional)
                 except Exception:
                     if before is not None:

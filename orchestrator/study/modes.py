@@ -39,6 +39,7 @@ from orchestrator.cases.fault_tables import component_faults
 from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ReferenceModeTable
+from orchestrator.cases.service import in_service
 from orchestrator.coupling.coupled import open_plan
 from orchestrator.coupling.master import Master
 from orchestrator.errors import ComponentError
@@ -114,7 +115,7 @@ def compute_modes(
     ``critical``: damping ratio below which modes are looked for, by sparse search; None for the full spectrum. The
     search knows too little to give modes their names.
     ``directional``: linearise with the FMUs' own directional derivatives instead of by perturbation."""
-    with running(prepared) as master:
+    with running(in_service(prepared)) as master:
         return modes_of(prepared, master, frequency_range, critical, directional=directional)
 
 
@@ -290,7 +291,7 @@ def identified(
         return NamedSystem(other, at, linear, found, named_modes(other.case, linear, found))
 
     def computed(other: PreparedScenario) -> NamedSystem:
-        with running(other) as master:
+        with running(in_service(other)) as master:
             boxes = black_boxes(master) if black_boxes else {}
             at = OperatingPoint(math.nan, math.nan, math.nan, 0, {}) if boxes else find_operating_point(master)
             linear = model_of(master, Blocks(master, directional=directional, known=boxes))

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
-from orchestrator.asked import FieldKind, Names, asked, plain_value
+from orchestrator.asked import FieldKind, Names, asked, plain_value, read_part
 from orchestrator.cases.given import check_case_name
 from orchestrator.errors import InputError
 from orchestrator.points.request import OverCluster, of_frequencies, of_scenarios, of_values
@@ -18,13 +18,7 @@ def read_until(text: str) -> Until:
     """``unstable``, or a damping [%]."""
     if text.strip().lower() == "unstable":
         return Until()
-    try:
-        damping = float(text.strip().removesuffix("%"))
-    except ValueError:
-        damping = -1.0
-    if not 0 < damping < 100:
-        raise ValueError(f"{text!r} is none; give 'unstable', or a damping from 0 to 100 % such as '5 %'")
-    return Until(damping)
+    return Until(100 * read_part("a damping from 0 to 100 % such as '5 %', or 'unstable'", 1e-6, 99.999)(text))
 
 
 def _until(given: Any, argument: str) -> Until | None:

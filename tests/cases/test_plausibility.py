@@ -368,7 +368,8 @@ def test_a_foreign_fmu_bound_with_another_frequency_is_refused(questions, tmp_pa
     if rated == "50 Hz":
         assert questions(*changes) == []
         return
-    (problem,) = refused(questions, *changes)
+    problem, asked = refused(questions, *changes)
+    assert "f_n = 60 Hz, and the FMU's f_n is 50 Hz by itself" in asked
     line = 1 + CASE.replace(*changes[0]).splitlines().index('binding = "vendor.toml"')
     assert problem.startswith(f"line {line}, components.vsc.binding: vsc is rated at 60 Hz and grid at 50 Hz")
     assert "rating.f_n" in problem

@@ -1,7 +1,9 @@
 """Operating points times outages: the numbers, what is named, and what must not be lost."""
 
 import json
+import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +18,10 @@ from orchestrator.cli import main
 from orchestrator.errors import InputError
 from orchestrator.operating_points.bench import PointBench, without_references
 from orchestrator.operating_points.columns import Elements
-from orchestrator.operating_points.item import Status
+from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.outages import read_outages
 from orchestrator.operating_points.points_file import read_points
+from orchestrator.operating_points.preparation import ItemPreparation
 from orchestrator.points.dask_cluster import DaskCluster
 from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
@@ -188,6 +191,36 @@ def test_outages_are_elements(two_area):
     _, _, elements = two_area
     assert [o.name for o in read_outages("n-1", elements)] == ["intact", "L", "sg1", "sg2", "gfor"]
     assert read_outages("L+gfor", elements)[1].elements == ("L", "gfor")
+
+
+def test_a_unit_and_its_transformer_are_one_outage(tmp_path):
+    """The loss of either has the modes of the other's, and one item of N-1 has both names."""
+    files = Path(__file__).parents[2] / ".docs" / "tutorials" / "psse"
+    for name in ("areas.raw", "areas.dyr"):
+        shutil.copy(files / name, tmp_path)
+    (tmp_path / "case.toml").write_text(
+        'name = "areas"\n[solver]\nstep_size = "5 ms"\n[power_flow]\ngrid = "grid"\n[components.grid]\n'
+        'model = "phasor_grid"\n[network]\nraw = "areas.raw"\n[units]\ndyr = "areas.dyr"\n'
+        'generator = "synchronous_generator_phasor"\nconverter = "gfor_phasor"\n'
+    )
+    case = load_case(tmp_path / "case.toml")
+    elements = Elements.of(case.prepare()[0])
+    names = [outage.name for outage in read_outages("n-1", elements)]
+    assert names[-4:] == [f"sg{n}+line_{bus}_{n}" for n, bus in ((1, 5), (2, 6), (3, 11), (4, 10))]
+    assert len(names) == 1 + 8 + 4
+    assert [o.name for o in read_outages("sg4, line_10_4", elements)] == ["intact", "sg4", "line_10_4"]
+    preparation = ItemPreparation(case, "areas", ())
+    either = [("sg2",), ("line_6_2",), ("sg2", "line_6_2")]
+    flows = [
+        preparation.prepared(Item(0, 1, {"grid.load_7.P": 700.0, "grid.load_9.P": 1400.0}, out, out)).scenario
+        for out in either
+    ]
+    assert flows[0].power_flow.voltages == pytest.approx(flows[2].power_flow.voltages)
+    assert flows[1].power_flow.voltages == pytest.approx(flows[2].power_flow.voltages)
+    assert all("sg2" not in flow.system.components for flow in flows)
+    with PointBench() as bench:  # |v| that an exciter takes at once is curved where v_im = 0, and no limit
+        bench.master(case.prepare((), {"sg*.exciter.T_R": 0.0})[0])
+        assert bench.linear_model().doubts == ()
 
 
 @pytest.mark.parametrize(("text", "said"), [("sg9", "'sg9'"), ("L,L", "named twice"), ("units,sg1", "named twice")])

@@ -216,8 +216,9 @@ def test_what_cannot_move_together_is_refused(loop, vary, said):
     [
         (["--vary", "one.T=0.1,0.2", "--until", "unstable"], "needs a range"),
         (["--vary", "one.T=0.1:0.2", "--vary", "two.T=0.1:0.2", "--until", "unstable"], "searches along one range"),
-        (["--vary", "one.T=0.1:0.2", "--until", "soon"], "'soon' is none; give 'unstable'"),
-        (["--vary", "one.T=0.1:0.2", "--until", "120 %"], "'120 %' is none; give 'unstable'"),
+        (["--vary", "one.T=0.1:0.2", "--until", "soon"], "'unstable'"),
+        (["--vary", "one.T=0.1:0.2", "--until", "120 %"], "'120 %' is not a damping"),
+        (["--vary", "one.T=0.1:0.2", "--until", "0.05"], "is read in percent; write 5 for a ratio of 0.05"),
     ],
 )
 def test_a_search_that_is_none_is_refused(gfor, loop, options, said):

@@ -162,7 +162,7 @@ def _model(machine: Machine, parts: Mapping[str, str], values: Mapping[str, floa
 
 def _values(record: DynamicRecord, known: DyrRecord) -> dict[str, float]:
     given = given_values(record, known.fields, {*_KNOWN, *FIELDS})
-    found: dict[str, float] = {}
+    found = dict.fromkeys(known.lacks, 0.0)
     for field in known.fields:
         value = given[field.name]
         if field.only and value not in field.only:

@@ -16,15 +16,17 @@ from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import Problem
 
 _BUS_COLUMNS, _BRANCH_COLUMNS, _GEN_COLUMNS = 9, 11, 10
+_VM, _VA = 7, 8  # columns of the table of buses
 _REFERENCE = 3
 _NO_LIMIT = 9999.0  # MW or Mvar by which PSS/E says that a generator has no limit
-_APART = 0.05  # voltage of a solved file beside what a generator within its limits is to hold [pu]
+_APART = 0.01  # voltage of a solved file beside what a generator within its limits is to hold [pu]
 _MOST_VOLTAGE = 2.0
 _SBASE = 100.0  # usual base [MVA]
 _FAR = 20.0
 """Times the middle one of all reactances of lines from which one is questioned, where its ohms would be usual."""
 
 _SMALL_LOSS = 10.0  # MW that a fixed shunt may draw unasked
+_RADIANS, _NEAR = math.pi / 6, 0.01  # step of shifts in radians, and how near a number is to be one of them
 _SAME_VOLTAGE = 0.1  # part by which the nominal voltages at a line's ends may differ
 
 
@@ -50,14 +52,12 @@ class Machine:
 class RawNetwork:
     """A file's tables, its machines in service, and what was taken over in another form.
 
-    ``idle`` has bus and identifier of the machines that are out of service. ``solved``: the voltages are no flat start.
-    """
+    ``idle`` has bus and identifier of the machines that are out of service."""
 
     tables: SourceTables
     machines: tuple[Machine, ...]
     changes: tuple[Problem, ...]
     idle: frozenset[tuple[int, str]] = frozenset()
-    solved: bool = True
 
 
 def read_raw(path: Path, leaving_out: Sequence[str] = (), *, keep_load_parts: bool = False) -> RawNetwork:
@@ -99,10 +99,7 @@ class _Reading:
             np.array(self._branches).reshape(-1, _BRANCH_COLUMNS), gen,
             np.array(self._to_earth, dtype=complex).reshape(-1, 2), self._labels, self._raw.frequency, self._load_parts,
         )  # fmt: skip
-        flat = all(
-            record.number(7, "VM", 1.0) == 1 and record.number(8, "VA", 0.0) == 0 for record in self._raw.of("bus")
-        )
-        return RawNetwork(tables, machines, tuple(self._changes.listed()), frozenset(self._idle), not flat)
+        return RawNetwork(tables, machines, tuple(self._changes.listed()), frozenset(self._idle))
 
     def _bus(self, record: Record, index: int = 0) -> int:
         bus = abs(record.whole(index, "the bus' number"))
@@ -135,6 +132,7 @@ class _Reading:
             self._rows[number] = [number, kind, *[0.0] * (_BUS_COLUMNS - 2)]
             self._kilovolts[number] = record.number(2, "BASKV", 0.0)
             self._magnitudes[number] = record.number(7, "VM", 1.0)
+            self._rows[number][_VM:] = self._magnitudes[number], record.number(8, "VA [degrees]", 0.0)
             if kind != 4 and not 0 < self._magnitudes[number] <= _MOST_VOLTAGE:
                 raise record.error(
                     f"VM is {self._magnitudes[number]:g} pu; it must exceed 0 and be at most {_MOST_VOLTAGE:g} (no kV, "
@@ -228,6 +226,10 @@ class _Reading:
         windings = t.windings
         if t.controlled:
             self._changes.note(t.record.line, "tap changer or phase-shift control: held at its position")
+        for turned in (w.shift / _RADIANS for w in windings if 0 < abs(w.shift) < 2 * math.pi):
+            if abs(turned - round(turned)) < _NEAR * abs(turned):
+                text = f"ANG is {turned * _RADIANS:g} degrees: is it in radians? {round(turned) * 30} degrees are usual"
+                self._changes.note(t.record.line, text)
         if t.corrected:
             self._changes.note(t.record.line, "impedance correction table: not applied")
         if t.off == (0, 1, 2):

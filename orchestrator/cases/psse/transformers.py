@@ -99,6 +99,8 @@ def _impedance(raw: RawFile, line: Record, index: int, code: int, nominal: float
     if not base > 0:
         raise line.error(f"a winding's SBASE is {base:g} MVA; it must exceed 0")
     if code == 3:  # load loss [W], and the magnitude of the impedance
+        if 0 < resistance < 1:
+            raise line.error(f"R = {resistance:g} is a load loss in W by CZ = 3; write 0, or CZ = 2 if it is in pu")
         resistance *= 1e-6 / base
         if abs(resistance) > abs(reactance):
             raise line.error(f"the load loss gives R = {resistance:g} pu, more than the impedance of {reactance:g} pu")

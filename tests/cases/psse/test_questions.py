@@ -1,11 +1,16 @@
 """Mistakes in RAW and DYR files that a power flow survives: each is one question, and an honest file has none."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.cases.file_solution import misfit_of
+from orchestrator.cases.network_import import import_network
+from orchestrator.cases.network_sources import read_pandapower
 from orchestrator.errors import CaseError
 
 FILES = Path(__file__).parents[3] / ".docs" / "tutorials" / "psse"
@@ -77,6 +82,16 @@ DYRS = {
     "gain of a stabiliser": (changed(DYR, (STAB1, STAB1.replace("  1.0 ", "  1000 "))), "pss.K_S = 1000 pu"),
     "least droop of a governor": (changed(DYR, (TGOV1, TGOV1.replace("0.05", "0.005"))), "governor.R = 0.005 pu is"),
     "field's time constant": (changed(DYR, ("8.0 0.03", "0.8 0.03")), "machine.T_d10 = 0.8 s is outside"),
+    "gain of a tenth": (
+        changed(DYR, (EXST1, EXST1.replace("200.0", "20.0"))),
+        "exciter.K_A = 20, where the 3 other machines have 200 to 200: is it so?",
+    ),
+    "inertia of a tenth": (
+        changed(DYR, (" 6.5 ", " 0.65 ")),
+        "machine.H = 0.65, where the 3 other machines have 6.175 to",
+    ),
+    "lead for lag of a governor": (changed(DYR, (TGOV1, TGOV1.replace("2.1 7.0", "7.0 2.1"))), "are the two swapped?"),
+    "time constant of an exciter": (changed(DYR, (EXST1, SEXS.replace("0.05", "50"))), "exciter.T_E = 50 s is outside"),
     "lead for lag": (changed(DYR, (EXST1, SEXS.replace("0.1 10.0", "10.0 0.1"))), "are the two swapped?"),
     "no saturation": (changed(DYR, ("0.0392 0.2227", "0.0 0.0")), "sg1: the saturation is 0, where 3 of 4 machines"),
     "saturation in percent": (changed(DYR, ("0.0392 0.2227", "3.92 22.27")), "machine.s_10 = 3.92 is outside"),
@@ -116,6 +131,49 @@ RAWS = {
     "transformer in percent": (
         changed(RAW, ("'T3', 1\n0.0, 0.15, 900.0", "'T3', 1\n0.0, 15, 900.0")),
         "is 15 pu on the 900 MVA behind it, and step-up transformers have 0.03 to 0.35 pu there; is it in percent?",
+    ),
+    "load at another bus": (
+        changed(RAW, (" 7, '1 ', 1, 1, 1,  967", " 6, '1 ', 1, 1, 1,  967")),
+        "beyond what the network takes away, +967 MW +99.99 Mvar at bus_7, -967 MW -99.99 Mvar at bus_6",
+    ),
+    "sign of a shunt": (
+        changed(RAW, ("0.0, 200.0", "0.0, -200.0")),
+        "-371.7 Mvar at bus_7; look at its load, its shunt",
+    ),
+    "branch out of service": (
+        changed(
+            RAW,
+            (
+                "8,  9, '2 ', 0.011, 0.11, 0.1925, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1",
+                "8,  9, '2 ', 0.011, 0.11, 0.1925, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0",
+            ),
+        ),
+        "Mvar at bus_8; look at a branch between these buses (its status",
+    ),
+    "shift of a transformer": (
+        changed(RAW, ("1.0, 230.0, 0.0, 0.0", "1.0, 230.0, 30.0, 0.0")),
+        "Mvar at bus_5; look at its load, its shunt, its unit's power or a branch",
+    ),
+    "shift in radians": (
+        changed(RAW, ("1.0, 230.0, 0.0, 0.0", "1.0, 230.0, 0.52, 0.0")),
+        "ANG is 0.52 degrees: is it in radians? 30",
+    ),
+    "load loss in pu": (
+        changed(
+            RAW, ("5,  1, 0, '1 ', 1, 2, 1", "5,  1, 0, '1 ', 1, 3, 1"), ("0.0, 0.15, 900.0", "0.003, 0.15, 900.0")
+        ),
+        "R = 0.003 is a load loss in W by CZ = 3",
+    ),
+    "angles in radians": (
+        "\n".join(
+            ",".join([*line.split(",")[:8], f" {float(line.split(',')[8]) * 0.0174533:.4f}"]) if 3 < n < 15 else line
+            for n, line in enumerate(RAW.splitlines(), start=1)
+        ),
+        "look at voltages of another case, or angles that are not in degrees",
+    ),
+    "setpoint a little off": (
+        changed(RAW, ("-300.0, 1.03, 0, 900.0", "-300.0, 1.05, 0, 900.0")),
+        "VS is 1.05 pu, where the solved file has",
     ),
     "setpoint that the solution does not hold": (
         changed(RAW, ("719.000, 0.0, 500.0, -300.0, 1.03", "719.000, 0.0, 500.0, -300.0, 0.83")),
@@ -302,6 +360,7 @@ def test_a_unit_that_is_out_is_not_asked_to_start(questions, tmp_path, gfor, swi
     assert code == 0, err
     assert json.loads(out)["scenarios"][0]["stable"] is True
     assert "3 machines" in json.loads(out)["facts"]
+    assert '"sg4.' not in out  # its own modes are none of the network's
     back = '[[events]]\ntype = "unit_reconnection"\ntime = "1 s"\nunit = "sg4"\n'
     (tmp_path / "case.toml").write_text(CASE + back)
     values = {"grid.load_9.P": 700.0, switch: False}
@@ -310,3 +369,56 @@ def test_a_unit_that_is_out_is_not_asked_to_start(questions, tmp_path, gfor, swi
         (tmp_path / "case.toml").write_text(text)
         (prepared,) = load_case(tmp_path / "case.toml").prepare((), values)
         assert prepared.system.components["sg4"].value("governor.V_MIN") == least
+
+
+def test_a_solution_is_compared_with_all_kinds_of_elements(tmp_path):
+    pytest.importorskip("pandapower")
+    tables = read_pandapower("case300", tmp_path)
+    network, rounded = import_network(tables), tables.bus.copy()
+    rounded[:, 7:9] = np.round(rounded[:, 7:9], 4)
+    assert misfit_of(network, rounded, tables.labels) == ""
+    most = max(network.shunts, key=lambda x: abs(x.b_mvar))
+    wrong = replace(
+        network, shunts=tuple(replace(x, b_mvar=-x.b_mvar if x is most else x.b_mvar) for x in network.shunts)
+    )
+    assert f"Mvar at {most.bus}; look at its load, its shunt" in misfit_of(wrong, rounded, tables.labels)
+
+
+def test_a_load_that_feeds_beside_a_machine_counts(questions, tmp_path):
+    line = " 7, '1 ', 1, 1, 1,  967.000"
+    beside = " 2, '1 ', 1, 1, 1, -100.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1, 1, 0\n"
+    slack = []
+    for raw in (RAW, changed(RAW, (line, beside + line))):
+        asked = questions(raw=raw)
+        (prepared,) = load_case(tmp_path / "case.toml").prepare()
+        slack.append(900 * prepared.power_flow.powers["sg1"].real)
+    assert any("MW +0 Mvar at bus_2" in question for question in asked)
+    assert slack[0] - slack[1] == pytest.approx(100, abs=5)  # but for losses
+
+
+CONVERTER = """
+[components.gfor]
+model = "gfor_phasor"
+bus = "bus_8"
+parameters = { S_n = "300 MVA", P_0 = 0.666667, v_0 = 0.97 }
+[scenarios.less]
+set = { "sg3.P_0" = 0.576667 }
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("0.666667", "0.666667", None),
+        ("0.576667", "0.798889", None),  # the slack feeds less
+        ("0.576667", "0.687778", "the case's converters feed 200 MW, and the file's units 100 MW less"),
+        ("0.666667", "-0.666667", "P_0 = -0.666667 pu: it draws 200 MW; is it so?"),
+        ("300 MVA", "150 MVA", "the case's converters feed 100 MW, and the file's units 200 MW less than in the file"),
+        ("0.666667", "0.0067", "it feeds 2.01 MW with S_n = 300 MVA; is it so?"),
+        ("0.666667", "0.0", "converters feed 0 MW, and the file's units 200 MW less"),
+        ("0.666667", "1.2", "more than the rating of the converter"),
+    ],
+)
+def test_a_converters_power_is_compared_with_its_rating_and_the_files(questions, old, new, words):
+    asked = questions(case=CASE + changed(CONVERTER, (old, new)))
+    assert any(words in question for question in asked) if words else asked == [], asked
