@@ -127,11 +127,6 @@ def sampling(times: NDArray[np.float64], highest_hz: float = 10.0) -> Sampling:
     return Sampling(step, thin, len(times), finest)
 
 
-def interval_used(times: NDArray[np.float64], highest_hz: float = 10.0) -> float:
-    """Time between the samples that `identify_modes` uses [s], as `Sampling.interval`."""
-    return sampling(times, highest_hz).interval
-
-
 def nearest(modes: list[IdentifiedMode], eigenvalue: complex) -> IdentifiedMode | None:
     """The identified mode closest to an eigenvalue [rad/s]."""
     return min(modes, key=lambda m: abs(m.eigenvalue - eigenvalue), default=None)

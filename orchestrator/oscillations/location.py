@@ -8,6 +8,7 @@ it gives more."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -126,7 +127,7 @@ def block_phasors(places: Sequence[Site], times: Numbers, found: SpectralLine, o
     return np.asarray(blocks * np.exp(-1j * np.angle(shared))[:, None])
 
 
-def jackknife(blocks: Complex, figures: Callable[[Complex], Numbers]) -> tuple[Numbers, Numbers]:
+def jackknife(blocks: Complex, figures: Callable[[Complex], Any]) -> tuple[Any, Numbers]:
     """Figures of the mean of all blocks, and their standard errors."""
     count = len(blocks)
     without = np.array([figures(np.delete(blocks, k, axis=0).mean(axis=0)) for k in range(count)])

@@ -3,7 +3,7 @@
 Chevalier, Vorobev and Turitsyn, "Using effective generator impedance for forced oscillation source location", IEEE
 Trans. Power Systems 33(6), 2018, with the linear models of the case's own components in the place of fitted ones."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,17 +25,7 @@ _NOTED = 0.05  # the same, from which on it is told
 _CLEARER = 0.6  # what the best place leaves beside what the second best does
 
 
-@dataclass(frozen=True)
-class Response:
-    """C·(sI − A)⁻¹·B + D."""
-
-    A: Matrix
-    B: Matrix
-    C: Matrix
-    D: Matrix
-
-    def at(self, s: complex) -> Complex:
-        return np.asarray(self.C @ np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B) + self.D)
+Response = Callable[[complex], Complex]  # of s
 
 
 @dataclass(frozen=True)
@@ -75,7 +65,7 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
     names = [p.name for p in places]
     s, known = 2j * np.pi * found.frequency, [units[name.casefold()] for name in names]
     means = np.array([complex(p.p.mean(), p.q.mean()) / measured.base for p in places])
-    own = [_frame(u.voltage).T @ u.admittance.at(s) @ _frame(u.voltage) for u in known]
+    own = [_frame(u.voltage).T @ u.admittance(s) @ _frame(u.voltage) for u in known]
     size = np.array([abs(unit.voltage) for unit in known])
 
     def driven(blocks: Complex) -> Complex:
@@ -93,9 +83,9 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
 
     def reach(response: Response, frame: complex = 1.0) -> Complex:
         """To the voltages of the observed units, each in its own frame, from a current in a frame."""
-        parts = response.at(s).reshape(len(models.buses), 2, -1)
+        parts = response(s).reshape(len(models.buses), 2, -1)
         there = np.concatenate([_frame(unit.voltage).T @ parts[b] for b, unit in zip(rows, known, strict=True)])
-        return there @ _frame(frame) if there.shape[1] == 2 else there
+        return np.asarray(there @ _frame(frame) if there.shape[1] == 2 else there)
 
     def left(rest: Complex) -> float:
         return float(np.linalg.norm(rest) / (np.linalg.norm(voltages) or 1.0))
@@ -121,11 +111,11 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
         also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
         return Opinion(OWN_MODEL, names[top], True, why + ("; less so " + ", ".join(also) if also else ""), ranking)
     order = sorted(rivals, key=rivals.__getitem__)
-    clear = bool(order) and rivals[order[0]] < min(_EXPLAINED, _CLEARER * min([1.0, *map(rivals.get, order[1:2])]))
-    if clear and max(parts) < _CONTRARY:
+    first, second, *_ = [*(rivals[name] for name in order), 1.0, 1.0]
+    if first < min(_EXPLAINED, _CLEARER * second) and max(parts) < _CONTRARY:
         name = " or ".join(n for n, u in unseen.items() if u.bus == order[0]) or order[0]
         why = (f"the units that are observed do as their models, and a current of {name} explains "
-               f"{100 * (1 - rivals[order[0]]):.0f} % of what the voltages do")  # fmt: skip
+               f"{100 * (1 - first):.0f} % of what the voltages do")  # fmt: skip
         return Opinion(OWN_MODEL, name, True, why, ranking)
     both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3])
     why = f"no place alone deviates from its model and explains the voltages (deviations: {both})"

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from orchestrator.analysis.blocks import Blocks
 from orchestrator.analysis.linearization import continuous
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.arrays import Matrix
+from orchestrator.arrays import Complex, Matrix
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
@@ -47,15 +48,14 @@ def unit_models(prepared: PreparedScenario) -> UnitModels:
     A, C = F + G @ settled @ H, (settled @ H)[seen]
 
     def reach(drive: Matrix) -> Response:
-        return Response(A, G @ drive, C, drive[seen])
+        return lambda s: _response(s, A, G @ drive, C, drive[seen])
 
     first = len(row) + len(blocks.links)
     loads = {name.removesuffix(".scale"): reach(settled[:, [first + k]]) for k, name in enumerate(scales)}
     found = {}
     for unit, bus in homes.items():
         c = blocks.components[unit]
-        assert c.A_c is not None  # `continuous` refuses a component without derivatives
-        assert c.B_c is not None
+        assert c.A_c is not None and c.B_c is not None  # noqa: PT018 - `continuous` has refused it
         columns = [c.inputs.index(v) for v in _VOLTAGE]
         given, y = _CURRENT, complex(1.0)
         if f"{unit}.i_re" not in row:  # a source behind an admittance y, which gives y times its own voltage
@@ -63,10 +63,14 @@ def unit_models(prepared: PreparedScenario) -> UnitModels:
         if not y or f"{unit}.{given[0]}" not in row:
             continue
         drive = settled[:, [row[f"{unit}.{name}"] for name in given]] @ np.linalg.inv(turn(y))
-        own = Response(c.A_c, c.B_c[:, columns], c.C_o, c.D_o[:, columns])
+        own = partial(_response, A=c.A_c, B=c.B_c[:, columns], C=c.C_o, D=c.D_o[:, columns])
         voltage = complex(*(values[f"{bus}.{v}"] for v in _VOLTAGE))
         found[unit] = UnitModel(bus, voltage, currents[unit], own, reach(drive))
     return UnitModels(found, buses, loads)
+
+
+def _response(s: complex, A: Matrix, B: Matrix, C: Matrix, D: Matrix) -> Complex:
+    return np.asarray(C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)
 
 
 def recorded_case(attributes: Mapping[str, Any]) -> PreparedScenario | None:
@@ -77,6 +81,5 @@ def recorded_case(attributes: Mapping[str, Any]) -> PreparedScenario | None:
     scenario, values = str(attributes["scenario"]), json.loads(attributes["values"])
     (prepared,) = case.prepare([scenario])
     changed = {key: value for key, value in values.items() if prepared.values.get(key) != value}
-    if changed:
-        (prepared,) = case.prepare([scenario], changed)
+    (prepared,) = case.prepare([scenario], changed) if changed else (prepared,)
     return prepared if dict(prepared.values) == values else None

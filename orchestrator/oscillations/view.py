@@ -72,7 +72,7 @@ def sources_of(
 
         try:
             prepared = prepared or own.recorded_case(dataset.attrs)
-            models = prepared and own.unit_models(prepared)
+            models = own.unit_models(prepared) if prepared else None
         except CosimError as error:
             remark = f"the record is compared with no models of the units: {error}"
             measured = replace(measured, remarks=(*measured.remarks, remark))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from orchestrator.analysis.identification import TOLERANCE, IdentifiedMode, identify_modes, interval_used
+from orchestrator.analysis.identification import TOLERANCE, IdentifiedMode, identify_modes, sampling
 from orchestrator.analysis.mode_doubts import COARSER, SHORTER, with_doubts, worth_showing
 from orchestrator.analysis.window_halves import WindowPart, part_of
 from orchestrator.cases.names import close_names
@@ -193,7 +193,7 @@ def _unit(dataset: xr.Dataset, expression: str) -> str:
 def _strongest(curve: xr.DataArray, start: float) -> IdentifiedMode | None:
     """Above a quarter of the sampling frequency there is perhaps no oscillation of the system."""
     times = curve["time"].values
-    highest = 0.25 / interval_used(times) if len(times) > 1 else 0.0
+    highest = 0.25 / sampling(times).interval if len(times) > 1 else 0.0
     try:
         found = [m for m in strongest_modes(curve, start) if 0.05 < m.frequency_hz <= highest]
     except AnalysisError:

@@ -64,16 +64,17 @@ def worse(models, size, seed):
     """Models whose elements are off by some part."""
     rng = np.random.default_rng(seed)
 
-    class Off:
-        def __init__(self, response):
-            self._response, self._factors = response, 1 + size * rng.standard_normal((2, 2))
+    def off(response):
+        factors = 1 + size * rng.standard_normal((2, 2))
 
-        def at(self, s):
-            whole = self._response.at(s)
-            return whole * np.tile(self._factors, (len(whole) // 2, 1))[:, : whole.shape[1]]
+        def changed(s):
+            whole = response(s)
+            return whole * np.tile(factors, (len(whole) // 2, 1))[:, : whole.shape[1]]
 
-    units = {n: replace(u, admittance=Off(u.admittance), reach=Off(u.reach)) for n, u in models.units.items()}
-    return UnitModels(units, models.buses, {name: Off(load) for name, load in models.loads.items()})
+        return changed
+
+    units = {n: replace(u, admittance=off(u.admittance), reach=off(u.reach)) for n, u in models.units.items()}
+    return UnitModels(units, models.buses, {name: off(load) for name, load in models.loads.items()})
 
 
 def test_models_that_are_a_fifth_off_name_no_other_unit():

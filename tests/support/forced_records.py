@@ -4,7 +4,6 @@ The model is kept with its slow eigenvalues alone (tests/oscillations/models); `
 --models` makes them anew.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -106,13 +105,6 @@ def save(model, name):
     np.savez_compressed(MODELS / f"{name}.npz", **small)
 
 
-@dataclass(frozen=True)
-class Computed:
-    """A response as `orchestrator.oscillations.models` has them, from a function of s."""
-
-    at: Callable
-
-
 def unit_models_of(system):
     """Each unit's own model, as the whole one implies it: what its currents do where something else is forced."""
     firsts = {bus: system.buses.index(bus) for bus in dict.fromkeys(system.buses)}
@@ -131,9 +123,9 @@ def unit_models_of(system):
 
     return UnitModels({
         unit: UnitModel(bus, complex(system.v_0[k]), complex(system.i_0[k]),
-                        *(Computed(lambda s, unit=unit, part=part: parts(unit, s)[part]) for part in range(2)))
+                        *(partial(lambda unit, part, s: parts(unit, s)[part], unit, part) for part in range(2)))
         for k, (unit, bus) in enumerate(zip(system.units, system.buses, strict=True))
-    }, tuple(firsts), {name.removesuffix(".scale"): Computed(partial(load, name))
+    }, tuple(firsts), {name.removesuffix(".scale"): partial(load, name)
                        for name in system.inputs if name.startswith("grid.")})  # fmt: skip
 
 
