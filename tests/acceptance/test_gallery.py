@@ -103,6 +103,7 @@ def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
         ("sixty_hertz", "rated_frequency", "so it is made for 60 Hz where 50 Hz is bound"),
         ("crash_in_dip", "limits", "s: its process died with SIGSEGV in fmi2DoStep"),
         ("limit_of_a_short_time", "limits", " s at 0.1"),
+        ("blocks_after_deep_dips", "limits", "it gives no current for"),
     ],
 )
 def test_the_verdict_says_what_happened(name, only, words, gallery):

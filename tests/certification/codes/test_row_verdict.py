@@ -191,6 +191,8 @@ def test_a_declared_limit_takes_the_place_of_the_widest():
     }
     current = judge_row(row, BenchResult(row.name, TIMES, signals, [told]), 50.0).findings[-1]
     assert (current.accepted, current.value, current.limit) == (False, 1.6, pytest.approx(1.26))
+    beside = BenchResult(row.name, TIMES, signals, [told | {"component": "duplicate"}])
+    assert judge_row(row, beside, 50.0).findings[-1].limit == 3.3
 
 
 def test_a_certificate_without_that_criterion_holds_where_it_is_met():
