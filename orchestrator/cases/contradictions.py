@@ -1,12 +1,17 @@
 """What a case file says twice, of nothing, or against itself. Nothing of a scenario is needed to see it."""
 
-from collections.abc import Iterable, Iterator
+from __future__ import annotations
 
-from orchestrator.cases.draft import Locate
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
 from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import CaseTable
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.errors import Problem
+
+if TYPE_CHECKING:
+    from orchestrator.cases.draft import Locate
 
 
 def contradictions(case: CaseTable, place: Locate) -> list[Problem]:
