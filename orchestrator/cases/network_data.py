@@ -166,19 +166,19 @@ def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
         name = "_".join(["line", row["from"], row["to"], *([circuit] if circuit not in ("", "1") else [])])
         ends = bus_name(row["from"]), bus_name(row["to"])
         tap, shift = optional_number(row, "tap") or 1.0, optional_number(row, "shift") or 0.0
-        lines.append((Line(name, *ends, **_impedance(row), tap=tap, shift=shift), place_of(row)))
+        lines.append((Line(name, *ends, *_impedance(row), tap, shift), place_of(row)))
     return lines
 
 
-def _impedance(row: Row) -> dict[str, float]:
-    """R, X and B [pu on 100 MVA], which a row gives so or in ohms and µS at its voltage."""
+def _impedance(row: Row) -> list[float]:
+    """X, R and B [pu on 100 MVA], which a row gives so or in ohms and µS at its voltage."""
     given = [key for key in ("X", "X_ohm") if (row.get(key) or "").strip()]
     if len(given) == 2:
         raise InputError(f"{place_of(row)}: X and X_ohm are both given; leave one of them empty")
     if "X_ohm" not in row or given == ["X"]:
-        return {key: number(row, key) for key in ("R", "X", "B")}
-    kv, *values = (number(row, key) for key in _IN_OHMS)
+        return [number(row, key) for key in ("X", "R", "B")]
+    kv, R, X, B = (number(row, key) for key in _IN_OHMS)
     if kv <= 0:
         raise InputError(f"{place_of(row)}: kv = {kv:g}; ohms need the line's rated voltage, above 0")
     z = kv**2 / SYSTEM_BASE_MVA
-    return {"R": values[0] / z, "X": values[1] / z, "B": values[2] * 1e-6 * z}
+    return [X / z, R / z, B * 1e-6 * z]
