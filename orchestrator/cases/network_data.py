@@ -166,7 +166,8 @@ def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
         name = "_".join(["line", row["from"], row["to"], *([circuit] if circuit not in ("", "1") else [])])
         ends = bus_name(row["from"]), bus_name(row["to"])
         tap, shift = optional_number(row, "tap") or 1.0, optional_number(row, "shift") or 0.0
-        lines.append((Line(name, *ends, *_impedance(row), tap, shift), place_of(row)))
+        X, R, B = _impedance(row)
+        lines.append((Line(name, *ends, X, R, B, tap, shift), place_of(row)))
     return lines
 
 

@@ -250,7 +250,7 @@ model = "{grid}"
 
 [network]
 {network}
-load_model = {{ active = "power", reactive = "power" }}    # or "current", "impedance"
+{loads}load_model = {{ active = "power", reactive = "power" }}    # or "current"; without it impedance
 {more}
 [units]
 {units}
@@ -288,11 +288,12 @@ class _Text:
             lines.append("machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data")
         if "units" in self._sources:
             lines[-1] += f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
-        lines.append("loads: constant power, as in the file's own power flow; [network] load_model changes it")
+        asked = "impedance until [network] load_model says otherwise; `gfor modes` tells what power would change"
+        lines.append(f"loads: constant {asked if not self._tables() else 'power; [network] load_model changes it'}")
         lines.append(f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}")
         lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
-        asked = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
-        return [*lines, asked] if questions else lines
+        more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
+        return [*lines, more] if questions else lines
 
     def _path(self, path: Path) -> str:
         """As the file names it: relative where that is possible, with slashes everywhere."""
@@ -329,6 +330,7 @@ class _Text:
             slack=f"\nslack = {_quoted(w.slack)}" if w.slack else "",
             grid="grid" if kind == "emt" else "phasor_grid",
             network=self._tables() or f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
+            loads="" if self._tables() else "# ",
             more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "") + stray["emt"] * (kind == "emt")
             + (f"leave_out = {_listed(w.leave_out)}\n" if w.leave_out else ""),
             units=dyr + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else ""),
