@@ -22,6 +22,8 @@ def read_until(text: str) -> Until:
         damping = float(text.strip().removesuffix("%"))
     except ValueError:
         damping = -1.0
+    if 0 < damping < 1 and "%" not in text:
+        raise ValueError(f"{text} is read in percent; write {100 * damping:g}, or '{text} %'")
     if not 0 < damping < 100:
         raise ValueError(f"{text!r} is none; give 'unstable', or a damping from 0 to 100 % such as '5 %'")
     return Until(damping)

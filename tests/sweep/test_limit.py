@@ -218,6 +218,7 @@ def test_what_cannot_move_together_is_refused(loop, vary, said):
         (["--vary", "one.T=0.1:0.2", "--vary", "two.T=0.1:0.2", "--until", "unstable"], "searches along one range"),
         (["--vary", "one.T=0.1:0.2", "--until", "soon"], "'soon' is none; give 'unstable'"),
         (["--vary", "one.T=0.1:0.2", "--until", "120 %"], "'120 %' is none; give 'unstable'"),
+        (["--vary", "one.T=0.1:0.2", "--until", "0.05"], "0.05 is read in percent; write 5"),
     ],
 )
 def test_a_search_that_is_none_is_refused(gfor, loop, options, said):
