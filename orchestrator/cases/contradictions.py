@@ -1,17 +1,13 @@
 """What a case file says twice, of nothing, or against itself. Nothing of a scenario is needed to see it."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Iterator
 
 from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import CaseTable
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.errors import Problem
 
-if TYPE_CHECKING:
-    from orchestrator.cases.draft import Locate
+Locate = Callable[..., str]
 
 
 def contradictions(case: CaseTable, place: Locate) -> list[Problem]:

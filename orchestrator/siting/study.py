@@ -9,18 +9,8 @@ from typing import Any, cast
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.asked import (
-    FILE,
-    OUTAGES,
-    POSITIVE,
-    RANKED,
-    FieldKind,
-    Names,
-    asked,
-    positive,
-    read_positive,
-    text_or_none,
-)
+from orchestrator.asked import FILE, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
+from orchestrator.asked import positive as above_zero
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable
@@ -37,7 +27,7 @@ from orchestrator.study.modes import running
 
 PODS = {"pod_p": ACTIVE, "pod_q": REACTIVE}
 DROOP = "droop"
-_RATING = FieldKind("MVA", read_positive, lambda given, name: None if given is None else positive(given, name))
+_RATING = FieldKind("MVA", POSITIVE.read, lambda given, name: None if given is None else above_zero(given, name))
 _DEVICE = FieldKind("DEVICE", str, lambda given, argument: str(text_or_none(str(given), argument)))
 HARDLY = 0.02  # A bus that moves a mode by less than this part of what the best bus does hardly reaches it
 
@@ -233,9 +223,8 @@ def _of_foreign(
     intact = situations[0]
     there = active[intact.name][intact.modes[0].label]
     bus = max(there, key=lambda name: abs(there[name].change))
-    prepared = _prepared(
-        placed(case, foreign(Path(request.device), request.binding_file, request.rating), [bus]), request, scenario
-    )
+    device = foreign(Path(request.device), request.binding_file, request.rating)
+    prepared = _prepared(placed(case, device, [bus]), request, scenario)
     with running(prepared) as master:
         find_operating_point(master)
         model = Blocks(master).components[name_at(bus)]

@@ -57,14 +57,9 @@ def draw_eigenvalues(
             zorder=3,
         )
         for mode in modes if annotate else ():
-            figures = f"{mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %"
-            text, at = (
-                f"{result.name_of(mode) or ''} {figures}".strip(),
-                (mode.eigenvalue.real, mode.frequency_hz * turn),
-            )
-            axis.annotate(
-                text, at, (-7, 3), textcoords="offset points", size="x-small", ha="right", color=colour(index)
-            )
+            text = f"{result.name_of(mode) or ''} {mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %"
+            look = {"textcoords": "offset points", "size": "x-small", "ha": "right", "color": colour(index)}
+            axis.annotate(text.strip(), (mode.eigenvalue.real, mode.frequency_hz * turn), (-7, 3), **look)
         for reference in result.references.values():
             real, hertz = _real_and_hz(reference)
             axis.scatter(real, hertz * turn, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)

@@ -130,9 +130,8 @@ def run_scenario(
         if federates.announce is not None:
             observers = [*observers, Pace(federates.announce)]
         with Federation(prepared, federates) as federation:
-            return _run(
-                federation.prepared, frequency_range, observers, linear, recording, None, threads, boxes, federation
-            )
+            ready = federation.prepared
+            return _run(ready, frequency_range, observers, linear, recording, None, threads, boxes, federation)
     try:
         return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes)
     except NotTakenUpError as error:
@@ -161,9 +160,7 @@ def _run(
             modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
         else:
             modes = modes_of(prepared, master, frequency_range)
-        if (
-            reasons and boxes is None and federation is None
-        ):  # a box is looked at in steps, which a foreign federate cannot take back
+        if reasons and not (boxes or federation):  # a look is in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
         follows = linear_response(master, prepared) if linear else None
