@@ -63,9 +63,12 @@ class Link:
 def similarities(a: ModeSet, b: ModeSet) -> NDArray[np.float64]:
     """Similarity of every mode of one point with every mode of another, shape (m_a, m_b), from 0 to 1.
 
-    A state that only one of the points has counts as 0 in the other's eigenvectors."""
+    A state that only one of the points has counts as 0 in the other's eigenvectors, and those of an identified model
+    in both: each identification has states of its own."""
     place_in_b = {name: k for k, name in enumerate(b.names)}
-    both = [(k, place_in_b[name]) for k, name in enumerate(a.names) if name in place_in_b]
+    both = [
+        (k, place_in_b[name]) for k, name in enumerate(a.names) if name in place_in_b and ".identified." not in name
+    ]
     of_a, of_b = [k for k, _ in both], [k for _, k in both]
     norm_a, norm_b = (np.einsum("ij,ij->i", s.left.conj(), s.right) for s in (a, b))
     product = similarity(a.left[:, of_a], a.right[:, of_a], b.left[:, of_b], b.right[:, of_b]) / np.abs(

@@ -3,40 +3,25 @@
 import json
 import re
 import tomllib
-from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from types import MethodType
-from typing import TYPE_CHECKING, Any, Concatenate, cast
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.added import rooms, study_in
-from orchestrator.api.methods import Asks, Shown, method
-from orchestrator.api.progress import shown_progress, shown_stages
-from orchestrator.api.scenario import Scenario, choose, question
-from orchestrator.asked import flag, text_or_none
-from orchestrator.asked import names as names_given
+from orchestrator.asked import flag
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
-from orchestrator.cases.forcing import forced
 from orchestrator.cases.given import keep, kept
-from orchestrator.coordinated_design.command import STUDY as COORDINATED_DESIGN
-from orchestrator.coordinated_design.one_point import design_controller
 from orchestrator.errors import InputError
-from orchestrator.interactions.command import STUDY as INTERACTIONS
 from orchestrator.late import pd
-from orchestrator.pod_design.design import DesignRequest
-from orchestrator.pod_design.view import ControllerDesign
-from orchestrator.points.points import nobody
-from orchestrator.points.store import POINTS
-from orchestrator.points.study import PointStudy, Study, StudyAtOnce, choose_executor
 from orchestrator.report.notebook import page
-from orchestrator.results.lock import held
-from orchestrator.screening.command import STUDY as SCREENING
-from orchestrator.siting.command import STUDY as SITING
-from orchestrator.study.request import ScenarioRequest, ScenariosRequest
-from orchestrator.sweep.command import STUDY as SWEEP
+
+if TYPE_CHECKING:
+    from orchestrator.api import studies
 
 
 def built_in_cases() -> tuple[str, ...]:
@@ -88,33 +73,15 @@ def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "
     return Case(load_case(case, trust_fmus=trusted))
 
 
-def _scenario(case: "Case", request: ScenarioRequest) -> Scenario:
-    known, name = ", ".join(case.scenarios), request.name
-    text_or_none(name, "name", f"give the name of one scenario: {known}")
-    if name is None and len(case.scenarios) != 1:
-        raise InputError(f"{case.name}: the case has {len(case.scenarios)} scenarios; choose one of: {known}")
-    file = forced(case.file, names_given(request.force, "force"))
-    (chosen,) = choose(file, [name] if name else [], request)
-    question([chosen.prepared], above=1)
-    return chosen
+class _Late:
+    """A method of `studies`, which is imported where one is first asked for: it takes a second, and `load` none."""
 
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
 
-def _chosen(case: "Case", request: ScenariosRequest) -> list[Scenario]:
-    chosen = choose(case.file, request.names, request, cast("float | None", request.stop))
-    question((scenario.prepared for scenario in chosen), above=1)
-    return chosen
-
-
-def _designed(file: CaseFile, request: DesignRequest) -> ControllerDesign:
-    with shown_stages(shown=request.progress) as report:
-        design = design_controller(file, request, report=report)
-    question([design.result.prepared], above=2)
-    return design
-
-
-def of_study(name: str, study: Study[Asks, Shown]) -> Callable[Concatenate[Any, Asks], Shown]:
-    """The method of a study."""
-    return method(f"Case.{name}", study.request, lambda case, request: _computed(study, case.file, request))
+    def __get__(self, instance: object, owner: type) -> Any:
+        setattr(owner, self._name, getattr(import_module("orchestrator.api.studies"), self._name))
+        return getattr(owner if instance is None else instance, self._name)
 
 
 class Case:
@@ -168,14 +135,17 @@ class Case:
             trust_fmus=self.file.trust_fmus,
         )
 
-    scenario = method("Case.scenario", ScenarioRequest, _scenario)
-    choose = method("Case.choose", ScenariosRequest, _chosen)
-    sweep = of_study("sweep", SWEEP)
-    screen = of_study("screen", SCREENING)
-    site = of_study("site", SITING)
-    interactions = of_study("interactions", INTERACTIONS)
-    design = method("Case.design", DesignRequest, lambda case, request: _designed(case.file, request))
-    design_over_points = of_study("design_over_points", COORDINATED_DESIGN)
+    if TYPE_CHECKING:
+        scenario = studies.scenario
+        choose = studies.choose
+        sweep = studies.sweep
+        screen = studies.screen
+        site = studies.site
+        interactions = studies.interactions
+        design = studies.design
+        design_over_points = studies.design_over_points
+    else:
+        scenario, choose, sweep, screen, site, interactions, design, design_over_points = (_Late() for _ in range(8))
 
     if not TYPE_CHECKING:  # a study that was added; a line as those above shows it to type checkers
 
@@ -183,6 +153,8 @@ class Case:
             room = rooms().get(name)
             if room is None or name.startswith("_"):
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            from orchestrator.api.studies import of_study  # noqa: PLC0415 - as `_Late`
+
             return MethodType(of_study(name, study_in(room)), self)
 
     def __repr__(self) -> str:
@@ -192,33 +164,6 @@ class Case:
         titles = [table.title or name for name, table in self.file.scenarios.items()]
         table = pd.DataFrame({"scenario": self.scenarios, "title": titles})
         return page(f"{self.name}: {self.file.table.title or self.name}", table=table)
-
-
-def _computed(study: Study[..., Shown], file: CaseFile, request: Any) -> Shown:
-    """Plan a study and compute it; a folder that keeps its points is kept from other commands meanwhile."""
-    if isinstance(study, StudyAtOnce):
-        return cast("Shown", study.compute(file, request, nobody))
-    assert isinstance(study, PointStudy)
-    cluster = (getattr(request, "scheduler", None), getattr(request, "tls", None))
-    executor = choose_executor(request.workers, cluster[0], study.imports, cluster[1])
-    planned = study.plan(file, request)
-    question(study.prepared(planned), above=2)
-    kept = None if request.folder is None else _folder(request.folder)
-    title = study.counted.capitalize()
-    with shown_progress(title, shown=request.progress) as report, nullcontext() if kept is None else held(kept):
-        return cast("Shown", study.compute(planned, executor, kept, report))
-
-
-def _folder(given: str | Path) -> Path:
-    """The folder that keeps a study's points, made where missing."""
-    place = path_of(given, "folder", "folder")
-    try:
-        (place / POINTS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"folder = {str(place)!r}: points cannot be kept there: {error.strerror}; choose another"
-        ) from error
-    return place
 
 
 def _joined(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

@@ -116,7 +116,7 @@ class Modes:
         write_modes([self.result], place)
         return place
 
-    def plot(self, ax: Axes = None, *, radians: bool = False) -> Axes:
+    def plot(self, ax: Axes = None, *, radians: bool = False, annotate: bool = False) -> Axes:
         """Eigenvalue map with rays of equal damping; large crosses are modes with a name.
 
         A mode lies at its real part [1/s] and its frequency [Hz].
@@ -127,6 +127,8 @@ class Modes:
             Matplotlib Axes, such as those with another scenario's modes; by default those of a new figure.
         radians
             The imaginary part [rad/s] in the place of the frequency: both axes have one unit.
+        annotate
+            Write frequency and damping beside each mode, with its name where it has one.
 
         Examples
         --------
@@ -140,7 +142,7 @@ class Modes:
         from orchestrator.study.mode_plots import draw_eigenvalues  # noqa: PLC0415 - a second to import
 
         axes = axes_or_new(ax, 7.2, 5.0)
-        draw_eigenvalues(axes, [self.result], curves_on(axes), radians=radians)
+        draw_eigenvalues(axes, [self.result], curves_on(axes), radians=radians, annotate=annotate)
         axes.legend(loc="best", fontsize="small")
         return axes
 

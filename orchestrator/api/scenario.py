@@ -6,14 +6,15 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 from orchestrator.api.linear import LinearSystem
 from orchestrator.api.methods import method
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
-from orchestrator.asked import Names, whole_number
+from orchestrator.asked import Names, flag, whole_number
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
@@ -169,7 +170,7 @@ class Scenario:
         self, stop: Time | None = None, *, linear: bool = False, progress: bool = False,
         observers: Sequence[Observer] = (), recording: RecordingFolder | None = None,
         checkpoints: str | Path | Checkpoints | None = None, checkpoint_every: Time = EVERY,
-        federates: Federates | None = None, threads: int | None = None,
+        federates: Federates | None = None, threads: int | None = None, black_box: bool = False,
     ) -> Run:  # fmt: skip
         """Modes, and the response to the scenario's events.
 
@@ -203,6 +204,8 @@ class Scenario:
         threads
             How many step native FMUs, from 1 to 64. By default as many as make a step shortest, up to one for each
             core, and only while they are seen to be faster than one. No value depends on it.
+        black_box
+            Identify the components that hide their states, for the modes before the events; else there are none.
 
         Raises
         ------
@@ -242,7 +245,7 @@ class Scenario:
                 bars = [Progress(report)] if progress else []
                 result = run_scenario(
                     prepared, observers=[*bars, *observers], linear=linear, recording=recording, checkpoints=kept,
-                    federates=federates, threads=threads,
+                    federates=federates, threads=threads, boxes=_boxes("modes_with_boxes", black_box),
                 )  # fmt: skip
             if kept is not None and kept is not checkpoints and result.failure is None:
                 kept.clear()
@@ -321,7 +324,9 @@ class Scenario:
         """
         return ShortCircuit.of(self.prepared).strengths(converter_current, rating)
 
-    def linearize(self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False) -> LinearSystem:
+    def linearize(
+        self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False, black_box: bool = False
+    ) -> LinearSystem:
         """The linear model A, B, C, D around the steady state, with names and the verdict on it.
 
         Parameters
@@ -332,6 +337,8 @@ class Scenario:
             Observed outputs; by default what the case plots.
         continuous
             ẋ = A·x + B·u instead of the map over one communication step.
+        black_box
+            Identify the components that hide their states; of those there is the step map alone.
 
         Raises
         ------
@@ -350,7 +357,11 @@ class Scenario:
 
         inputs = names_given(inputs, "inputs") or default_inputs(self.prepared)
         outputs = names_given(outputs, "outputs") or default_outputs(self.prepared)
-        model, point, examined = linear_model(self.prepared, inputs, outputs, as_continuous=continuous)
+        if continuous and black_box:
+            raise InputError("black_box identifies a step map; leave out continuous, or black_box")
+        model, point, examined = linear_model(
+            self.prepared, inputs, outputs, as_continuous=continuous, boxes=_boxes("linear_with_boxes", black_box)
+        )
         return LinearSystem(
             **vars(model), operating_point=point, stability=examined.stability, warnings=examined.warnings
         )
@@ -361,6 +372,12 @@ class Scenario:
     def _repr_html_(self) -> str:
         table = pd.DataFrame({"value": self.values})
         return page(f"{self.prepared.case.name}, {self.name}: {self.title}", self.questions, table)
+
+
+def _boxes(name: str, wanted: bool) -> Any:
+    """A function of `coupled_modes`, or None where no component is to be identified."""
+    flag(wanted, "black_box")
+    return getattr(import_module("orchestrator.black_box.coupled_modes"), name) if wanted else None
 
 
 def _check_observers(given: Sequence[Observer]) -> None:

@@ -11,12 +11,14 @@ import numpy as np
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.device_start import misfits_of, sentences
+from orchestrator.analysis.examination import Examination
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearity import doubts
 from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, find_spectrum
 from orchestrator.analysis.sampled import repeating, steps_of_period
 from orchestrator.analysis.state_access import StateAccess, obstacle
+from orchestrator.analysis.state_space import StateSpace, state_space
 from orchestrator.analysis.steady_state import OperatingPoint, what_to_check
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit, require_fitting
@@ -25,7 +27,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.fmi.component import Component
-from orchestrator.study.modes import ModesResult, modes_from, modes_of
+from orchestrator.study.modes import ModesResult, modes_from, modes_of, running
 
 STEADY = 1e-6  # largest difference of the box's current [pu] at the ideal bus from the power flow's
 
@@ -99,9 +101,32 @@ def modes_with_boxes(
 
     ``prepared`` and ``master`` and ``frequency_range`` and ``critical``: as `modes_of`; to identify anything, the
     master must be at rest at the power flow's operating point."""
-    boxes = [name for name, component in master.components.items() if is_black_box(component)]
-    if not boxes:
+    if not any(map(is_black_box, master.components.values())):
         return modes_of(prepared, master, frequency_range, critical)
+    return _with_boxes(prepared, master, frequency_range, critical, excitation or Excitation(), report)[0]
+
+
+def coupled_with_boxes(prepared: PreparedScenario, frequency_range: tuple[float, float]) -> ModesResult:
+    """The same of a scenario that does not run yet."""
+    with running(prepared) as master:
+        return modes_with_boxes(prepared, master, frequency_range)
+
+
+def linear_with_boxes(
+    prepared: PreparedScenario, master: Master, inputs: Sequence[str], outputs: Sequence[str]
+) -> tuple[StateSpace, OperatingPoint, Examination]:
+    """The step map from inputs to outputs, with the verdict on it."""
+    found, blocks = _with_boxes(prepared, master, ELECTROMECHANICAL_HZ, None, Excitation(), None, inputs, outputs)
+    space = state_space(blocks, master.schedule)
+    return space, found.operating_point, Examination(found.stability, found.warnings)
+
+
+def _with_boxes(
+    prepared: PreparedScenario, master: Master, frequency_range: tuple[float, float], critical: float | None,
+    excitation: Excitation, report: Callable[[str], None] | None, inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+) -> tuple[ModesResult, Blocks]:  # fmt: skip
+    boxes = [name for name, component in master.components.items() if is_black_box(component)]
     require_fitting()
     most = 0.0
 
@@ -109,14 +134,14 @@ def modes_with_boxes(
         nonlocal most
         most, known = max(most, _check_still(master, boxes)), {}
         for name in boxes:
-            response, moved = _respond(master, name, excitation or Excitation(), report=report)
+            response, moved = _respond(master, name, excitation, report=report)
             known[name] = _as_component(name, fit(response))
             most = max(most, moved)
         return known
 
-    blocks = Blocks(master, known=identified(master))
+    blocks = Blocks(master, inputs=inputs, outputs=outputs, known=identified(master))
     point = OperatingPoint(most, most / master.clock.step_size, most, 0, {})
-    return modes_from(prepared, master, point, blocks, frequency_range, critical, identified)
+    return modes_from(prepared, master, point, blocks, frequency_range, critical, identified), blocks
 
 
 def _respond(

@@ -1,5 +1,7 @@
 """A case file, read and checked against its form."""
 
+from __future__ import annotations
+
 import difflib
 import tomllib
 from collections import Counter
@@ -8,7 +10,7 @@ from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 from pydantic import ValidationError
@@ -16,21 +18,27 @@ from pydantic import ValidationError
 from fmus.toolchain.cache import cache_directory
 from orchestrator.cases.contradictions import contradictions
 from orchestrator.cases.definition import CaseDefinition
-from orchestrator.cases.event_tables import other_scenarios
-from orchestrator.cases.idle_values import idle_everywhere
 from orchestrator.cases.locate import place_in
-from orchestrator.cases.mentions import Named, unmatched
 from orchestrator.cases.model_kinds import kind_wanted, of_kind
 from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
-from orchestrator.cases.prepare import PreparedScenario, Preparer
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
-from orchestrator.cases.sharing import Dispatch, SharingRule, in_words, load_of, lost_load
 from orchestrator.cases.values import TWICE, flatten, given_twice
-from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
-from orchestrator.ssp.reading import read_ssp
+from orchestrator.late import Late
 from orchestrator.toml_files import Table, fault_of, read_toml
+
+if TYPE_CHECKING:
+    from orchestrator.cases import event_tables, idle_values, mentions, prepare, sharing
+    from orchestrator.cases.prepare import PreparedScenario, Preparer
+    from orchestrator.cases.sharing import Dispatch
+    from orchestrator.coupling.system import ComponentPlan
+    from orchestrator.ssp import reading
+else:  # what prepares a scenario: FMUs and the power flow, which reading a file does without
+    event_tables, idle_values, mentions, prepare, sharing = (
+        Late(f"orchestrator.cases.{name}") for name in ("event_tables", "idle_values", "mentions", "prepare", "sharing")
+    )
+    reading = Late("orchestrator.ssp.reading")
 
 BUILT_IN = Path(__file__).parent
 _SCHEMA_PASSES = 50
@@ -78,7 +86,7 @@ class Case(CaseDefinition):
         ]
         if unknown or doubles:
             raise CaseError(str(self.path), problems)
-        prepared, questions, named = [], [], Named()
+        prepared, questions, named = [], [], mentions.Named()
         for name in scenarios or self.scenarios:
             preparer = self._preparer(name, overrides, parameters)
             lost, shared = self._switched_off(name, overrides or {}, parameters) if dispatch is None else ((), dispatch)
@@ -87,18 +95,18 @@ class Case(CaseDefinition):
             named.add(preparer.draft)
             problems += [p for p in preparer.problems if p not in problems]
             questions += [q for q in preparer.draft.found.questions if q not in questions]
-        if not problems and self.numbered and unmatched(self.table, named, self.place):
+        if not problems and self.numbered and mentions.unmatched(self.table, named, self.place):
             problems += self._mentions
         if problems:  # unusual data may be the reason of the failure
             kind = problems[0].kind  # a question besides is of no kind of its own
             asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
             raise CaseError(str(self.path), [*problems, *asked])
         if scenarios and self.numbered:
-            others = other_scenarios(preparer.draft, scenarios)
+            others = event_tables.other_scenarios(preparer.draft, scenarios)
             prepared[-1] = prepared[-1] and replace(prepared[-1], questions=(*prepared[-1].questions, *others))
         beside = partial(self._beside, overrides, step_size, parameters)
         ready = [p for p in prepared if p is not None]
-        idle = idle_everywhere([p.idle for p in ready])
+        idle = idle_values.idle_everywhere([p.idle for p in ready])
         return [replace(p, beside=beside, questions=(*p.questions, *idle)) for p in ready]
 
     def _beside(
@@ -138,10 +146,12 @@ class Case(CaseDefinition):
             if not any(fnmatchcase(f"{table.grid}.{x}", key.rpartition(".")[0]) for x in loads)
         }
         if kept != on and (intact := self._preparer(name, kept, parameters).prepare(None, None)):
-            drawn = load_of(loads, intact.system.components[table.grid]) - load_of(loads, plans[table.grid])
+            drawn = sharing.load_of(loads, intact.system.components[table.grid]) - sharing.load_of(
+                loads, plans[table.grid]
+            )
             powers = intact.power_flow.powers if intact.power_flow else powers
         fed = sum(powers[unit].real * plans[unit].number("S_n") for unit in lost)
-        rule = self.sharing or SharingRule(table.sharing)
+        rule = self.sharing or sharing.SharingRule(table.sharing)
         return lost, Dispatch(rule, powers, fed - drawn)
 
     @cached_property
@@ -150,14 +160,14 @@ class Case(CaseDefinition):
 
         Scenarios are assembled one after the other until every name is found. A scenario that cannot be assembled
         leaves the rest undecided."""
-        named, problems = Named(), list[Problem]()
+        named, problems = mentions.Named(), list[Problem]()
         for name in self.scenarios:
             preparer = self._preparer(name, None, ())
             preparer.assemble()
             if preparer.problems:
                 return []
             named.add(preparer.draft)
-            problems = unmatched(self.table, named, self.place)
+            problems = mentions.unmatched(self.table, named, self.place)
             if not problems:
                 break
         return problems
@@ -177,7 +187,7 @@ class Case(CaseDefinition):
             raise CaseError(str(self.path), problems)
         return {name: (preparer.draft.tables[name], plan) for name, plan in components.items()}
 
-    def _of_kind(self, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]) -> "Case":
+    def _of_kind(self, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]) -> Case:
         """The case with the kind of models that is wanted; itself where that is the file's own."""
         kind = kind_wanted(overrides, parameters)
         if kind is None or kind == self.table.models:
@@ -187,7 +197,7 @@ class Case(CaseDefinition):
     def _preparer(
         self, name: str, overrides: Mapping[str, Value] | None, parameters: Sequence[ParameterFile]
     ) -> Preparer:
-        return Preparer(self, name, dict(overrides or {}), parameters)
+        return prepare.Preparer(self, name, dict(overrides or {}), parameters)
 
 
 _FED = 1e-6  # power of a unit from which its loss is told [pu]
@@ -203,8 +213,8 @@ def _told(
         return prepared
     plans = prepared.system.components
     drawn = sum(dispatch.powers[unit].real * plans[unit].number("S_n") for unit in lost) - dispatch.change
-    shared = in_words(dispatch, prepared.power_flow.powers, plans, lost, lost_load(drawn))
-    text = f"{shared}, by {dispatch.rule}; the rules are {', '.join(SharingRule)}"
+    shared = sharing.in_words(dispatch, prepared.power_flow.powers, plans, lost, sharing.lost_load(drawn))
+    text = f"{shared}, by {dispatch.rule}; the rules are {', '.join(sharing.SharingRule)}"
     return replace(prepared, questions=(*prepared.questions, Problem("[power_flow] sharing", text)))
 
 
@@ -246,7 +256,7 @@ def case_of_text(text: str, raw: dict[str, Any], path: Path, *, trust_fmus: bool
 
 def _from_ssp(path: Path, trust_fmus: bool) -> Case:
     """The case from an SSP. Its FMUs are unpacked into the cache of built FMUs."""
-    ssp = read_ssp(path, cache_directory("ssp"))
+    ssp = reading.read_ssp(path, cache_directory("ssp"))
     text = f"# What {path.name} comes to (SHA-256 {ssp.digest})\n\n{tomli_w.dumps(ssp.tables)}"
     table, problems = _validate(tomllib.loads(text), "", path)
     return _case(table, text, path, problems, ssp.folder, numbered=False, trust_fmus=trust_fmus)

@@ -1,12 +1,13 @@
 """What a case file says twice, of nothing, or against itself. Nothing of a scenario is needed to see it."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
-from orchestrator.cases.draft import Locate
 from orchestrator.cases.names import close_names
 from orchestrator.cases.schema import CaseTable
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.errors import Problem
+
+Locate = Callable[..., str]
 
 
 def contradictions(case: CaseTable, place: Locate) -> list[Problem]:

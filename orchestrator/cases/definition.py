@@ -1,14 +1,19 @@
 """The contents of a case file, checked against its form."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
-from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import Problem
+
+if TYPE_CHECKING:
+    from orchestrator.cases.sharing import SharingRule
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.build_choices import MODELS
 from orchestrator.cases.names import TWINS
 from orchestrator.cases.parameter_files import ParameterFile
@@ -52,6 +51,8 @@ def twin(model: str, kind: str) -> str:
     back = {phasor: emt for emt, phasor in _GRIDS.items()}
     emt = back.get(model, model.removesuffix(_SUFFIX))
     wanted = emt if kind == "emt" else _GRIDS.get(emt, f"{emt}{_SUFFIX}")
+    from fmus.toolchain.catalogue import model_names  # noqa: PLC0415 - models, which most files are read without
+
     known = model_names()
     if model in known and wanted not in known:
         raise InputError(f"models = {kind!r}: the model {model!r} has no counterpart {wanted!r} in the catalogue")

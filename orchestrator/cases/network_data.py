@@ -4,8 +4,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from fmus.grid.network import Line, Load, Shunt, ThreeWinding
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.cgmes.network import read_cgmes
-from orchestrator.cases.csv_rows import number, optional_number, place_of, rows_of
+from orchestrator.cases.csv_rows import Row, number, optional_number, place_of, rows_of
 from orchestrator.cases.file_solution import NOT_SOLVED, misfit_of
 from orchestrator.cases.load_models import with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
@@ -14,6 +15,8 @@ from orchestrator.cases.psse.raw import Machine, read_raw
 from orchestrator.cases.schema import NetworkTable
 from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.errors import InputError, Problem
+
+_IN_OHMS = ("kv", "R_ohm", "X_ohm", "B_us")  # of a file of lines, in the place of R, X, B
 
 
 @dataclass(frozen=True)
@@ -156,7 +159,8 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
     lines = []
-    for row in rows_of(path, ("from", "to", "R", "X", "B")):
+    ohms = "X_ohm" in next(iter(rows_of(path, ("from", "to"))), ())
+    for row in rows_of(path, ("from", "to", *(_IN_OHMS if ohms else ("R", "X", "B")))):
         if not (row["from"] and row["to"]):
             raise InputError(f"{place_of(row)}: from = {row['from']!r}, to = {row['to']!r}; name the bus at each end")
         circuit = (row.get("circuit") or "").strip()
@@ -167,6 +171,20 @@ def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
         name = "_".join(["line", row["from"], row["to"], *([circuit] if circuit not in ("", "1") else [])])
         ends = bus_name(row["from"]), bus_name(row["to"])
         tap, shift = optional_number(row, "tap") or 1.0, optional_number(row, "shift") or 0.0
-        line = Line(name, *ends, number(row, "X"), number(row, "R"), number(row, "B"), tap, shift)
-        lines.append((line, place_of(row)))
+        X, R, B = _impedance(row)
+        lines.append((Line(name, *ends, X, R, B, tap, shift), place_of(row)))
     return lines
+
+
+def _impedance(row: Row) -> list[float]:
+    """X, R and B [pu on 100 MVA], which a row gives so or in ohms and µS at its voltage."""
+    given = [key for key in ("X", "X_ohm") if (row.get(key) or "").strip()]
+    if len(given) == 2:
+        raise InputError(f"{place_of(row)}: X and X_ohm are both given; leave one of them empty")
+    if "X_ohm" not in row or given == ["X"]:
+        return [number(row, key) for key in ("X", "R", "B")]
+    kv, R, X, B = (number(row, key) for key in _IN_OHMS)
+    if kv <= 0:
+        raise InputError(f"{place_of(row)}: kv = {kv:g}; ohms need the line's rated voltage, above 0")
+    z = kv**2 / SYSTEM_BASE_MVA
+    return [X / z, R / z, B * 1e-6 * z]

@@ -9,14 +9,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
+from fmus.toolchain.port_variables import I_IM, I_RE, SYSTEM_BASE_MVA, V_IM, V_RE
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import Case, case_of_text
+from orchestrator.cases.csv_rows import number, rows_of
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.short_circuit import source_impedance
 from orchestrator.errors import InputError, Problem
+from orchestrator.fmi.description import FmuDescription
 from orchestrator.units import to_unit
+
+_TABLES = {
+    "lines_file": ("from", "to"),
+    "units": ("bus", "rating_mva"),
+    "loads_file": ("bus", "p_mw"),
+    "buses": ("bus",),
+}
+"""What a table of a plain network is → the columns that tell it."""
 
 _FILES = {".raw": "raw", ".m": "matpower", ".mat": "matpower", ".json": "pandapower", ".zip": "cgmes"}
 _EMT_STEP = 1e-4
@@ -62,6 +73,7 @@ class NewCase:
     text: str
     assumed: tuple[str, ...]
     scenarios: tuple[str, ...]
+    black_box: bool = False  # whether its modes need --black-box
 
 
 def read_converter(text: str) -> WantedConverter:
@@ -98,13 +110,33 @@ def write_case(wanted: WantedCase) -> NewCase:
 
     Raises `InputError` if a file, a bus or a machine cannot be used; as a case of these files would be refused."""
     sources = sources_of(wanted.files)
+    device = None if wanted.device is None else _described(wanted.device, wanted.binding, is_dll=wanted.is_dll)
+    if "units" in sources:  # tables say neither
+        machines = {
+            bus_name(row["bus"]): number(row, "rating_mva") for row in rows_of(sources["units"], ("rating_mva",))
+        }
+        largest = max(machines, key=machines.__getitem__)
+        wanted = replace(wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz")
     base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
     place = None if wanted.converter is None else _placed(wanted.converter, base)
     draft = _Text(wanted, sources, base, place)
     scenarios = _prepared(draft.text, wanted, [])
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
     text = _commented(draft.text, list(questions), sources)
-    return NewCase(text, tuple(draft.assumed(len(questions))), tuple(p.name for p in scenarios))
+    black_box = device is not None and not device.can_save_state
+    return NewCase(text, tuple(draft.assumed(len(questions))), tuple(p.name for p in scenarios), black_box)
+
+
+def _described(path: Path, binding: Path | None, *, is_dll: bool) -> FmuDescription:
+    """A device that has the port of a case, perhaps by a binding."""
+    found = bound_fmu(path, binding)
+    other = [v.name for v in (V_RE, V_IM, I_RE, I_IM)
+             if v.name not in found.variables or found.variables[v.name].unit not in (None, "", "pu")]  # fmt: skip
+    if other:
+        way = "say which of its variables it is with --binding; `gfor fmu bind` drafts one"
+        way = "lay a circuit around the DLL in a device's file, and give that to --dll" if is_dll else way
+        raise InputError(f"{path}: it has no port of voltage and current in pu ({', '.join(other)}); {way}")
+    return found
 
 
 def _prepared(text: str, wanted: WantedCase, names: Sequence[str]) -> list[PreparedScenario]:
@@ -116,22 +148,35 @@ def sources_of(files: Sequence[Path]) -> dict[str, Path]:
     """Key of the case file that names it → file."""
     found: dict[str, Path] = {}
     for path in files:
-        key = "cgmes" if path.is_dir() else "dyr" if path.suffix.lower() == ".dyr" else _FILES.get(path.suffix.lower())
-        if key is None:
-            known = ", ".join([*_FILES, ".dyr"])
+        suffix = path.suffix.lower()
+        known = ", ".join([*_FILES, ".dyr", ".csv"])
+        if not path.is_dir() and suffix not in (*_FILES, ".dyr", ".csv"):
             raise InputError(f"{path}: no network that is read; give a file {known}, or the folder of a CGMES model")
         if not path.exists():
             near = close_names(path.name, [p.name for p in path.absolute().parent.glob("*")])
             raise InputError(f"{path}: there is no such file{f'; {near}' if near else ''}")
-        networks = [k for k in found if k != "dyr"]
-        if key in found or (key != "dyr" and networks):
-            raise InputError(f"{path} and {found.get(key) or found[networks[0]]}: a case has one of them; give one")
+        key = "cgmes" if path.is_dir() else "dyr" if suffix == ".dyr" else _FILES.get(suffix) or _table_of(path)
+        others = [k for k in found if "dyr" not in (k, key) and not {k, key} <= {*_TABLES}]
+        if key in found or others:
+            raise InputError(f"{path} and {found.get(key) or found[others[0]]}: a case has one of them; give one")
         found[key] = path
     if not [key for key in found if key != "dyr"]:
         raise InputError("no network is given; name its file, such as own.raw, and with it own.dyr")
+    if {*found} & {*_TABLES} and (lacks := [key for key in ("lines_file", "units") if key not in found]):
+        wanted = " and ".join(f"one with the columns {', '.join(_TABLES[key])}" for key in lacks)
+        raise InputError(f"{', '.join(map(str, found.values()))}: of the tables of a network, {wanted} is missing")
     if "dyr" in found and "raw" not in found:
         raise InputError(f"{found['dyr']}: dynamics data of PSS/E need the network's RAW file; give both")
     return found
+
+
+def _table_of(path: Path) -> str:
+    columns = {*next(iter(rows_of(path, ())), ())}
+    key = next((key for key, wanted in _TABLES.items() if columns >= {*wanted}), None)
+    if key is None:
+        kinds = "; ".join(", ".join(wanted) for wanted in _TABLES.values())
+        raise InputError(f"{path}: no table of a network: none has its columns in line 1, or it has no row ({kinds})")
+    return key
 
 
 @dataclass(frozen=True)
@@ -205,7 +250,7 @@ model = "{grid}"
 
 [network]
 {network}
-load_model = {{ active = "power", reactive = "power" }}    # or "current", "impedance"
+{loads}load_model = {{ active = "power", reactive = "power" }}    # or "current"; without it impedance
 {more}
 [units]
 {units}
@@ -241,11 +286,14 @@ class _Text:
             lines.append(f"converter: {what}; at {p.bus} it holds the {p.v_pu:g} pu of the base; {dispatch}")
         if "dyr" not in self._sources:
             lines.append("machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data")
-        lines.append("loads: constant power, as in the file's own power flow; [network] load_model changes it")
+        if "units" in self._sources:
+            lines[-1] += f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
+        asked = "impedance until [network] load_model says otherwise; `gfor modes` tells what power would change"
+        lines.append(f"loads: constant {asked if not self._tables() else 'power; [network] load_model changes it'}")
         lines.append(f"models: {self._wanted.kind}; stray_B of EMT models: {self._stray:g} pu{self._stray_why}")
         lines.append(f"fault: three-phase at {self._fault_bus}, 100 ms, nothing trips")
-        asked = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
-        return [*lines, asked] if questions else lines
+        more = f"{questions} question{'s' * (questions != 1)} about the data: comments at their lines in the file"
+        return [*lines, more] if questions else lines
 
     def _path(self, path: Path) -> str:
         """As the file names it: relative where that is possible, with slashes everywhere."""
@@ -257,7 +305,7 @@ class _Text:
     @property
     def text(self) -> str:
         w, place = self._wanted, self._place
-        (key,) = (key for key in self._sources if key != "dyr")
+        key = next(key for key in self._sources if key not in ("dyr", "units"))
         kind, other = w.kind, "phasor" if w.kind == "emt" else "emt"
         steps = {"emt": "100 us", "phasor": "2 ms"}
         stray = {"emt": f"stray_B = {self._stray:g}             # pu on 100 MVA{self._stray_why}\n",
@@ -268,6 +316,7 @@ class _Text:
         kept = "\nkeep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances"
         dyr = "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
         dyr = f"dyr = {self._path(self._sources['dyr'])}" if "dyr" in self._sources else dyr
+        dyr = f"file = {self._path(self._sources['units'])}\n{dyr}" if "units" in self._sources else dyr
         lines = self._network is not None and any(x.name.startswith("line_") for x in self._network.lines)
         return _TEMPLATE.format(
             command=w.command,
@@ -280,7 +329,8 @@ class _Text:
             other=rest + stray[other] if w.device is None else "",
             slack=f"\nslack = {_quoted(w.slack)}" if w.slack else "",
             grid="grid" if kind == "emt" else "phasor_grid",
-            network=f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
+            network=self._tables() or f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
+            loads="" if self._tables() else "# ",
             more=(f"frequency = {_quoted(w.frequency)}\n" if w.frequency else "") + stray["emt"] * (kind == "emt")
             + (f"leave_out = {_listed(w.leave_out)}\n" if w.leave_out else ""),
             units=dyr + (f"\ndyr_leave_out = {_listed(w.dyr_leave_out)}" if w.dyr_leave_out else ""),
@@ -289,6 +339,14 @@ class _Text:
             converter=self._converter(),
             scenarios="\n".join("\n".join([*block, ""]) for block in [*self._scenarios(), *self._plots()]),
         )  # fmt: skip
+
+    def _tables(self) -> str:
+        tables = [f"{k} = {self._path(self._sources[k])}" for k in ("lines_file", "loads_file") if k in self._sources]
+        if "buses" in self._sources:
+            tables.append(
+                f"buses = {_listed([bus_name(row['bus']) for row in rows_of(self._sources['buses'], ('bus',))])}"
+            )
+        return "\n".join(tables)
 
     def _converter(self) -> str:
         if self._place is None:

@@ -1,16 +1,19 @@
 """Values of a case file, brought to the type, unit and range that a variable declares."""
 
+from __future__ import annotations
+
 import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fmus.toolchain.port_variables import I_RE, S_BASE, S_N, SYSTEM_BASE, SYSTEM_BASE_MVA
 from orchestrator.cases.schema import Value
-from orchestrator.fmi.description import FmuDescription, VariableInfo
-from orchestrator.fmi.port import BoundDescription
 from orchestrator.units import to_unit
+
+if TYPE_CHECKING:
+    from orchestrator.fmi.description import FmuDescription, VariableInfo
 
 _CHOICES = re.compile(r"\b0: .*\b1: ")  # in the description of a variable that chooses: what its numbers mean
 
@@ -44,6 +47,8 @@ def convert(info: VariableInfo, value: Value) -> float | bool:
 
 def check_system_base(description: FmuDescription, variable: str, value: float | bool) -> None:
     """Refuse another system base for a device with our port. In a bound FMU the name has another meaning."""
+    from orchestrator.fmi.port import BoundDescription  # noqa: PLC0415 - FMUs, which reading a file does without
+
     own = not isinstance(description, BoundDescription) and I_RE.name in description.variables
     if own and variable == S_BASE.name and value != SYSTEM_BASE_MVA:
         raise ValueError(

@@ -11,6 +11,7 @@ from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, 
 from orchestrator.cli.arguments import repeatable
 from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError, ResultsError
+from orchestrator.fmi.vendor_files import is_vendor_file
 from orchestrator.safe_files import write_text
 
 _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less sg3" --out case.toml'
@@ -18,7 +19,8 @@ _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less s
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="the network: .raw (with .dyr), .m, .mat, "
-                        "pandapower's .json, a CGMES model; without any, gfor asks")  # fmt: skip
+                        "pandapower's .json, a CGMES model, tables (.csv) of lines, machines, loads and buses; "
+                        "without any, gfor asks")  # fmt: skip
     parser.add_argument("--converter", metavar="TEXT", help="'bus 9, 300 MVA, 200 MW, less sg3'")
     device = parser.add_mutually_exclusive_group()
     device.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="a vendor's FMU in place of our converter")
@@ -53,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     console.print(escape(f"{wanted.out}: scenarios {', '.join(made.scenarios)}. Assumed:"), highlight=False)
     for line in made.assumed:
         console.print(escape(f"- {line}"), soft_wrap=True, highlight=False)
-    console.print(escape(f"Next: gfor modes {wanted.out}"), highlight=False)
+    console.print(escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False)
     return 0
 
 
@@ -96,15 +98,18 @@ def _ask(options: argparse.Namespace) -> None:
     options.files = [Path(word) for word in shlex.split(line("Network file(s), such as own.raw own.dyr"))]
     if not options.files:
         raise InputError(f"no network is given; all in one line it is\n  {_EXAMPLE}")
+    sources_of(options.files)  # what is wrong is said before the next question
     bus = line("Bus of a converter, such as 9 [no converter]")
     if bus:
         parts = [f"bus {bus.removeprefix('bus ')}", _with_unit(line("Its rating in MVA, such as 300"), "MVA"),
                  _with_unit(line("Its power in MW, such as 200"), "MW")]  # fmt: skip
         less = line("Machine that feeds so much less, such as sg3 [the slack]")
         options.converter = ", ".join([*parts, *([f"less {less}"] if less else [])])
-        read_converter(options.converter)  # what is wrong is said before the next question
-        device = line("A vendor's FMU [our converter]")
-        if device:
+        read_converter(options.converter)
+        device = line("A vendor's FMU, or the file of a device around a DLL [our converter]")
+        if device and is_vendor_file(Path(device)):
+            options.dll = Path(device)
+        elif device:
             options.fmu = Path(device)
             binding = line("Its binding, as `gfor fmu bind` drafts it [none]")
             options.binding = Path(binding) if binding else None

@@ -1,12 +1,17 @@
 """A system on paper: components, the connections between them, and what their variables start from."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from orchestrator.coupling.imperfections import Imperfection, WirePlan
 from orchestrator.errors import InputError
-from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.values import Scalar
+
+if TYPE_CHECKING:
+    from orchestrator.fmi.description import FmuDescription, VariableInfo
 
 
 @dataclass(frozen=True, slots=True)

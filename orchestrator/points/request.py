@@ -50,6 +50,10 @@ def of_frequencies(python: str = "") -> Any:
     return asked(FREQUENCIES, ELECTROMECHANICAL_HZ, "frequencies [Hz] (0.1:2)", option="--range", python=python)
 
 
+def of_black_box() -> Any:
+    return asked(FLAG, False, "identify the components that hide their states from their inputs and outputs")
+
+
 class _Layered:
     """Values and files as the preparation of a scenario takes them; a request has them among its own fields."""
 

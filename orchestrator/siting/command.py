@@ -24,7 +24,8 @@ def _parts(found: Siting) -> Iterator[RenderableType]:
 
 STUDY = StudyAtOnce(
     request=SiteRequest, compute=_compute, prepared=lambda found: [found.result.prepared], parts=_parts,
-    code=lambda found, _: 0 if found.agrees else NOT_MET, counted="places",
+    code=lambda found, _: 0 if found.agrees and not found.result.breaking else NOT_MET,
+    counted="places",
     files="site.json, buses.csv and site.html with a map",
     warnings=lambda found: [f"scenario {found.result.prepared.name!r}: {text}"
                             for text in found.result.intact.found.warnings],

@@ -9,6 +9,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable
 from orchestrator.errors import InputError
 
+OURS_MVA = 100.0
 STAGES = 3  # lead/lag stages of a POD that is put somewhere: together they turn by any angle
 
 
@@ -22,12 +23,13 @@ def converter(prepared: PreparedScenario, rating: float, controller: str | None)
     return ComponentTable(model=model, parameters={"S_n": rating, "P_0": 0.0, "Q_0": 0.0, **stages})
 
 
-def foreign(fmu: Path, binding: Path | None) -> ComponentTable:
+def foreign(fmu: Path, binding: Path | None, rating: float | None) -> ComponentTable:
     for path in (fmu, *([binding] if binding else [])):
         if not path.is_file():
             raise InputError(f"{path}: there is no such file; --device takes pod_p, pod_q, droop or the path of an FMU")
     own = str(binding.absolute()) if binding else None
-    return ComponentTable(fmu=str(fmu.absolute()), binding=own, parameters={"P_0": 0.0, "Q_0": 0.0})
+    values = {"P_0": 0.0, "Q_0": 0.0, **({} if rating is None else {"S_n": rating})}
+    return ComponentTable(fmu=str(fmu.absolute()), binding=own, parameters=values)
 
 
 def name_at(bus: str) -> str:

@@ -10,6 +10,7 @@ from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.asked import FILE, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
+from orchestrator.asked import positive as above_zero
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable
@@ -19,13 +20,14 @@ from orchestrator.operating_points.outages import INTACT, read_outages
 from orchestrator.operating_points.preparation import ItemPreparation, failure
 from orchestrator.points.request import OfCase, of_frequencies, of_scenario, of_values
 from orchestrator.siting.confirmation import Confirmation, confirmed
-from orchestrator.siting.placing import converter, foreign, name_at, placed
+from orchestrator.siting.placing import OURS_MVA, converter, foreign, name_at, placed
 from orchestrator.siting.residues import SeenMode, Situation, situation_of
 from orchestrator.siting.responses import ACTIVE, REACTIVE, ideal_support, response_of, turned
 from orchestrator.study.modes import running
 
 PODS = {"pod_p": ACTIVE, "pod_q": REACTIVE}
 DROOP = "droop"
+_RATING = FieldKind("MVA", POSITIVE.read, lambda given, name: None if given is None else above_zero(given, name))
 _DEVICE = FieldKind("DEVICE", str, lambda given, argument: str(text_or_none(str(given), argument)))
 HARDLY = 0.02  # A bus that moves a mode by less than this part of what the best bus does hardly reaches it
 
@@ -64,8 +66,8 @@ class SiteRequest(OfCase):
     outages: Names | None = asked(OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)")
     confirm: int = asked(RANKED, 3, "confirm the best N by coupled FMUs (default: 3)", python="how many of the best "
                          "buses are confirmed by coupled FMUs")  # fmt: skip
-    rating: float = asked(POSITIVE, 100.0, "of the converter that confirms (default: 100)", "MVA",
-                          python="of the converter that confirms [MVA]")  # fmt: skip
+    rating: float | None = asked(_RATING, None, "of the converter that confirms (default: 100), or of the vendor's FMU "
+                                 "(default: its own)")  # fmt: skip
     gain: float = asked(POSITIVE, 200.0, "largest of its POD [pu of its rating] (default: 200)", "K")
 
     @property
@@ -139,6 +141,12 @@ class SiteResult:
     @property
     def agrees(self) -> bool:
         return all(one.agrees for one in self.confirmations)
+
+    @property
+    def breaking(self) -> list[Confirmation]:
+        """The places at which the device makes a stable system unstable."""
+        stable = self.intact.found.stability.stable is True
+        return [one for one in self.confirmations if stable and one.stable is False]
 
 
 def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], None] = lambda a, b: None) -> SiteResult:
@@ -215,7 +223,8 @@ def _of_foreign(
     intact = situations[0]
     there = active[intact.name][intact.modes[0].label]
     bus = max(there, key=lambda name: abs(there[name].change))
-    prepared = _prepared(placed(case, foreign(Path(request.device), request.binding_file), [bus]), request, scenario)
+    device = foreign(Path(request.device), request.binding_file, request.rating)
+    prepared = _prepared(placed(case, device, [bus]), request, scenario)
     with running(prepared) as master:
         find_operating_point(master)
         model = Blocks(master).components[name_at(bus)]
@@ -235,9 +244,9 @@ def _prepared(case: Case, request: SiteRequest, scenario: str) -> PreparedScenar
 def _with_confirmations(result: SiteResult, scenario: str, report: Callable[[int], None]) -> SiteResult:
     request, seen = result.request, result.intact.modes[0]
     device: ComponentTable = (
-        foreign(Path(request.device), request.binding_file)
+        foreign(Path(request.device), request.binding_file, request.rating)
         if request.is_foreign
-        else converter(result.prepared, request.rating, request.controller)
+        else converter(result.prepared, request.rating or OURS_MVA, request.controller)
     )
     found = []
     for k, bus in enumerate(result.ranking[: request.confirm]):

@@ -24,6 +24,7 @@ from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import made_folder, write_text
 from orchestrator.siting.confirmation import Confirmation
+from orchestrator.siting.placing import OURS_MVA
 from orchestrator.siting.residues import SeenMode
 from orchestrator.siting.responses import ACTIVE, REACTIVE
 from orchestrator.siting.study import DEVICE, DROOP, SiteResult, SupportShift
@@ -139,14 +140,16 @@ def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:
     if one.failure:
         return f"{one.bus}: NOT CONFIRMED: {one.failure}"
     word = "confirmed" if one.agrees else "NOT CONFIRMED"
-    rating = "" if result.request.is_foreign else f" of {result.request.rating:g} MVA"
+    given = result.request.rating or (None if result.request.is_foreign else OURS_MVA)
+    rating = " of its own rating" if given is None else f" of {given:g} MVA"
     steps = f"{before:.2f} % → {damping_percent(one.with_device):.2f} % with the device{rating}"
     if one.setting is not None:
         steps += f" → {one.damping:.2f} % with its POD (K {one.setting.gain:g})"
-    unstable = "" if one.stable or result.intact.found.stability.stable is not True else "; UNSTABLE with it"
+    if one in result.breaking:
+        word += ", but UNSTABLE with it (`gfor modes` of a case with it tells the cause, often the step)"
     return (
         f"{one.bus}: {word} by coupled FMUs: {steps}; least damped then {one.least or 0.0:.2f} %; predicted and "
-        f"coupled shift differ by {100 * one.error:.2g} %{unstable}"
+        f"coupled shift differ by {100 * one.error:.2g} %"
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from orchestrator.analysis.examination import Examination, examine
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous_model
 from orchestrator.analysis.stability import judge
+from orchestrator.analysis.state_access import obstacle
 from orchestrator.analysis.state_space import StateSpace, state_space
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
 from orchestrator.arrays import Matrix
@@ -52,20 +53,29 @@ def _is_output(prepared: PreparedScenario, name: str) -> bool:
 
 
 def linear_model(
-    prepared: PreparedScenario, inputs: Sequence[str], outputs: Sequence[str], *, as_continuous: bool = False
+    prepared: PreparedScenario,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    *,
+    as_continuous: bool = False,
+    boxes: Callable[..., tuple[StateSpace, OperatingPoint, Examination]] | None = None,
 ) -> tuple[StateSpace, OperatingPoint, Examination]:
     """The scenario's linear model around its steady state, as step map or continuous, with the verdict on it.
 
     The verdict on the continuous model is its own; beside it stands what is to be said of the step map.
 
     ``inputs`` and ``outputs``: names ``component.variable``; an output may be a difference ``a.b - c.d``.
-    ``as_continuous``: A model in continuous time instead of the map over one communication step."""
+    ``as_continuous``: A model in continuous time instead of the map over one communication step.
+    ``boxes``: finds the step map where components hide their states."""
     parts = {output: variables_of(output) for output in outputs}
     if phasors := [output for output in outputs if "|" in output]:
         raise InputError(f"outputs: {phasors[0]!r}: a magnitude is not linear; give its two parts")
     wanted, outputs = list(outputs), list(dict.fromkeys(name for names in parts.values() for name in names))
     select = np.array([[(n == parts[w][0]) - 1.0 * (n in parts[w][1:]) for n in outputs] for w in wanted])
     with running(prepared) as master:
+        if boxes is not None and any(map(obstacle, master.components.values())):
+            space, point, examined = boxes(prepared, master, inputs, outputs)
+            return _selected(space, select, wanted), point, examined
         point = find_operating_point(master)
         blocks = Blocks(master, inputs=inputs, outputs=outputs, derivatives=True)
         examined = examine(master, blocks, compose(blocks, master.schedule), continuous_model(master, blocks))

@@ -30,10 +30,13 @@ def plot_eigenvalues(results: Sequence[ModesResult], title: str, path: Path) -> 
         save_figure(figure, path)
 
 
-def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0, *, radians: bool = False) -> None:
+def draw_eigenvalues(
+    axis: Any, results: Sequence[ModesResult], first: int = 0, *, radians: bool = False, annotate: bool = False
+) -> None:
     """Eigenvalue map with rays of equal damping; other people's figures as open circles.
 
-    ``radians``: the imaginary part [rad/s] instead of the frequency."""
+    ``radians``: the imaginary part [rad/s] instead of the frequency.
+    ``annotate``: frequency and damping beside each mode, with its name where it has one."""
     turn = 2 * np.pi if radians else 1.0
     named = [m.frequency_hz for r in results for m in r.named.values()]
     highest_hz = 1.25 * max([*named, *(t.frequency_hz for r in results for t in r.references.values())], default=0.8)
@@ -52,6 +55,10 @@ def draw_eigenvalues(axis: Any, results: Sequence[ModesResult], first: int = 0, 
             label=result.label,
             zorder=3,
         )
+        for mode in modes if annotate else ():
+            text = f"{result.name_of(mode) or ''} {mode.frequency_hz:.2f} Hz, {mode.damping_percent:.1f} %"
+            look = {"textcoords": "offset points", "size": "x-small", "ha": "right", "color": colour(index)}
+            axis.annotate(text.strip(), (mode.eigenvalue.real, mode.frequency_hz * turn), (-7, 3), **look)
         for reference in result.references.values():
             real, hertz = _real_and_hz(reference)
             axis.scatter(real, hertz * turn, marker="o", s=110, facecolors="none", edgecolors=colour(index), zorder=3)

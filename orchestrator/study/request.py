@@ -12,7 +12,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.coupling.schedule import SCHEDULES, SECOND_ORDER, ScheduleName
 from orchestrator.errors import InputError
-from orchestrator.points.request import ANYTHING, OfCase, of_scenarios, of_values
+from orchestrator.points.request import ANYTHING, OfCase, of_black_box, of_scenarios, of_values
 from orchestrator.study.step_choice import TRIED
 
 _SHARING, _SCHEDULE, _STOP = one_of(SharingRule), one_of(SCHEDULES), FieldKind("T", str, in_seconds)
@@ -131,7 +131,7 @@ class ModesRequest:
     directional: bool = asked(
         FLAG, False, "linearise with the FMUs' own directional derivatives instead of by perturbation (with --native)"
     )
-    black_box: bool = asked(FLAG, False, "identify the components that hide their states from their inputs and outputs")
+    black_box: bool = of_black_box()
     report: Callable[[str], None] | None = asked(
         ANYTHING, None, "called with a sentence before each run of an identification, which may take minutes; such as "
         "``print``", option=None,

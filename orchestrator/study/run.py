@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -109,6 +109,7 @@ def run_scenario(
     prepared: PreparedScenario, frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
     observers: Sequence[Observer] = (), *, linear: bool = False, recording: RecordingFolder | None = None,
     checkpoints: Checkpoints | None = None, federates: Federates | None = None, threads: int | None = 1,
+    boxes: Callable[..., ModesResult] | None = None,
 ) -> RunResult:  # fmt: skip
     """Compute the modes of a scenario and its response to the case's events, the linear model's as well if wanted.
 
@@ -117,25 +118,27 @@ def run_scenario(
     the result.
 
     ``recording``: where the rows go while the run goes on; at the end they are ``trajectory.nc`` beside it.
-    ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates."""
+    ``checkpoints``: keep the run while it goes on, and go on from the newest where one was left; not with federates.
+    ``boxes``: finds the modes where components hide their states."""
     if federates is not None:
         if federates.announce is not None:
             observers = [*observers, Pace(federates.announce)]
         with Federation(prepared, federates) as federation:
-            return _run(federation.prepared, frequency_range, observers, linear, recording, None, threads, federation)
+            ready = federation.prepared
+            return _run(ready, frequency_range, observers, linear, recording, None, threads, boxes, federation)
     try:
-        return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads)
+        return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes)
     except NotTakenUpError as error:
         if checkpoints is None:
             raise
         checkpoints.forget(str(error))
-        return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads)
+        return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes)
 
 
 def _run(
     prepared: PreparedScenario, frequency_range: tuple[float, float], observers: Sequence[Observer], linear: bool,
     recording: RecordingFolder | None, checkpoints: Checkpoints | None, threads: int | None,
-    federation: Federation | None = None,
+    boxes: Callable[..., ModesResult] | None, federation: Federation | None = None,
 ) -> RunResult:  # fmt: skip
     watch = Watch(prepared, recording)
     statistics = None
@@ -143,13 +146,15 @@ def _run(
     with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
-        if reasons:
+        if reasons and boxes is not None:
+            modes = boxes(prepared, master, frequency_range)
+        elif reasons:
             misfits, modes = misfits_of(master), unknown_modes(prepared, reasons)
             started = (*sentences(misfits), *start_warnings(master))
             modes = replace(modes, warnings=(*started, *modes.warnings), misfits=misfits)
         else:
             modes = modes_of(prepared, master, frequency_range)
-        if reasons and federation is None:  # a box is looked at in steps, which a foreign federate cannot take back
+        if reasons and not (boxes or federation):  # a look is in steps, which a foreign federate cannot take back
             modes = replace(modes, warnings=(*modes.warnings, *_diverging(master)))
         shifts = _shifts(master, modes)
         follows = linear_response(master, prepared) if linear else None

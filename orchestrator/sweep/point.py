@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.black_box.coupled_modes import coupled_with_boxes
 from orchestrator.cases.case import Case
 from orchestrator.cases.schema import Value
 from orchestrator.points.failure import Failure
@@ -34,6 +35,7 @@ class SweepPointTask(Task):
     record = PointRecord
     overrides: dict[str, Value]  # the varied values by ``component.variable``, which override all layers
     frequency_range: tuple[float, float]  # of the modes [Hz]
+    black_box: bool = False  # identify the components that hide their states
 
 
 def compute_point(task: SweepPointTask) -> PointRecord:
@@ -44,7 +46,8 @@ def _modes(task: SweepPointTask, case: Case) -> PointRecord:
     prepared = task.study.prepare(case, task.overrides)
     asked = tuple(question for question in prepared.questions if question not in prepared.idle.values())
     # A sweep follows modes from point to point itself, and asks of all scenarios together.
-    return _record(compute_modes(replace(prepared, beside=None, questions=asked), task.frequency_range))
+    find = coupled_with_boxes if task.black_box else compute_modes
+    return _record(find(replace(prepared, beside=None, questions=asked), task.frequency_range))
 
 
 def _record(result: ModesResult) -> PointRecord:

@@ -7,7 +7,7 @@ from typing import Any
 from orchestrator.asked import FieldKind, Names, asked, plain_value, read_part
 from orchestrator.cases.given import check_case_name
 from orchestrator.errors import InputError
-from orchestrator.points.request import OverCluster, of_frequencies, of_scenarios, of_values
+from orchestrator.points.request import OverCluster, of_black_box, of_frequencies, of_scenarios, of_values
 from orchestrator.sweep.axes import Vary, parse_vary
 from orchestrator.sweep.limit import Until
 
@@ -100,4 +100,5 @@ class SweepRequest(OverCluster):
         'damping such as ``"5 %"``: bisect how far the only range that is varied may go, such as ``"grid.X_L=0.1:2"``; '
         "the result is in ``limits``",
     )  # fmt: skip
+    black_box: bool = of_black_box()
     frequencies: tuple[float, float] = of_frequencies("modes from the first to the second are followed [Hz]")

@@ -38,6 +38,7 @@ class SweepPlan:
     frequency_range: tuple[float, float]  # [Hz]
     idle: tuple[Problem, ...] = ()  # questions about values that act in no scenario
     until: Until | None = None  # what is searched for along the only axis; None for a sweep alone
+    black_box: bool = False  # as in `SweepPointTask`
 
     @property
     def overrides(self) -> dict[str, Value]:
@@ -57,7 +58,7 @@ class SweepPlan:
         return {one.name: StudyCase.of(one, self.layers, self.step_size) for one in self.scenarios}
 
     def task(self, prepared: PreparedScenario, place: GridPlace) -> SweepPointTask:
-        return SweepPointTask(self.studies[prepared.name], self.values(place), self.frequency_range)
+        return SweepPointTask(self.studies[prepared.name], self.values(place), self.frequency_range, self.black_box)
 
 
 def _value_at(axis: Axis, position: float) -> Value:
@@ -120,7 +121,8 @@ def plan_sweep(case: Case, request: SweepRequest) -> SweepPlan:
     vary = vary if until is None else [_searched(vary)]
     prepared = case.prepare(request.scenarios, request.overrides, request.step_size, None, request.files)
     axes = tuple(resolve(one, prepared) for one in vary)
-    plan = SweepPlan(case, axes, tuple(prepared), request.layers, request.step_size, request.frequencies, until=until)
+    plan = SweepPlan(case, axes, tuple(prepared), request.layers, request.step_size, request.frequencies, (), until,
+                     request.black_box)  # fmt: skip
     refuse_doubles(axes, prepared)
     ends = [plan.values(tuple(end % len(axis.values) for axis in axes)) for end in (0, -1)]
     idle = [_check_end(plan, varied) for varied in (ends if any(axis.key == ALPHA for axis in axes) else ends[:1])]

@@ -11,6 +11,7 @@ from orchestrator.cases.new_case import WantedCase, read_converter, write_case
 from orchestrator.errors import InputError
 from orchestrator.study.modes import compute_modes
 from tests.screening.five_machines import POWERS, RATINGS, five_machines
+from tests.support import vendor
 
 CONVERTER = "bus 13, 100 MVA, 60 MW, less sg3"
 
@@ -134,15 +135,57 @@ def test_a_converter_that_cannot_be_is_refused(files, converter, said):
         (["five.raw", "--binding", "b.toml"], "say where by --converter"),
         (["five.raw", "--out", "case.txt"], "ends in .toml"),
         ([], "no terminal to ask at"),
+        (["lines.csv", "loads.csv"], "one with the columns bus, rating_mva is missing"),
+        (["lines.csv", "five.raw"], "a case has one of them"),
+        (["empty.csv"], "no table of a network"),
+        (
+            ["five.raw", "--converter", CONVERTER, "--fmu", "vendor.fmu", "--force"],
+            "say which of its variables it is with --binding",
+        ),
     ],
 )
 def test_files_that_make_no_case_are_refused(gfor, files, monkeypatch, words, said):
     monkeypatch.chdir(files[0].parent)
     monkeypatch.setattr(sys, "stdin", io.StringIO())
     (files[0].parent / "other.raw").touch()
+    tables(files[0].parent)
+    if "--fmu" in words:
+        vendor.device(files[0].parent)
     code, _, err = gfor(*words)
     assert code == 2
     assert said in " ".join(err.split())
+
+
+LINES = "from,to,kv,R_ohm,X_ohm,B_us,R,X,B\n1,2,,,,,0,0.02,0\n2,4,,,,,0.004,0.05,0.1\n4,3,,,,,0,0.03,0\n"
+
+
+def tables(folder, lines=LINES):
+    """Two machines and a line of 0.05 pu between them, and what a planner would type for the line at 345 kV."""
+    (folder / "lines.csv").write_text(lines)
+    (folder / "machines.csv").write_text("bus,rating_mva,p_mw,v_pu\n3,500,300,1.01\n1,900,500,1.02\n")
+    (folder / "loads.csv").write_text("bus,p_mw,q_mvar\n2,400,50\n4,400,50\n")
+    (folder / "buses.csv").write_text("bus\n1\n2\n3\n4\n")
+    (folder / "empty.csv").write_text("bus,p_mw\n")
+    return tuple(folder / f"{name}.csv" for name in ("buses", "lines", "loads", "machines"))
+
+
+def test_a_case_comes_from_nothing_but_tables(tmp_path):
+    case, new = made(tables(tmp_path), "bus 4, 100 MVA, 60 MW, less sg3", frequency="60 Hz")
+    (base,) = case.prepare(["base"])
+    assert (base.network.buses, base.power_flow.slack) == (("bus_1", "bus_2", "bus_3", "bus_4"), "bus_1")
+    assert {plan.number("f_n") for name, plan in base.system.components.items() if name != "grid"} == {60}
+    assert "slack bus_1, 60 Hz" in "".join(new.assumed)
+    z = 345**2 / 100
+    ohms = LINES.replace("2,4,,,,,0.004,0.05,0.1", f"2,4,345,{0.004 * z},{0.05 * z},{0.1 / z * 1e6},,,")
+    (again,) = made(tables(tmp_path, ohms), None)[0].prepare(["base"])
+    assert abs(again.power_flow.voltages["bus_3"] - base.power_flow.voltages["bus_3"]) < 1e-12
+    for wrong, said in (
+        ("2,44,", "'bus_44', which does not exist"),
+        ("2,4,0,1,1,1,,,", "kv = 0"),
+        ("2,4,345,1,1,1,1,1,1", "both"),
+    ):
+        with pytest.raises(InputError, match=said):
+            made(tables(tmp_path, LINES.replace("2,4,,,,,0.004,0.05,0.1" if wrong[-2] == "," else "2,4,", wrong)), None)
 
 
 def test_it_asks_at_a_terminal(gfor, files, monkeypatch):

@@ -22,3 +22,13 @@ def test_recordings_are_read_without_what_they_do_not_need(tmp_path, command):
     imported = found.stdout.splitlines()[-1]
     assert "'xarray'" in imported
     assert not [name for name in ("dask", "pint", "pydantic") if f"'{name}'" in imported]
+
+
+def test_a_case_is_loaded_without_what_computes():
+    """Else `load` takes a second."""
+    code = (
+        "import sys, orchestrator; orchestrator.load('two_area_rms').scenarios; "
+        "print({'numpy', 'scipy', 'pandas', 'fmpy', 'rich', 'casadi'} & {*sys.modules})"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout == "set()\n"

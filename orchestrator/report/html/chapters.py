@@ -311,6 +311,12 @@ def kept_answers(chapters: Sequence[Chapter]) -> str:
     return held_data("answers", data)
 
 
+def limits_of(place: Path) -> list[Any]:
+    """What ``--until`` found along with a sweep."""
+    file = place / "limits.json"
+    return list(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else []
+
+
 def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     named = sweep["damping"].where(sweep["named"] == 1)
     least = named if bool(named.notnull().any()) else sweep["damping"]
@@ -319,6 +325,14 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     stable = sweep.get("stable")
     lost = 0 if stable is None else int((stable == 0).sum())
     unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
+    if limits := limits_of(place):
+        said = "; ".join(f"{one['scenario']}: {one['reason']}" for one in limits)
+        holds = all(one["ends_with"] == "holds" for one in limits)
+        return Chapter(
+            place, f"How far may {limits[0]['parameter']} go?", said, holds or None,
+            "coarse values, then bisection; each is of the coupled FMUs at an operating point of its own",
+            ["narrow pieces between the values that were tried"],
+        )  # fmt: skip
     answer = f"least damping {float(least.min()):.2f} % at {where}" + (f"; UNSTABLE at {lost} points" if lost else "")
     return Chapter(
         place, f"How do the modes move along {studies.axis_of(sweep)}?", answer, False if lost else None,
