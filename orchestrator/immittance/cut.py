@@ -76,7 +76,8 @@ def _devices(homes: dict[str, str], bus: str | None, names: tuple[str, ...]) -> 
         )
     if unknown := [name for name in names if name not in homes]:
         raise InputError(
-            f"--component {unknown[0]}: it is no device with a voltage and a current; there are: {', '.join(homes)}"
+            f"--component {unknown[0]}: it is no device with a voltage and a current in this scenario (--scenario "
+            f"chooses another); there are: {', '.join(homes)}"
         )
     if bus is None:
         return names or tuple(homes)

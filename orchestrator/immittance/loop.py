@@ -31,6 +31,12 @@ class SeriesCapacitors:
         return np.stack([np.stack([along, cross], -1), np.stack([-cross, along], -1)], -2)
 
 
+def _det(L: Complex) -> Complex:
+    """Of 1 + L; where a free angle's pole makes it 0 to the last digit, next to nothing."""
+    found = np.linalg.det(np.eye(L.shape[-1]) + L)
+    return np.asarray(np.where(found == 0, 1e-100, found))
+
+
 @dataclass(frozen=True)
 class LoopPath:
     s: Vector  # points [1/s], shape (f,); round a pole on the axis they leave it to the right
@@ -44,7 +50,7 @@ class LoopPath:
 
     @cached_property
     def det(self) -> Complex:
-        return np.asarray(np.linalg.det(np.eye(self.L.shape[-1]) + self.L))
+        return _det(self.L)
 
     @property
     def turns(self) -> Numbers:
@@ -90,7 +96,7 @@ class CutLoop:
             s = np.concatenate([w[0] * np.exp(1j * np.linspace(0, np.pi / 2, 17))[:-1], s])
         L = self.values(s)
         for _ in range(_ROUNDS):
-            det = np.linalg.det(np.eye(L.shape[-1]) + L)
+            det = _det(L)
             wide = np.flatnonzero(np.abs(np.angle(det[1:] / det[:-1])) > _STEP)
             if not len(wide) or len(s) > 200_000:
                 break

@@ -9,6 +9,7 @@ from orchestrator.immittance.loop import LoopPath
 
 _LEAST = 1e-4  # loci that cross the axis nearer to 0 tell nothing
 _LEVEL, _FLAT = 0.05, 0.5  # parts by which a locus that begins on the real axis may leave it, and change up to thrice f
+_TOUCHES, _FREE = 1e-9, 0.01  # distances from −1 of an undamped mode, and of the locus of a free angle near 0 Hz
 _SLOWEST = 0.05  # least frequency of a distance [Hz]: below, a free angle moves as far as one likes
 
 
@@ -68,7 +69,7 @@ def gains_of(path: LoopPath, crossings: list[Crossing]) -> list[Margin]:
     begins = [
         Margin(float(-1 / a.real), 0.0)
         for a, b in zip(path.loci[0], path.loci[later], strict=True)
-        if a.real < -_LEAST and abs(a.imag) < _LEVEL * abs(a) and abs(b - a) < _FLAT * abs(a)
+        if a.real < -_LEAST and abs(1 + a) > _FREE and abs(a.imag) < _LEVEL * abs(a) and abs(b - a) < _FLAT * abs(a)
     ]
     return [*begins, *(Margin(-1 / c.real, c.frequency_hz) for c in crossings)]
 
@@ -86,8 +87,11 @@ def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
                 hertz = float(path.hertz[i] + t * (path.hertz[i + 1] - path.hertz[i]))
                 turned.append(Margin(float(abs(np.rad2deg(np.angle(np.exp(1j * angle))))), hertz))
                 delayed.append(Margin(float(angle % (2 * np.pi) / (2 * np.pi * hertz)), hertz))
-    sensitivity = np.linalg.inv(np.eye(path.L.shape[-1]) + path.L)
-    disk = 1 / np.linalg.norm(sensitivity - np.eye(path.L.shape[-1]) / 2, ord=2, axis=(1, 2))
+    told = path.on_axis & (path.hertz >= min(_SLOWEST, path.hertz[-1]))
+    one, disk = np.eye(path.L.shape[-1]), np.full(len(path.s), np.inf)
+    disk[told & (path.distance <= _TOUCHES)] = 0.0
+    told &= path.distance > _TOUCHES
+    disk[told] = 1 / np.linalg.norm(np.linalg.pinv(one + path.L[told], rcond=0.0) - one / 2, ord=2, axis=(1, 2))
     return NyquistMargins(
         up, down, _least(turned), _least(delayed), _where_least(path, path.distance), _where_least(path, disk)
     )
