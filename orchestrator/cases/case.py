@@ -152,7 +152,7 @@ class Case(CaseDefinition):
             powers = intact.power_flow.powers if intact.power_flow else powers
         fed = sum(powers[unit].real * plans[unit].number("S_n") for unit in lost)
         rule = self.sharing or sharing.SharingRule(table.sharing)
-        return lost, Dispatch(rule, powers, fed - drawn)
+        return lost, sharing.Dispatch(rule, powers, fed - drawn)
 
     @cached_property
     def _mentions(self) -> list[Problem]:

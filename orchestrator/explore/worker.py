@@ -13,6 +13,7 @@ from typing import Any
 
 from orchestrator.api.case import Case, load
 from orchestrator.api.scenario import Scenario
+from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import CosimError
@@ -102,10 +103,11 @@ def _values_of(case: Case, question: Mapping[str, Any], values: dict[str, Value]
     own, lost = ([str(name) for name in question.get(key) or ()] for key in ("own", "lost"))
     if not own and not lost:
         return values
-    rule = question.get("sharing")
+    rule, base = question.get("sharing"), question.get("base")
     preparation = ItemPreparation(
-        case.file, question["scenario"], (), sharing=None if rule is None else SharingRule(rule)
-    )
+        case.file, question["scenario"], [OptionValues.of(base)] if base else (),
+        sharing=None if rule is None else SharingRule(rule),
+    )  # fmt: skip
     lost = [name for name in lost if name not in own]
     return preparation.live(Item(0, int(bool(lost)), values, (*own, *lost), tuple(lost)))
 

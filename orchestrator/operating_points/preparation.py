@@ -82,15 +82,15 @@ class ItemPreparation:
         return PreparedItem(without_units(found, remains.units), text)
 
     def live(self, item: Item) -> dict[str, Value]:
-        """Values by which the case alone is at an item: what is off, and what units feed instead of what was lost.
+        """Values by which the case alone is at an item: what is off, and what each unit feeds where a unit is off.
 
         Raises as `prepared`."""
         remains = what_remains(valued := self._valued(item), self.elements, item.out)
-        prepared = self.prepared(item)
+        scenario = self.prepared(item).scenario
         found = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
-        flow, left = prepared.scenario.power_flow, prepared.scenario.system.components
-        if prepared.text and flow is not None:
-            found |= {f"{name}.P_0": power.real for name, power in flow.powers.items() if name in left and power}
+        if scenario.power_flow is not None and {*item.out, *remains.units} & {*self.elements.units}:
+            powers = scenario.power_flow.powers  # else the case would share what the item leaves to the slack
+            found |= {f"{x}.P_0": powers[x].real for x in scenario.system.components if powers.get(x)}
         return found
 
     def _before_outage(self, item: Item, own: tuple[str, ...], without: Remains) -> PreparedScenario:
