@@ -82,13 +82,15 @@ class ItemPreparation:
         return PreparedItem(without_units(found, remains.units), text)
 
     def live(self, item: Item) -> dict[str, Value]:
-        """Values by which the case alone is at an item: what is off, and what each unit feeds where a unit is off.
+        """Values by which the case alone is at an item: what is off, and what each unit feeds where others share it.
 
         Raises as `prepared`."""
         remains = what_remains(valued := self._valued(item), self.elements, item.out)
-        scenario = self.prepared(item).scenario
+        prepared = self.prepared(item)
+        scenario = prepared.scenario
         found = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
-        if scenario.power_flow is not None and {*item.out, *remains.units} & {*self.elements.units}:
+        shared = prepared.text or {*item.out, *remains.units} & {*self.elements.units}
+        if shared and scenario.power_flow is not None:
             powers = scenario.power_flow.powers  # else the case would share what the item leaves to the slack
             found |= {f"{x}.P_0": powers[x].real for x in scenario.system.components if powers.get(x)}
         return found

