@@ -52,7 +52,12 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}")
     beginning = {"case": case.name, "scenario": name, "values": values_set(options), "range": list(options.range)}
     if study is not None:
-        beginning |= {"study": study, "values": study["values"] | beginning["values"], "range": study["range"]}
+        beginning |= {
+            "study": study,
+            "step": study.get("step"),
+            "values": study["values"] | beginning["values"],
+            "range": study["range"],
+        }
     if options.save is not None:
         desk = Desk(word, options.trust_fmus)
         with shown_progress("Points", shown=True) as report, catch_warnings():

@@ -23,11 +23,12 @@ EXPLORED = "explored"
 def copied(
     file: CaseFile, word: str, scenario: str, values: Mapping[str, Value], frequencies: tuple[float, float],
     events: Sequence[Mapping[str, Any]] | None = None, places: Mapping[str, Sequence[float]] | None = None,
+    step: float | None = None,
 ) -> dict[str, str]:  # fmt: skip
     """``command``, ``toml`` and ``python``; ``word`` is the case as it was given.
 
     ``events``: instead of the scenario's; they do not move the modes, and a command has none. ``places``: of buses in
-    the diagram."""
+    the diagram. ``step``: communication step [s]; None for the case's."""
     low, high = frequencies
     sets = [
         text
@@ -35,11 +36,13 @@ def copied(
         for text in ("--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}")
     ]
     words = ["gfor", "modes", word, "--scenario", scenario, *sets, "--range", f"{low!r}:{high!r}"]
+    words += [] if step is None else ["--step", f"{step!r} s"]
     case = f"gfor.load({word!r})"
     if events is not None:
         case += f".with_(scenarios={ {scenario: {'events': list(events)}}!r})"
+    last = "" if step is None else f", step={step!r}"
     lines = [
-        "import orchestrator as gfor", "", f"scenario = {case}.scenario({scenario!r}, {dict(values)!r})",
+        "import orchestrator as gfor", "", f"scenario = {case}.scenario({scenario!r}, {dict(values)!r}{last})",
         f"modes = scenario.modes(({low!r}, {high!r}))", "print(modes.stability.sentence())", "print(modes.table())",
     ]  # fmt: skip
     return {

@@ -51,7 +51,7 @@ class Desk:
         if events is not None:
             case = case.with_(scenarios={question["scenario"]: {"events": events}})
         name = str(question["scenario"])
-        scenario = partial(case.scenario, name)
+        scenario = partial(case.scenario, name, step=question.get("step"))
         values: dict[str, Value] = dict(question.get("values") or {})
         low, high = question.get("range") or (0.1, 2.0)
         signals = question.get("signals") or ()
@@ -93,7 +93,7 @@ class Desk:
             "swings": [modes.result.swing_of(mode) for mode in modes],
             "copied": copied(
                 case.file, self._word, scenario.name, values, frequencies, question.get("events"),
-                question.get("places"),
+                question.get("places"), question.get("step"),
             ),
         }  # fmt: skip
 
@@ -105,7 +105,7 @@ def _values_of(case: Case, question: Mapping[str, Any], values: dict[str, Value]
         return values
     rule, base = question.get("sharing"), question.get("base")
     preparation = ItemPreparation(
-        case.file, question["scenario"], [OptionValues.of(base)] if base else (),
+        case.file, question["scenario"], [OptionValues.of(base)] if base else (), question.get("step"),
         sharing=None if rule is None else SharingRule(rule),
     )  # fmt: skip
     lost = [name for name in lost if name not in own]

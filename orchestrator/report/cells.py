@@ -48,6 +48,7 @@ class Cells:
     columns: Sequence[CellLine]
     cells: Sequence[Sequence[Cell | None]]
     values: Mapping[str, Value] = field(default_factory=dict)  # that hold in all cells
+    step: float | None = None  # communication step [s], where it is not the case's
     sharing: str | None = None  # who feeds what an outage takes, where it is not as the case says
     followed: bool = False  # whether a row is a mode that is followed over the columns
 
@@ -59,7 +60,7 @@ class Cells:
         content = {
             "format": _FORMAT, "title": self.title, "scenario": self.scenario, "range": self.frequencies,
             "case": path.parent.name if built_in else os.path.relpath(path.resolve(), folder.resolve()),
-            "values": dict(self.values), "sharing": self.sharing, "followed": self.followed,
+            "values": dict(self.values), "sharing": self.sharing, "step": self.step, "followed": self.followed,
             "left_out": max(0, len(self.rows) - fit),
             "rows": [asdict(side) for side in self.rows[:fit]], "columns": [asdict(side) for side in self.columns],
             "cells": [[_told(cell) for cell in row] for row in self.cells[:fit]],

@@ -136,7 +136,8 @@ def _cells(summary: Summary) -> Cells:
         [CellLine(name, out=taken[name]) for name in outages],
         [CellLine(one.name, one.values, out=one.out) for one in plan.points],
         [[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
-        {key: value for layer in plan.layers for key, value in layer.values.items()}, plan.tasks[0].sharing,
+        {key: value for layer in plan.layers for key, value in layer.values.items()},
+        plan.tasks[0].study.step_size, plan.tasks[0].sharing,
     )  # fmt: skip
 
 

@@ -131,7 +131,8 @@ class ParameterSweep:
             f"Damping of followed modes over {axis.key} [{axis.unit or 1}]", plan.case, plan.scenarios[0].name,
             plan.frequency_range, [side(*key) for key in rows],
             [CellLine(f"{value:g}", axis.sets(value)) for value in axis.values],
-            [[row.get(k) for k in range(len(axis.values))] for row in rows.values()], plan.overrides, followed=True,
+            [[row.get(k) for k in range(len(axis.values))] for row in rows.values()], plan.overrides,
+            plan.step_size, followed=True,
         )  # fmt: skip
 
     def plot(self, ax: Axes = None) -> Axes:

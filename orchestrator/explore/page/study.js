@@ -70,7 +70,7 @@ async function openCell(at) {
   $("study-said").textContent = saidOf(at);
   if (SAVED || row.values === null || column.values === null || !s.cells[at.row][at.column]) return;
   const scenario = row.scenario || column.scenario || s.scenario, values = { ...s.values, ...row.values, ...column.values };
-  const found = await ask("the cell", { ask: "cell", scenario, values, base: s.values, own: column.out, lost: row.out, sharing: s.sharing }, $("study-said"));
+  const found = await ask("the cell", { ask: "cell", scenario, values, base: s.values, step: s.step, own: column.out, lost: row.out, sharing: s.sharing }, $("study-said"));
   if (!found) return;
   Object.assign(state, { scenario, events: null, values: found.values, controls: Object.keys(found.values).slice(0, 8), range: s.range });
   $("scenario").value = scenario;

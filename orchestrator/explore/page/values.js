@@ -94,7 +94,7 @@ async function wantSlopes(name) {
   const key = slopeKey(name);
   if (SAVED || key in seen.slopes) return;
   seen.slopes[key] = null;
-  const found = await ask("∂λ/∂p", { ask: "slopes", scenario: state.scenario, values: state.values, range: state.range, parameter: name }, document.createElement("span"));
+  const found = await ask("∂λ/∂p", { ask: "slopes", ...theCase(), range: state.range, parameter: name }, document.createElement("span"));
   if (found) seen.slopes[key] = found; else delete seen.slopes[key];
   const keys = Object.keys(seen.slopes);
   for (const old of keys.slice(0, Math.max(0, keys.length - 40))) delete seen.slopes[old];
