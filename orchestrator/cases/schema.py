@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, FiniteFloat, PrivateAttr, model_validator
 
 from orchestrator.cases.names import file_name
 from orchestrator.coupling.events import ForcingShape
@@ -577,7 +577,7 @@ class ConventionsTable(Table):
 class DiagramTable(Table):
     """The network as ``gfor explore`` draws it: places of buses, to the right and downwards, about 900 by 600."""
 
-    positions: dict[str, tuple[float, float]] = {}
+    positions: dict[str, tuple[FiniteFloat, FiniteFloat]] = {}
 
 
 class CaseTable(Table):

@@ -1,6 +1,5 @@
 """What stands in the page, as text that makes it again: a command, a scenario of a case file, and Python."""
 
-import json
 import shlex
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -67,18 +66,19 @@ def events_of(file: CaseFile, scenario: str) -> list[dict[str, Any]]:
 
 def saved(file: CaseFile, toml: str, folder: Path) -> Path:
     """Write a copy of the case file with one scenario more, as `as_scenario` gives it; the file as it is stays."""
-    head = "" if file.table.directory else f"directory = {json.dumps(str(file.directory.resolve()))}\n"
     try:
-        given = tomllib.loads(file.text)
+        tables = tomllib.loads(file.text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{file.path}: it is no TOML file, so that no scenario can be added: {error}") from error
     added = tomllib.loads(toml)
-    if EXPLORED in given.get("scenarios", {}):
+    scenarios, places = tables.setdefault("scenarios", {}), tables.get("diagram", {}).get("positions", {})
+    if EXPLORED in scenarios:
         raise InputError(f"{file.path}: it has a scenario {EXPLORED!r} already; rename that one, then save again")
-    if "diagram" in given:
-        added.pop("diagram", None)
+    scenarios |= added["scenarios"]
+    if "diagram" in added:
+        tables["diagram"] = {"positions": places | added["diagram"]["positions"]}
     place = made_folder(folder) / f"{file.name}_{new_run_id()}.toml"
-    write_text(place, f"{head}{file.text.rstrip()}\n\n{tomli_w.dumps(added)}")
+    write_text(place, tomli_w.dumps({**tables, "directory": str(file.directory.resolve())}))
     return place
 
 

@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 
 from orchestrator.api.scenario import Scenario
+from orchestrator.cases.names import close_names
+from orchestrator.errors import InputError
 from orchestrator.report.html.network_map import HEIGHT, WIDTH, places
 
 
@@ -39,6 +41,11 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     points = places(network.buses, ends)
     points += np.array([WIDTH, HEIGHT]) / 2 - (points.max(axis=0) + points.min(axis=0)) / 2
     given = prepared.case.table.diagram.positions
+    if unknown := [bus for bus in given if bus not in network.buses]:
+        raise InputError(
+            f"{prepared.case.path}: [diagram] positions: there is no bus {unknown[0]!r}; "
+            + close_names(unknown[0], network.buses, f"there are: {', '.join(network.buses[:8])} …")
+        )
     at = [given.get(bus, tuple(xy)) for bus, xy in zip(network.buses, points.tolist(), strict=True)]
     return {
         "width": WIDTH,

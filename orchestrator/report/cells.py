@@ -5,10 +5,11 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from orchestrator.cases.case import BUILT_IN, Case
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import InputError
 from orchestrator.results.storage import save_json
 
@@ -20,6 +21,7 @@ _MOST = 200_000  # cells that a page is given; the first rows are the worst
 
 @dataclass(frozen=True)
 class Cell:
+    __pydantic_config__ = ConfigDict(allow_inf_nan=False)
     text: str = ""  # what stands under the pointer
     percent: float | None = None  # damping, by which it is coloured
     stable: bool | None = None
@@ -73,6 +75,25 @@ def _told(cell: Cell | None) -> dict[str, Any] | None:
     return None if cell is None else {name: value for name, value in asdict(cell).items() if value not in (None, "")}
 
 
+@dataclass(frozen=True)
+class _Kept:
+    """The file as it must be; what a page needs of it."""
+
+    __pydantic_config__ = ConfigDict(allow_inf_nan=False)
+    format: int
+    title: str
+    case: str
+    scenario: str
+    range: tuple[float, float]
+    values: dict[str, Value]
+    sharing: SharingRule | None
+    followed: bool
+    rows: Annotated[list[CellLine], Field(min_length=1)]
+    columns: Annotated[list[CellLine], Field(min_length=1)]
+    cells: list[list[Cell | None]]
+    step: float | None = None
+
+
 def read_cells(folder: Path) -> dict[str, Any]:
     """What `Cells.save` wrote, with the ``case`` as a word that opens it."""
     file = folder / CELLS
@@ -83,15 +104,17 @@ def read_cells(folder: Path) -> dict[str, Any]:
         )
     try:
         found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        if found["format"] != _FORMAT:
-            raise InputError(f"{file}: its format is {found['format']!r}, and only {_FORMAT} is known; compute it anew")
-        sides = [*found["rows"], *found["columns"]]
-        whole = len(found["cells"]) == len(found["rows"])
-        whole = whole and all(len(row) == len(found["columns"]) for row in found["cells"])
-        if not whole or not all(isinstance(side["name"], str) for side in sides):
+        kept = TypeAdapter(_Kept).validate_python(found)
+        if kept.format != _FORMAT:
+            raise InputError(
+                f"{file}: its format is {kept.format}, and only {_FORMAT} is known; compute the study anew"
+            )
+        if len(kept.cells) != len(kept.rows) or any(len(row) != len(kept.columns) for row in kept.cells):
             raise ValueError("rows and columns do not fit the cells")
-        word = found["case"]
-        near = (folder / word).resolve()
-    except (ValueError, KeyError, TypeError, OSError) as error:
-        raise InputError(f"{file}: it cannot be read as rows and columns: {error}; compute the study anew") from error
-    return found | {"case": str(near) if near.is_file() else word}
+        near = (folder / kept.case).resolve()
+        return found | {"case": str(near) if near.is_file() else kept.case}
+    except (ValueError, TypeError, OSError, RecursionError) as error:
+        text = str(error).splitlines()[0] if not isinstance(error, ValidationError) else "; ".join(
+            f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()[:3]
+        )  # fmt: skip
+        raise InputError(f"{file}: it cannot be read as rows and columns: {text}; compute the study anew") from error

@@ -77,12 +77,15 @@ def test_cells_of_a_sweep_are_its_followed_modes(tmp_path):
 
 
 @pytest.mark.parametrize(("change", "text"), [
-    ({"format": 7}, "format is 7"), ({"cells": []}, "do not fit"), ({"rows": [{"name": 3}]}, "do not fit"),
-    (None, "there is no cells.json"),
+    ({"format": 7}, "format is 7"), ({"cells": []}, "do not fit"), ({"rows": [{"name": 3}]}, "rows.0.name"),
+    ({"range": None}, "range"), ({"values": []}, "values"), ({"cells": [[{"percent": float("nan")}]]}, "finite"),
+    ({"rows": [], "cells": []}, "rows"), (None, "there is no cells.json"),
 ])  # fmt: skip
 def test_what_is_no_study_is_refused_by_name(tmp_path, capsys, change, text):
     if change is not None:
-        whole = {"format": 1, "case": "wscc9", "rows": [{"name": "a"}], "columns": [{"name": "b"}], "cells": [[None]]}
+        whole = {"format": 1, "title": "", "case": "wscc9", "scenario": "gfor", "range": [0.1, 2.0], "values": {},
+                 "sharing": None, "followed": False, "rows": [{"name": "a"}], "columns": [{"name": "b"}],
+                 "cells": [[None]]}  # fmt: skip
         (tmp_path / "cells.json").write_text(json.dumps(whole | change), encoding="utf-8")
     assert main(["explore", str(tmp_path), "--no-browser"]) == 2
     error = capsys.readouterr().err
