@@ -147,17 +147,21 @@ def stability_fault(
     with_converter: Mapping[str, Any] | None = None,
     without: Mapping[str, Any] | None = None,
 ) -> str | None:
-    """The fault of a converter that makes the system unstable at any frequency, or whose stability is not known; None
-    without such a fault. A system that was unstable without the converter excuses it."""
+    """The fault of a converter that makes the system unstable at any frequency; None without such a fault. A system
+    that was unstable without the converter excuses it."""
     if not np.isfinite(growth_with):
         return "the largest growth rate with the converter is not a number, so that nothing shows that it is stable"
     if growth_with > ZERO >= growth_without:
         return f"the converter makes the system unstable: an eigenvalue has a real part of {growth_with:+.3g} 1/s"
-    if with_converter and with_converter["stable"] is None:
-        return f"nothing shows that the system with the converter is stable: {with_converter['sentence']}"
     if with_converter and with_converter["stable"] is False and not (without and without["stable"] is False):
         return f"the converter makes the system unstable: {with_converter['sentence']}"
     return None
+
+
+def unknown_stability(with_converter: Mapping[str, Any] | None) -> str:
+    if with_converter and with_converter["stable"] is None:
+        return f"nothing shows that the system with the converter is stable: {with_converter['sentence']}"
+    return ""
 
 
 def modal_test(times: NDArray[np.float64], signal: NDArray[np.float64], start: float) -> ModalTest:

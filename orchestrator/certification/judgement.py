@@ -17,6 +17,7 @@ from orchestrator.certification.criteria import (
     modal_test,
     neighbouring_modes,
     stability_fault,
+    unknown_stability,
 )
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.motion import motion_faults, not_judged
@@ -152,7 +153,8 @@ def judge(
         faults.append(f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}")
     if time is None and not having.failure:
         faults.append(f"there is no response of {signal}")
-    unknown = "" if faults else not_judged(having.findings)
+    open_ = [text for text in (unknown_stability(having.stability), not_judged(having.findings)) if text]
+    unknown = "" if faults else "; ".join(open_)
     return PointVerdict(having.X_L, modes, time, base, tuple(faults), beside, unknown, critical)
 
 

@@ -21,7 +21,7 @@ from orchestrator.certification.codes.all_codes import code_for
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row_verdict import judge_row
-from orchestrator.certification.criteria import ModeVerdict, judge_mode
+from orchestrator.certification.criteria import ModeVerdict, judge_mode, unknown_stability
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
 from orchestrator.certification.form import NORM
 from orchestrator.certification.judgement import PointVerdict, judge
@@ -134,6 +134,7 @@ def _verdict(point: dict[str, Any], having: PointResult, lacking: PointResult, p
     if point["time"] is None and (faults or unknown):
         return replace(again, time=None, faults=faults, unknown=unknown)
     same = (bool(again.faults), bool(again.unknown)) == (bool(faults), bool(unknown))
+    same = same or bool(faults and not unknown and unknown_stability(having.stability))  # earlier versions failed it
     return replace(again, faults=faults, unknown=unknown) if same else again
 
 

@@ -120,6 +120,18 @@ def test_a_response_that_the_watch_did_not_judge_is_not_passed(certified):
     assert said in page
 
 
+@pytest.mark.parametrize(
+    ("other", "expected"), [({}, (3, "incomplete", "0 of 13")), ({"power": 0.0}, (1, "fails", "1 of 13"))]
+)
+def test_a_point_of_unknown_stability_is_not_judged_unless_it_fails_by_something_else(certified, other, expected):
+    unknown = {"stable": None, "sentence": "not known: a limit is near"}
+    code, text, content, page = certified("--reactances", "0.3", points=only(0.3, stability=unknown, **other))
+    assert (code, content["verdict"], content["judged"]) == expected
+    if not other:
+        assert "nothing shows that the system with the converter is stable: not known: a limit is near" in page
+        assert "not judged" in text
+
+
 def test_failing_beyond_the_norms_reactances_is_failing(certified):
     code, _, content, _ = certified("--reactances", "0.1,0.7", points=only(0.7, **UNSTABLE))
     assert code == 1

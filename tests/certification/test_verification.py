@@ -14,6 +14,7 @@ from orchestrator.certification import acceptance, anew
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
 from orchestrator.certification.files import figures_hash, write_sealed
+from orchestrator.certification.judgement import judge
 from orchestrator.certification.point import POWER
 from orchestrator.certification.request import REACTANCES, CertificationRequest
 from orchestrator.cli import main
@@ -93,7 +94,7 @@ def test_what_nobody_touched_holds(certificate, gfor):
 @pytest.mark.parametrize(
     ("reactances", "other", "verdict", "points", "code"),
     [("0.1,0.3", {}, "incomplete", "2 of 13", 3), ("0.1", {"power": 0.0}, "fails", "1 of 13", 1),
-     ("0.1", {"stability": {"stable": None, "sentence": "not known: it answers otherwise"}}, "fails", "1 of 13", 1),
+     ("0.1", {"stability": {"stable": None, "sentence": "not known: it answers otherwise"}}, "incomplete", "0 of 13", 3),
      (",".join(map(str, REACTANCES)), {}, "passes", "13 of 13", 0)],
 )  # fmt: skip
 def test_a_certificate_that_holds_is_no_pass(
@@ -108,6 +109,19 @@ def test_a_certificate_that_holds_is_no_pass(
     got, text, _ = gfor("verify", tmp_path, "--files-only")
     assert got == code
     assert text.strip().splitlines()[-1] == f"Its verdict: {verdict}, {points} line reactances of the norm judged."
+
+
+def test_a_point_of_unknown_stability_that_was_certified_as_failed_still_holds(tmp_path, fmu_path, gfor, monkeypatch):
+    def judged(*given):
+        found = judge(*given)
+        return replace(found, faults=(found.unknown,), unknown="")
+
+    monkeypatch.setattr(study_module, "judge", judged)
+    unknown = {"stable": None, "sentence": "not known: it answers otherwise"}
+    monkeypatch.setattr(study_module, "compute_point", lambda task: replace(rings(task), stability=unknown))
+    gfor("certify", fmu_path("gfor"), "--no-check", "--reactances", "0.1", "--workers", 1, "--out", tmp_path)
+    code, found = verified(gfor, tmp_path, "--files-only")
+    assert (code, found["faults"], found["verdict"]) == (1, [], "fails")
 
 
 @pytest.mark.parametrize("pod", ["p", "pq", "none"])
