@@ -18,7 +18,7 @@ from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.stability import Stability
 from orchestrator.arrays import Matrix
 from orchestrator.coupling.master import Master
-from orchestrator.errors import AnalysisError, ComponentError
+from orchestrator.errors import ComponentError
 from orchestrator.fmi.instance import is_ours
 from orchestrator.fmi.port import without_binding
 
@@ -33,6 +33,10 @@ at 0.25 %. The error of a model that lacks a growing mode exceeds every limit.""
 _FLOOR = 0.01
 """Least size to which errors are related, as a part of the state's largest response and of the disturbance. Smaller
 responses lie within the integrators' tolerances."""
+
+_CURVATURE = 0.05
+"""Difference between the departures at the two larger sizes, each divided by the cube of its size, up to which they
+are smooth curvature. A limit or a dead band has no such law."""
 
 _SECONDS, _WALL, _LEAST, _SHORT = 5.0, 8.0, 0.1, 1.0
 """Longest simulated time for which a response is followed [s], longest computing time for it [s], least simulated time
@@ -54,6 +58,7 @@ class Disagreement:
     error: float  # relative to the response's size at that time
     seconds: float  # how long the response was followed [s]
     size: float  # of the disturbance, one of `SIZES`
+    smooth: bool = True  # whether the disagreement at the size before is that of a curve, and of no edge
 
 
 def foreign_components(master: Master) -> list[str]:
@@ -111,7 +116,7 @@ def _departure(master: Master, model: LinearModel, foreign: Sequence[str]) -> tu
     of = found.state.partition(".")[0]
     whose = f"component {of!r}" if of in foreign else f"the system with the foreign FMU of {', '.join(foreign)}"
     if not found.error > LARGEST_ERROR:
-        if found.size == SIZES[-1]:
+        if found.size == SIZES[-1] and not found.smooth:
             return (
                 f"the system with the foreign FMU of {', '.join(foreign)} answers as its linear model does after a "
                 f"disturbance of {found.size:g} of each state, and not after one of {SIZES[-2]:g}: a limit or a dead "
@@ -146,24 +151,37 @@ def worst_disagreement(master: Master, model: LinearModel) -> Disagreement:
     # Random signs excite every mode. They are the same in every call.
     shape = np.random.default_rng(1).choice([-1.0, 1.0], len(x_0)) * np.maximum(1.0, np.abs(x_0)) * settable
     every = model.period * max(1, round(_SAMPLE / (model.period * master.clock.step_size)))
-    best: Disagreement | None = None
-    for size in SIZES:
-        measured, start = _response(master, state, model, x_0, size * shape, every)
+
+    def departure(size: float, times: int | None = None) -> _Departure:
+        measured, start = _response(master, state, model, x_0, size * shape, every, times)
         expected = _predicted(model, start, every, len(measured))[:, : len(x_0)]
-        found = _compare(measured, expected, size, np.maximum(1.0, np.abs(x_0)), model, every)
-        best = found if best is None or found.error < best.error else best
-        if best.error <= LARGEST_ERROR:
+        return _compare(measured, expected, size, np.maximum(1.0, np.abs(x_0)))
+
+    tried: list[_Departure] = []
+    for size in SIZES:
+        tried.append(departure(size))
+        if tried[-1].relative.max() <= LARGEST_ERROR:
             break
-    if best is None:
-        raise AnalysisError("no disturbance was tried")
-    return best
+    best = min(tried, key=lambda departure: float(departure.relative.max()))
+    k, i = np.unravel_index(np.argmax(best.relative), best.relative.shape)
+    interval, error = every * (model.step_size or 0.0), float(best.relative[k, i])
+    smooth = True
+    if best.size == SIZES[-1] and error <= LARGEST_ERROR:
+        larger, smaller = tried[:2]
+        if len(larger.difference) < len(smaller.difference):  # the computing time ended it, and not the model
+            larger = departure(larger.size, len(smaller.difference))
+        smooth = _is_curvature(larger, smaller)
+    return Disagreement(
+        model.names[i], float(k + 1) * interval, error, len(best.relative) * interval, best.size, smooth
+    )
 
 
 def _response(
-    master: Master, state: CoupledState, model: LinearModel, x_0: Matrix, disturbance: Matrix, every: int
-) -> tuple[Matrix, Matrix]:
+    master: Master, state: CoupledState, model: LinearModel, x_0: Matrix, disturbance: Matrix, every: int,
+    times: int | None,
+) -> tuple[Matrix, Matrix]:  # fmt: skip
     """Odd part of the response to a disturbance up and down, shape (times, states), and the z that it begins with."""
-    up, z_up = _run(master, state, model, x_0 + disturbance, every, None)
+    up, z_up = _run(master, state, model, x_0 + disturbance, every, times)
     down, z_down = _run(master, state, model, x_0 - disturbance, every, len(up))
     return (up - down) / 2, (z_up - z_down) / 2
 
@@ -204,18 +222,30 @@ def _predicted(model: LinearModel, z: Matrix, every: int, times: int) -> Matrix:
     return np.array(rows)
 
 
-def _compare(
-    measured: Matrix, expected: Matrix, disturbance: float, scale: Matrix, model: LinearModel, every: int
-) -> Disagreement:
-    """The largest error of any state in any window, relative to the response there."""
-    interval = every * (model.step_size or 0.0)
-    floor = _FLOOR * np.maximum(np.abs(expected).max(axis=0), disturbance * scale)
-    worst = Disagreement("", 0.0, 0.0, len(measured) * interval, disturbance)
+@dataclass(frozen=True)
+class _Departure:
+    """What differs between the response and the model's, shape (times, states)."""
+
+    size: float
+    difference: Matrix
+    relative: Matrix  # to the response's size in the same window
+
+
+def _compare(measured: Matrix, expected: Matrix, size: float, scale: Matrix) -> _Departure:
+    floor = _FLOOR * np.maximum(np.abs(expected).max(axis=0), size * scale)
+    difference = measured - expected
+    relative = np.empty_like(difference)
     for window in np.array_split(np.arange(len(measured)), min(_WINDOWS, len(measured))):
-        size = np.maximum(np.abs(expected[window]).max(axis=0), floor)
-        error = np.nan_to_num(np.abs(measured[window] - expected[window]) / size, nan=np.inf)
-        k, i = np.unravel_index(np.argmax(error), error.shape)
-        if error[k, i] > worst.error:
-            time = (window[k] + 1) * interval
-            worst = Disagreement(model.names[i], float(time), float(error[k, i]), worst.seconds, disturbance)
-    return worst
+        response = np.maximum(np.abs(expected[window]).max(axis=0), floor)
+        relative[window] = np.nan_to_num(np.abs(difference[window]) / response, nan=np.inf)
+    return _Departure(size, difference, relative)
+
+
+def _is_curvature(larger: _Departure, smaller: _Departure) -> bool:
+    """Whether all that is too large at the smaller size grows with the disturbance's cube.
+
+    The odd part of a smooth system's response has no other terms that small. Such a system is stable as its modes are,
+    however little a state moves in them: it may answer with nothing but its curvature."""
+    beyond = smaller.relative > LARGEST_ERROR
+    coarse, fine = (d.difference[: len(beyond)][beyond] / d.size**3 for d in (larger, smaller))
+    return bool(np.all(np.abs(coarse - fine) <= _CURVATURE * np.abs(fine)))

@@ -117,8 +117,9 @@ def _overview(c: Certification) -> str:
         rows.append(row)
     columns = ["X_L [pu]", "Least damped mode [Hz]", "Damping [%]", "Without the converter",
                "ΔP1M1", "ΔP5M5", "Ratio", "Least damping in the signal [%]", "Verdict"]  # fmt: skip
-    faults = "".join(f"<li>X_L = {v.X_L:g} pu: {escape('; '.join(v.faults))}</li>" for v in c.verdicts if v.faults)
-    return table("All line reactances, with the converter", columns, rows) + (f"<ul>{faults}</ul>" if faults else "")
+    reasons = [(v.X_L, "; ".join(v.faults) or v.unknown) for v in c.verdicts]
+    listed = "".join(f"<li>X_L = {X_L:g} pu: {escape(reason)}</li>" for X_L, reason in reasons if reason)
+    return table("All line reactances, with the converter", columns, rows) + (f"<ul>{listed}</ul>" if listed else "")
 
 
 def _said(v: PointVerdict) -> str:

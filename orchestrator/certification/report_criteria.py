@@ -93,7 +93,7 @@ def responses(c: Certification, figures: Figures) -> str:
 def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[str]:
     yield f"<h3>X_L = {v.X_L:g} pu</h3>"
     if v.time is None:
-        yield f'<p class="bad">{escape("; ".join(v.faults))}</p>'
+        yield f'<p class="bad">{escape("; ".join(v.faults) or v.unknown)}</p>'
         return
     unit = c.points[WITH, v.X_L].units[v.time.signal]
     curves = []

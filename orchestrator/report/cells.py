@@ -7,6 +7,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
 from orchestrator.cases.case import BUILT_IN, Case
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule

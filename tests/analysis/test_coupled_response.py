@@ -107,11 +107,25 @@ def test_growth_that_an_fmu_does_not_declare_leaves_the_verdict_not_known(tmp_pa
     assert found.stability.largest_growth_rate < 0  # what the declared states alone say
 
 
-def test_a_system_that_is_stable_within_a_dead_band_only_is_not_called_stable(tmp_path):
-    found = modes(tmp_path, device(tmp_path, "narrow", BAND=1))
-    assert found.stability.largest_growth_rate < 0  # within the band
+@pytest.mark.parametrize(
+    "edge", [{"BAND": 3e-6}, {"BAND": 8e-6}, {"LIMIT": 5e-6}, {"LIMIT": 5e-6, "CURVED": 2e9}], ids=str
+)
+def test_a_system_that_is_stable_within_an_edge_only_is_not_called_stable(tmp_path, edge):
+    found = modes(tmp_path, device(tmp_path, "narrow", **edge))
+    assert found.stability.largest_growth_rate < 0  # within the edge
     assert found.stability.stable is None
     assert "after a disturbance of 1e-06 of each state, and not after one of 1e-05" in found.stability.reason
+
+
+def test_a_state_that_moves_by_curvature_alone_is_near_no_edge(tmp_path, monkeypatch):
+    found = []
+    compare = coupled_response.worst_disagreement
+    monkeypatch.setattr(
+        coupled_response, "worst_disagreement", lambda *given: found.append(compare(*given)) or found[-1]
+    )
+    stability = modes(tmp_path, device(tmp_path, "curved", CURVED=2e9)).stability
+    assert (stability.stable, stability.reason) == (True, "")
+    assert found[0].size == coupled_response.SIZES[-1]  # larger ones departed
 
 
 @pytest.mark.parametrize("as_continuous", [False, True])
