@@ -3,7 +3,7 @@
 What comes from it lies in memory that the FMU's code can write. So it is taken for what the FMU says, of the form that
 was asked for, and nothing else in this process is in the FMU's reach."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from ctypes import c_uint, memmove
 from dataclasses import asdict
 from math import inf
@@ -17,17 +17,16 @@ from numpy.typing import NDArray
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi import answers
-from orchestrator.fmi.component import Derived, RealBatch
+from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.confined import ConfinedProcess
 from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.limits import TO_BEGIN, Limits, crowded
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, unlocked_library
-from orchestrator.fmi.messages import texts
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.process_end import ProcessFault
 from orchestrator.fmi.protection import Protection
-from orchestrator.fmi.refusal import FATAL, check_log, refusal
-from orchestrator.fmi.remote_calls import RemoteCalls
+from orchestrator.fmi.refusal import FATAL, refusal
+from orchestrator.fmi.remote_calls import Form, RemoteCalls
 
 _STAGES = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
 _LOOK = 0.05  # time [s] after which it is looked whether the process is still there
@@ -73,7 +72,7 @@ class FmuProcess:
 
     def _begin(self) -> None:
         try:
-            self.protections = self._typed(answers.protections, self.talk("the beginning of its process", -1, "begin"))
+            self.protections = self.typed(answers.protections, self.talk("the beginning of its process", -1, "begin"))
         except ProcessEndedError as error:  # the FMU is not loaded yet
             raise InputError(f"the FMU's process did not start: {error.how}") from error
         self._patience = self.limits.seconds
@@ -137,29 +136,12 @@ class FmuProcess:
 
     def number(self, call: str, instance: int, command: str, *arguments: Any) -> int:
         """As `talk`, where the answer must be a whole number."""
-        found: int = self._typed(answers.number, self.talk(call, instance, command, *arguments))
-        return found
+        return self.typed(answers.number, self.talk(call, instance, command, *arguments))
 
-    def table(self, answer: Any) -> dict[str, float | bool]:
-        found: dict[str, float | bool] = self._typed(answers.table, answer)
-        return found
-
-    def progress(self, answer: Any) -> tuple[bool, float | None]:
-        """Whether it ended by itself, and when, as an answer must say it."""
-        found: tuple[bool, float | None] = self._typed(answers.progress, answer)
-        return found
-
-    def names(self, answer: Any) -> list[str]:
-        found: list[str] = self._typed(answers.names, answer)
-        return found
-
-    def hexadecimal(self, answer: Any) -> bytes:
-        found: bytes = self._typed(answers.hexadecimal, answer)
-        return found
-
-    def _typed(self, form: Callable[[Any], Any], answer: Any) -> Any:
+    def typed(self, form: Callable[..., Form], answer: Any, *wanted: Any) -> Form:
+        """An answer in the form that was asked for."""
         try:
-            return form(answer)
+            return form(answer, *wanted)
         except answers.NotAnAnswerError as error:
             raise self._tampered(f"{error}") from error
 
@@ -224,33 +206,31 @@ class FmuProcess:
         self._ended = self._ended or ProcessEndedError(ProcessFault.EXIT, "its process was closed")
 
 
-class HostedComponent(RemoteCalls, Derived):
+class HostedComponent(RemoteCalls):
     """An instance in an `FmuProcess`, used as any other; NaN and infinite values are passed on."""
 
     def __init__(self, name: str, process: FmuProcess) -> None:
         self.name, self.description, self._process = name, process.description, process
         self._open, self._lost = False, False
+        self._box = process.box
         self.pointer = self.number = process.number("fmi2Instantiate", -1, "open", name)
         self._open = True
         functions: Any = (self._set_real, self._get_real, self._do_step)
         self.set_real, self.get_real, self.do_step = functions
-
-    def _texts(self, least: int = 0) -> list[str]:
-        return texts(self._process.box.read_log(), least)
 
     def check(self, status: int, call: str, time: float | None = None) -> None:
         if status > 1:
             self._lost = self._lost or status == FATAL
             raise refusal(self, self._texts, status, call, time)
 
-    def progress_of_step(self) -> tuple[bool, float | None]:
-        return self._process.progress(self._remote("fmi2GetBooleanStatus", "progress_of_step"))
-
-    def _remote(self, call: str, command: str, *arguments: Any, ask: Any = None) -> Any:
+    def _remote(self, call: str, command: str, *arguments: Any) -> Any:
         try:
-            return (ask or self._process.talk)(call, self.number, command, *arguments)
+            return self._process.talk(call, self.number, command, *arguments)
         except ComponentError as error:
             raise ComponentError(self.name, error.call, error.status, error.log) from error
+
+    def _typed(self, form: Callable[..., Form], answer: Any, *wanted: Any) -> Form:
+        return self._process.typed(form, answer, *wanted)
 
     # -- numbers ---------------------------------------------------------------------------------
 
@@ -284,36 +264,15 @@ class HostedComponent(RemoteCalls, Derived):
 
     # -- all else --------------------------------------------------------------------------------
 
-    def values(self, names: Iterable[str]) -> dict[str, float | bool]:
-        return self._process.table(self._remote("reading", "values", list(names)))
-
-    def read(self, batch: RealBatch) -> None:
-        self._process.box.clear_log()
-        batch.read()
-        check_log(self, self._texts, "fmi2GetReal")
-
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NoReturn:
         """Refuse: no check asks for derivatives."""
         raise ComponentError(
             self.name, "fmi2GetDirectionalDerivative", "nothing", "the acceptance tests ask no FMU for derivatives"
         )
 
-    def save_state(self) -> Any:
-        return self._remote("fmi2GetFMUstate", "save_state", ask=self._process.number)
-
-    def restore_state(self, state: Any) -> None:
-        self._remote("fmi2SetFMUstate", "restore_state", state)
-
     def free_state(self, state: Any) -> None:
         if self._process.alive:
-            self._remote("fmi2FreeFMUstate", "free_state", state)
-
-    def serialize_state(self, state: Any) -> bytes:
-        return self._process.hexadecimal(self._remote("fmi2SerializeFMUstate", "serialize_state", state))
-
-    def deserialize_state(self, content: bytes) -> Any:
-        return self._remote("fmi2DeSerializeFMUstate", "deserialize_state", content.hex(),
-                            ask=self._process.number)  # fmt: skip
+            super().free_state(state)
 
     def close(self) -> None:
         """Terminate and free the instance; its process goes on."""

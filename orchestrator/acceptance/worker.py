@@ -40,7 +40,7 @@ class Host(Worker):
         box = self._box
         while box.library.mailbox_host(box.address, self._parent, self._table, _MOST):
             self._asked, command, *arguments = box.read_text()
-            self._answer(getattr(self, f"do_{command}"), arguments)
+            self._answer(command, arguments)
         os._exit(DIED)
 
     def _instance(self) -> Component:

@@ -3,7 +3,7 @@
 A crash, a hang, an exit or a flood in it becomes one `ComponentError`; what was computed until then stays. Values pass
 through shared memory (`mailbox.c`), one exchange for a communication step."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,30 +15,19 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.removal import remove_tree
 from orchestrator.errors import ComponentError, ErrorKind, InputError, NotFiniteError
-from orchestrator.fmi.answers import (
-    NotAnAnswerError,
-    content_of,
-    hexadecimal,
-    matrix,
-    number,
-    progress,
-    protections,
-    table_of,
-)
+from orchestrator.fmi.answers import NotAnAnswerError, content_of, matrix, protections
 from orchestrator.fmi.archive import extract
-from orchestrator.fmi.component import Derived, RealBatch
 from orchestrator.fmi.confined import ConfinedProcess
 from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.limits import TO_BEGIN, Limits
 from orchestrator.fmi.mailbox import DIED, HUNG, INTERRUPTED, NOT_A_NUMBER, TAMPERED
-from orchestrator.fmi.messages import texts
 from orchestrator.fmi.protection import Protection
-from orchestrator.fmi.refusal import check_log, refusal
-from orchestrator.fmi.remote_calls import RemoteCalls
+from orchestrator.fmi.refusal import refusal
+from orchestrator.fmi.remote_calls import Form, RemoteCalls
 
 
-class IsolatedComponent(RemoteCalls, Derived):
+class IsolatedComponent(RemoteCalls):
     """An instance of an FMU in a process of its own."""
 
     def __init__(
@@ -97,15 +86,6 @@ class IsolatedComponent(RemoteCalls, Derived):
             raise ComponentError(self.name, call, ended, self._last_words(), time, self._end_kind)
         raise refusal(self, self._texts, status, call, time)
 
-    def _texts(self, least: int = 0) -> list[str]:
-        return texts(self._box.read_log(), least)
-
-    def progress_of_step(self) -> tuple[bool, float | None]:
-        found: tuple[bool, float | None] = self._typed(
-            progress, self._remote("fmi2GetBooleanStatus", "progress_of_step")
-        )
-        return found
-
     def _how_it_ended(self, status: int) -> str:
         """Crash, hang, exit, flood or tampering, in words; the process is ended if it is still there."""
         if self._end is not None:
@@ -136,7 +116,6 @@ class IsolatedComponent(RemoteCalls, Derived):
     # -- conversation ----------------------------------------------------------------------------
 
     def _remote(self, call: str, command: str, *arguments: Any) -> Any:
-        """Have something done in the other process that needs more than numbers."""
         if self._end is not None:
             raise ComponentError(self.name, call, self._end, "", kind=self._end_kind)
         self._box.clear_log()
@@ -148,8 +127,7 @@ class IsolatedComponent(RemoteCalls, Derived):
         except ValueError as error:
             raise self._tampered(call, error) from None
 
-    def _typed(self, form: Any, answer: Any, *wanted: Any) -> Any:
-        """An answer in the form that was asked for, or an error that says what is there instead."""
+    def _typed(self, form: Callable[..., Form], answer: Any, *wanted: Any) -> Form:
         try:
             return form(answer, *wanted)
         except NotAnAnswerError as error:
@@ -159,35 +137,9 @@ class IsolatedComponent(RemoteCalls, Derived):
         why = self._give_up("tampering: its process was ended")
         return ComponentError(self.name, call, why, f"it wrote into the memory between the processes: {error}")
 
-    def read(self, batch: RealBatch) -> None:
-        self._box.clear_log()
-        batch.read()
-        check_log(self, self._texts, "fmi2GetReal")
-
-    def values(self, names: Iterable[str]) -> dict[str, float | bool]:
-        wanted = list(names)
-        return dict(self._typed(table_of, self._remote("reading", "values", wanted), wanted))
-
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
         found = self._remote("fmi2GetDirectionalDerivative", "jacobian", list(unknowns), list(knowns))
-        jacobian: NDArray[np.float64] = self._typed(matrix, found, len(unknowns), len(knowns))
-        return jacobian
-
-    def save_state(self) -> Any:
-        return self._typed(number, self._remote("fmi2GetFMUstate", "save_state"))
-
-    def restore_state(self, state: Any) -> None:
-        self._remote("fmi2SetFMUstate", "restore_state", state)
-
-    def free_state(self, state: Any) -> None:
-        self._remote("fmi2FreeFMUstate", "free_state", state)
-
-    def serialize_state(self, state: Any) -> bytes:
-        content: bytes = self._typed(hexadecimal, self._remote("fmi2SerializeFMUstate", "serialize_state", state))
-        return content
-
-    def deserialize_state(self, content: bytes) -> Any:
-        return self._typed(number, self._remote("fmi2DeSerializeFMUstate", "deserialize_state", content.hex()))
+        return self._typed(matrix, found, len(unknowns), len(knowns))
 
     # -- the end ---------------------------------------------------------------------------------
 

@@ -3,7 +3,6 @@
 import ctypes
 import itertools
 import os
-from collections.abc import Callable
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,11 @@ from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.mailbox import DIED, OK, Mailbox
 from orchestrator.fmi.messages import on_message
 
+_PASSED_ON = frozenset((
+    "setup", "enter_initialization_mode", "exit_initialization_mode", "progress_of_step", "reset", "set", "values",
+))  # fmt: skip
+"""Commands that are methods of a component, whose answers are JSON's types."""
+
 
 class Worker:
     """Answers until it is told to close, or its parent is gone."""
@@ -26,7 +30,8 @@ class Worker:
         folder = Path(request["folder"])
         self._request, self._parent = request, os.getppid() if hasattr(os, "getppid") else 0
         self._box = Mailbox(request["mailbox"])
-        self._close_mailbox(request["mailbox"])
+        if isinstance(request["mailbox"], int):
+            os.close(request["mailbox"])  # it is mapped by now
         limits = Limits(**request["limits"])
         self._description = self._described()
         compile_adapters(self._description)
@@ -37,12 +42,6 @@ class Worker:
         self._component: Component | None = None
         self._states: dict[int, Any] = {}
         self._next = itertools.count(1)
-
-    @staticmethod
-    def _close_mailbox(mailbox: int | str) -> None:
-        """It is mapped by now."""
-        if isinstance(mailbox, int):
-            os.close(mailbox)
 
     def _described(self) -> FmuDescription:
         return read_description(self._request["fmu"])
@@ -58,14 +57,15 @@ class Worker:
                 box.write_text({})
                 box.library.mailbox_answer(box.address, OK)
                 os._exit(0)  # what an FMU registered for the end of the process is of no use to anyone
-            self._answer(getattr(self, f"do_{command}"), arguments)
+            self._answer(command, arguments)
             component = self._component
             if component is not None:
                 functions = (component.set_real, component.get_real, component.do_step)
                 pointers = (component.pointer, *(ctypes.cast(f, ctypes.c_void_p) for f in functions))
         os._exit(DIED)
 
-    def _answer(self, function: Callable[..., Any], arguments: list[Any]) -> None:
+    def _answer(self, command: str, arguments: list[Any]) -> None:
+        function = getattr(self._instance(), command) if command in _PASSED_ON else getattr(self, f"do_{command}")
         try:
             answer = {"result": function(*arguments)}
         except ComponentError as error:
@@ -97,34 +97,16 @@ class Worker:
         directory = Path(self._request["directory"])
         self._component = LoadedComponent(self._request["name"], self._description, directory)
 
-    def do_setup(self, start_time: float, stop_time: float | None) -> None:
-        self._instance().setup(start_time, stop_time)
-
-    def do_enter_initialization_mode(self) -> None:
-        self._instance().enter_initialization_mode()
-
-    def do_exit_initialization_mode(self) -> None:
-        self._instance().exit_initialization_mode()
-
-    def do_progress_of_step(self) -> list[Any]:
-        return list(self._instance().progress_of_step())
-
-    def do_reset(self) -> None:
-        self._instance().reset()
-
-    def do_set(self, values: dict[str, float | bool]) -> None:
-        self._instance().set(values)
-
-    def do_values(self, names: list[str]) -> dict[str, float | bool]:
-        return self._instance().values(names)
-
     def do_jacobian(self, unknowns: list[str], knowns: list[str]) -> Any:
         return self._instance().jacobian(unknowns, knowns).tolist()
 
-    def do_save_state(self) -> int:
+    def _kept(self, state: Any) -> int:
         number = next(self._next)
-        self._states[number] = self._instance().save_state()
+        self._states[number] = state
         return number
+
+    def do_save_state(self) -> int:
+        return self._kept(self._instance().save_state())
 
     def do_restore_state(self, number: int) -> None:
         self._instance().restore_state(self._states[number])
@@ -136,9 +118,7 @@ class Worker:
         return self._instance().serialize_state(self._states[number]).hex()
 
     def do_deserialize_state(self, content: str) -> int:
-        number = next(self._next)
-        self._states[number] = self._instance().deserialize_state(bytes.fromhex(content))
-        return number
+        return self._kept(self._instance().deserialize_state(bytes.fromhex(content)))
 
 
 def main(request: dict[str, Any]) -> None:

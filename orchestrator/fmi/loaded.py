@@ -162,7 +162,7 @@ class LoadedComponent(Derived):
         except FMICallException as error:
             self.check(error.status, call)
             raise ComponentError(self.name, call, str(error), "; ".join(self._texts())) from error
-        check_log(self, self._texts, call)
+        check_log(self.name, self._texts, call)
         return result
 
     # -- life cycle ------------------------------------------------------------------------------

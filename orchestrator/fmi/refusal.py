@@ -50,7 +50,7 @@ def in_its_words(description: FmuDescription, text: str) -> str:
     return in_words_of_3(text) if description.fmi_version == "3.0" else text
 
 
-def check_log(component: Component, said_by: Said, call: str) -> None:
+def check_log(name: str, said_by: Said, call: str) -> None:
     """Refuse a call that returned OK and logged an error all the same."""
     if errors := said_by(ERROR):
-        raise ComponentError(component.name, call, "an error in the log", "; ".join(errors))
+        raise ComponentError(name, call, "an error in the log", "; ".join(errors))

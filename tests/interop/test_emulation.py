@@ -1,6 +1,7 @@
 """Rules of other masters on our coupling: what they say, what they refuse, and ``gfor run --like``."""
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,29 +12,28 @@ from orchestrator.cli import main
 from orchestrator.coupling.events import ParameterChange
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
-from orchestrator.coupling.schedule import jacobi
+from orchestrator.coupling.schedule import FirstInputs, jacobi
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import probe_system
 from orchestrator.interop.emulation import emulate
-from orchestrator.interop.masters import (
-    COFMUPY_GAUSS_SEIDEL,
-    ECOS_EXECUTABLE,
-    FMPY_SSP,
-    FMUCONTAINER,
-    LIBCOSIM,
-    MASTERS,
-    MOSAIK,
-    PATHSIM,
-)
+from orchestrator.interop.masters import MASTERS
+from orchestrator.interop.rules import LastLabel, Steps
 from tests.interop import drivers, table
 from tests.interop.jobs import job_of, write_ssp
+
+COFMUPY_GAUSS_SEIDEL, ECOS_EXECUTABLE, FMPY_SSP, FMUCONTAINER, LIBCOSIM, MOSAIK, PATHSIM = (
+    MASTERS[name]
+    for name in ("cofmupy_gauss_seidel", "ecos_executable", "fmpy_ssp", "fmucontainer", "libcosim", "mosaik", "pathsim")
+)
 
 H = 1e-4
 
 
 def test_every_master_says_where_its_rules_are_from():
     assert all(len(rules.source) > 30 for rules in MASTERS.values())
-    assert all(name == rules.name for name, rules in MASTERS.items())
+    assert {rules.steps for rules in MASTERS.values()} == {*get_args(Steps)}
+    assert {rules.last_label for rules in MASTERS.values()} == {*get_args(LastLabel)}
+    assert {rules.first_inputs for rules in MASTERS.values()} <= {*get_args(FirstInputs)}
 
 
 def test_the_page_lists_every_master_with_its_schedule():

@@ -5,6 +5,7 @@ from orchestrator.acceptance.checks.file import some_of
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.acceptance.process import HostedComponent, ProcessEndedError
 from orchestrator.errors import ComponentError, EndedError, InputError, UnsupportedFmuError
+from orchestrator.fmi.answers import names
 from orchestrator.fmi.port import without_binding
 
 
@@ -18,7 +19,8 @@ def loads(subject: Subject) -> CheckResult:
         raise
     except InputError as error:
         return failed("loads", "binary not loadable", str(error))
-    missing, spare = map(process.names, answer if isinstance(answer, list) and len(answer) == 2 else (None, None))
+    both = answer if isinstance(answer, list) and len(answer) == 2 else (None, None)
+    missing, spare = (process.typed(names, found) for found in both)
     if missing:
         return failed(
             "loads", "missing function", f"its binary has no {', '.join(missing)}, which what it declares needs"
