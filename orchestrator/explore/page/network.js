@@ -146,7 +146,7 @@ function paintElement() {
     }
     parts.push(happens("It opens", 0, "", 0, () => ({ type: "line_trip", line: element.name })));
   } else if (element.kind === "load") {
-    parts.push(happens("It steps to", 101, "% of its power", 1000, x => ({ type: "load_change", load: element.name, scale: x / 100 })));
+    parts.push(happens("It steps to", 101, "% of its power", 1000, x => ({ type: "load_change", load: element.name, scale: x / 100 * (state.values[d.loads.find(l => l.name === element.name).scale] ?? 1) })));
     const load = d.loads.find(l => l.name === element.name);
     if (load.scale) parts.push(times("Load, times the case's", state.values[load.scale] ?? 1, 0.2, 3, factor => setOnes({ [load.scale]: factor === 1 ? null : factor }, error)));
   } else {
