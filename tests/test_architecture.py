@@ -15,7 +15,8 @@ PACKAGES = ("fmus", "gfor_fmu", "orchestrator")
 
 FLOORS = (
     ("orchestrator.added", "orchestrator.spelling"),
-    ("orchestrator.arrays", "orchestrator.cores", "orchestrator.errors", "orchestrator.late", "orchestrator.units"),
+    ("orchestrator.arrays", "orchestrator.closing", "orchestrator.cores"),
+    ("orchestrator.errors", "orchestrator.late", "orchestrator.units"),
     ("orchestrator.asked", "orchestrator.safe_files", "orchestrator.toml_files"),
     ("orchestrator.fmi",),
     ("orchestrator.coupling", "orchestrator.binding"),

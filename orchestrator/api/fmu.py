@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import pandas as pd
@@ -13,6 +12,7 @@ from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.given import Time, binding_path, in_seconds, plain
 from orchestrator.cases.values import convert
+from orchestrator.closing import Closing
 from orchestrator.errors import InputError
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription, VariableInfo, read_declared
@@ -21,7 +21,7 @@ from orchestrator.fmi.linear_model import EmbeddedModel, read_embedded_model
 from orchestrator.report.notebook import page
 
 
-class Fmu:
+class Fmu(Closing):
     """A running FMU at its time 0, initialised with what it was given. `open_fmu` makes it; leaving ``with`` ends it.
 
     Attributes
@@ -135,11 +135,6 @@ class Fmu:
     def __enter__(self) -> Self:
         self._open()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def __repr__(self) -> str:
         return f"<Fmu {self.description.model_name} at {self.time:.6g} s>"

@@ -77,41 +77,7 @@ _MODULES = {new: old for old, new in OLD.items()}  # a command in a group has th
 _READERS = ("signal compare", "signal identify", "signal source", "verify")
 """Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
 
-QUESTIONS = """\
-gfor: co-simulation of grid-forming converters, from FMUs and a case file
-
-Is the network stable, and which swing is damped least?
-  gfor new own.raw own.dyr --out case.toml            a case of your own, for the place of two_area
-  gfor modes two_area --set grid.X_L=0.3              modes of each scenario, with another value
-  gfor run two_area --stop 5                          after a fault or a step: signals and plots
-  gfor report results/two_area                        all that as one page for a browser
-What makes it better or worse?
-  gfor explore two_area                               in the browser: drag a value, see modes move
-  gfor sensitivities two_area --scenario pod_p        which parameter moves the mode, and how far
-  gfor sweep two_area --vary grid.X_L=0.1:0.5:9       modes along a parameter (or --until unstable)
-  gfor screen ieee39 --points year.csv --outages n-1  hour by hour, outage by outage
-  gfor design two_area --controller pod_p             settings of a damping controller
-  gfor site ieee39 --device pod_p                     where a converter helps most
-  gfor interactions my_case.toml                      which vendors' converters do not agree
-  gfor scr my_case.toml                               how weak the grid is at each bus
-May this converter's FMU be trusted, and does it meet the grid code?
-  gfor fmu info vendor.fmu                            what it declares (also: admittance, nyquist)
-  gfor fmu bind vendor.fmu                            draft of its binding: what its variables mean
-  gfor fmu check vendor.fmu --binding vendor.toml     acceptance tests
-  gfor certify vendor.fmu --binding vendor.toml       the tests of a grid code (--code all)
-  gfor verify results/certify_vendor                  whether a certificate still holds
-What does a recording say?
-  gfor signal identify results/two_area/gfor "sg1.omega - sg2.omega"   the modes in a signal
-  gfor signal compare results/two_area/gfor results/two_area/pod_p     two runs beside each other
-  gfor signal source results/two_area/gfor            which unit drives an oscillation
-How do the models get into another tool, and does it compute alike?
-  gfor fmu build gfor --dest fmus                     an FMU for any FMI tool
-  gfor export linear two_area --scenario gfor         A, B, C, D (also: ssp, comtrade, dll)
-  gfor master which --build probes                    which schedule a tool runs (also: federate)
-  gfor steps two_area --error 0.001:0.1               how long a step may be
-
-`gfor COMMAND --help` has a command's options, `gfor --help` all commands.
-"""
+QUESTIONS = Path(__file__).with_name("questions.txt").read_text(encoding="utf-8")
 """The page that ``gfor`` alone prints."""
 
 

@@ -3,14 +3,13 @@
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fmus.toolchain.removal import remove_tree
 from orchestrator.arrays import Numbers
+from orchestrator.closing import Closing
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.late_start import LateStart
 from orchestrator.coupling.memory import apart
@@ -32,7 +31,7 @@ def open_plan(name: str, plan: ComponentPlan, directory: Path) -> Component:
     return open_component(name, plan.description, directory, isolated=plan.isolated)
 
 
-class CoupledComponents:
+class CoupledComponents(Closing):
     """Components at their common start; a context manager that releases every FMU.
 
     ``y``: All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
@@ -164,14 +163,6 @@ class CoupledComponents:
     def close(self) -> None:
         """Terminate and free every FMU; calling it again does nothing."""
         self._release.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def exchange_inputs(self, name: str) -> None:
         """Send a component the newest outputs of its partners; over a connection of `wires`, what arrived last."""

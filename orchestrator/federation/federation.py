@@ -19,6 +19,7 @@ from typing import Any, Self
 from fmus.toolchain import temporary
 from fmus.toolchain.extras import require
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.closing import Closing
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import ComponentError, InputError
@@ -41,7 +42,7 @@ _TO_END = 10.0  # for a process to end by itself [s]
 _AFTER_CTRL_C = 2.0  # how long Ctrl-C waits for the end of a step [s]
 
 
-class Federation:
+class Federation(Closing):
     """The processes of one run, from `with` to its end.
 
     ``prepared``: Inside of ``with``: the scenario with foreign federates as what they publish.
@@ -80,9 +81,6 @@ class Federation:
             self.close()
             raise
         return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     # -- processes -------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.closing import Closing
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.interrupts import calls
@@ -101,7 +102,7 @@ class Component(Protocol):
         """A handle to a state made from bytes; give it to `restore_state`, then to `free_state`."""
 
 
-class Derived:
+class Derived(Closing):
     """What a component does by its other methods alone; it holds no data."""
 
     @property
@@ -115,14 +116,6 @@ class Derived:
     def get(self: Component, names: Iterable[str]) -> dict[str, float]:
         batch = RealBatch(self, tuple(names))
         return dict(zip(batch.names, batch.read().tolist(), strict=True))
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self: Component, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class RealBatch:

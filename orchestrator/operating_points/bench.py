@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.linear_model import LinearModel
@@ -11,6 +10,7 @@ from orchestrator.analysis.linearization import Blocks, continuous
 from orchestrator.analysis.slope_linearization import covers, linearize_slopes
 from orchestrator.analysis.state_access import StateAccess
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.closing import Closing
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.step_awareness import other_step
 from orchestrator.coupling.system import ComponentPlan
@@ -37,7 +37,7 @@ class PointModel:
     doubts: tuple[str, ...]  # a warning where a limit is so close that the model is doubtful
 
 
-class PointBench:
+class PointBench(Closing):
     """Holds the FMUs of one operating point; the next one gets the same FMUs, reset, where it has the same."""
 
     def __init__(self) -> None:
@@ -103,14 +103,6 @@ class PointBench:
         master, self._master = self._master, None
         if master is not None:
             master.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def is_converter(plan: ComponentPlan) -> bool:

@@ -1,81 +1,10 @@
 """Every fault that a check can find, by name, and what to do about it."""
 
+import tomllib
+from pathlib import Path
+
 from orchestrator.binding import misfits
 
-REMEDIES = {
-    # the file
-    "hostile archive": "do not trust this file; ask for the FMU to be packed again by its exporter",
-    "path traversal": "do not trust this file; ask for the FMU to be packed again by its exporter",
-    "zip bomb": "do not trust this file; ask for the FMU to be packed again by its exporter",
-    "too many variables": "ask for an FMU that declares only what others need",
-    "entity expansion": "do not trust this file; ask for a model description without a document type",
-    "unreadable": "ask for the file again, exported as an FMI 2.0 co-simulation FMU for this platform",
-    "binding does not fit": "mend these places of the binding; `gfor fmu bind` drafts one from the FMU",
-    "invalid FMI": "have the exporter corrected; `fmpy validate` lists all problems",
-    "wrong units": "have the unit corrected in modelDescription.xml; what it means cannot be known otherwise",
-    "bad start values": "have the start values declared as FMI 2.0 asks",
-    "start values differ": "have the declared start values corrected: a master shows them and leaves them as they are",
-    # the process
-    "crash": "ask the author for a corrected FMU; until then it runs in a process of its own only",
-    "hang": "ask the author for a corrected FMU, or raise --time-limit if it is only slow",
-    "exit": "an FMU must return fmi2Fatal and never end the process; ask the author",
-    "output flood": "an FMU must log through its logger, and only what matters; ask the author",
-    "memory": "ask why it needs so much memory, or raise --memory-limit",
-    "processor time": "ask what it computes for so long; an FMU works in fmi2DoStep and not beside it",
-    "too many processes": "have each process and thread that it starts ended with its instance; ask why it starts any",
-    "disk": "ask why it writes so much into its folder",
-    "tampering": "do not run this file: its code wrote where an FMU has no business",
-    "no verdict": "report this with the FMU; until the check works nothing is known of what it asks",
-    "missing function": "an FMU must have every function that its declared capabilities need; ask the author",
-    "binary not loadable": "ask the author for a binary that this platform can load",
-    "no instance": "ask the author what the FMU's message means",
-    "error in a step": "ask the author what the FMU's message means",
-    "ends at once": "it must run for as long as its experiment; ask the author why it ends",
-    "refused call": "ask the author why it refuses what it declares to be able to do",
-    "memory leak": "what is allocated must be freed; until then use short runs",
-    "files stay open": "what is opened must be closed with the instance; until then begin a new process now and then",
-    # the same answer
-    "parameter not taken": "fmi2SetReal must change what the file declares as a parameter; ask the author",
-    "state not taken": "what is declared as settable must be set: until it is, linearisation by perturbation is wrong",
-    "not repeatable": "look for numbers that are never set, random numbers, or clocks",
-    "reading changes it": "a getter must not change the FMU",
-    "shared between instances": "static variables must become members of the instance; until then use one a process",
-    "reset fails": "fmi2Reset must lead back to where fmi2Instantiate led; instantiate anew instead",
-    "reset leaves something": "fmi2Reset must set every variable and parameter back; instantiate anew instead",
-    "no second instance": "fmi2FreeInstance must leave room for another one",
-    "instances differ": "look for static variables that live longer than the instance",
-    "hidden state": "all that changes must be in the saved state; until then neither linearise nor repeat steps",
-    "outputs come late": "have outputs computed in initialisation mode already, from parameters and inputs: there a "
-    "master reads them to initialise their partners, and fmi2ExitInitializationMode comes too late",
-    "growing state": "the state must not keep its past; ask the author",
-    "serialised state": "have fmi2SerializeFMUstate and fmi2DeSerializeFMUstate corrected, or do not declare them",
-    "incomplete state": "the state must hold all continuous states; ask the author",
-    # time
-    "undeclared feed-through": "have ModelStructure corrected: a master orders its calls by it, and misses the loop",
-    "delayed output": "outputs must be those of the communication point, computed when they are read",
-    "step-dependent answer": "the answer must follow communicationStepSize and not the number of calls",
-    "internal step leaks": "time left between internal steps must be carried over, not dropped or rounded",
-    "step not honoured": "fmi2DoStep must lead to where the step ends: couple it with its own step, or have it mended",
-    # numbers
-    "not a number": "an FMU must return fmi2Error where it has no answer, or limit what it is given",
-    "not a number stays": "look for static variables",
-    # the port
-    **misfits.REMEDIES,
-    "wrong frequency": "check variable, unit and sign of the binding's 'omega', and the base by which its angle turns",
-    "loses synchronism": "look for a limit that acts in one direction only; ask the author",
-    "unstable": "look for a measurement of the wrong sign, or ask at which network impedance it is stable",
-    "no current limit": "have its current limited as the converter's is; a machine's binding says I_max",
-    "blocks": "have it stay on, or ask which grid code allows that, and at which voltages and jumps it blocks",
-    "base of another rating": "its start values must follow the rating that it is given: check [start.S_n] and 'base'",
-    "limit of another rating": "have its current limit follow the rating that it is given, or remove [start.S_n]",
-    "uneven droop": "ask whether it means to answer frequency or voltage otherwise while it takes power",
-    "uneven damping": "look for damping that its operating point switches off; ask whether it means that",
-    "keeps moving": "look for an oscillation that nothing damps; ask at which network impedance it is damped",
-    "changed by a disturbance": "look for gains, integrators and counters that a dip moves and nothing sets back",
-    "rests elsewhere": "look for integrators that wind up in a dip, and for references that are not set back after it",
-    "does not start": "it must start from a power flow within its ratings",
-    "no steady state": "it must compute its states from the power flow; otherwise let it settle before linearising",
-    "counts time": "look for a clock in single precision, or for what acts at a time of its own; it must be a double",
-    "jumps with its angle": "look for an angle that is set back by another amount than a turn",
-    "leaves its steady state": "something in it counts time, or adds up what never ends; ask the author",
-}
+_OWN: dict[str, str] = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
+
+REMEDIES = _OWN | misfits.REMEDIES

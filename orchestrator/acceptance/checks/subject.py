@@ -5,14 +5,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 from zlib import crc32
 
 import numpy as np
 
 from orchestrator.acceptance.process import FmuProcess, HostedComponent
 from orchestrator.arrays import Numbers
+from orchestrator.closing import Closing
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import START, BoundDescription
@@ -205,7 +205,7 @@ class Subject:
             return running.hold(rows, len(rows), self.step_size)
 
 
-class Running:
+class Running(Closing):
     """An initialised instance that knows its time."""
 
     def __init__(self, subject: Subject, component: HostedComponent, point: OperatingAt | None = None,
@@ -268,12 +268,7 @@ class Running:
         self.component.reset()
         self.begin()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
         self.component.close()
 
 
