@@ -86,6 +86,8 @@ def kept(given: Any, name: str, argument: str) -> Path:
             raise InputError(f"{argument}: {error}; give what TOML has: tables, lists, numbers and text") from error
         return keep(text, name)
     table = given if hasattr(given, "to_csv") else pd.DataFrame.from_dict(given, orient="index")
+    if not hasattr(table, "columns"):
+        raise InputError(f"{argument}: a {type(given).__name__} has no columns; give a DataFrame, a row each")
     named = {"time", "name"} & set(table.columns)
     return keep(table.to_csv(index=not named, index_label=None if named else "name"), name)
 

@@ -16,7 +16,7 @@ from orchestrator.errors import InputError
 from orchestrator.explore.saved import save_page
 from orchestrator.explore.server import Explorer
 from orchestrator.explore.worker import Desk
-from orchestrator.report.cells import read_cells
+from orchestrator.report.cells import check_case, read_cells
 from orchestrator.sweep.axes import parse_vary
 
 
@@ -45,19 +45,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Serve the page until it was closed for a minute, or Ctrl-C."""
     study = read_cells(Path(options.case)) if Path(options.case).is_dir() else None
+    if study is not None and (options.set or options.range != ELECTROMECHANICAL_HZ or options.save):
+        raise InputError(f"{options.case}: a study has its own values and range, and is not saved as a page; --set, "
+                         "--range and --save go with a case")  # fmt: skip
     word = options.case if study is None else study["case"]
     case = load(word, trust_fmus=options.trust_fmus)
+    if study is not None:
+        check_case(study, case.file, Path(options.case))
     name = options.scenario or (case.scenarios[-1] if study is None else study["scenario"])
     if name not in case.scenarios:
         raise InputError(f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}")
     beginning = {"case": case.name, "scenario": name, "values": values_set(options), "range": list(options.range)}
     if study is not None:
-        beginning |= {
-            "study": study,
-            "step": study.get("step"),
-            "values": study["values"] | beginning["values"],
-            "range": study["range"],
-        }
+        beginning |= {"study": study} | {key: study.get(key) for key in ("step", "values", "range")}
     if options.save is not None:
         desk = Desk(word, options.trust_fmus)
         with shown_progress("Points", shown=True) as report, catch_warnings():

@@ -131,7 +131,9 @@ class Interactions:
         pairs = [[cell(_together(self.judgement, a, b)) for b in plan.vendors] for a in plan.vendors]
         title = f"Least damping of vendors alone and in pairs; {stand_in_sentence(self.judgement)}"
         values = {key: value for layer in plan.layers for key, value in layer.values.items()}
-        return Cells(title, plan.case, plan.prepared.name, (0.1, 2.0), sides, sides, pairs, values, plan.step_size)
+        return Cells(
+            title, plan.case, plan.prepared.name, plan.request.frequencies, sides, sides, pairs, values, plan.step_size
+        )
 
     def __repr__(self) -> str:
         plan = self.result.plan

@@ -1,5 +1,6 @@
 """A study in rows and columns, by which ``gfor explore`` opens it: each cell a figure, and a case that can be live."""
 
+import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -9,7 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from orchestrator.cases.case import BUILT_IN, Case
+from orchestrator.cases.case import BUILT_IN, Case, built_in_cases
+from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import InputError
@@ -64,13 +66,29 @@ class Cells:
         content = {
             "format": _FORMAT, "title": self.title, "scenario": self.scenario, "range": self.frequencies,
             "case": path.parent.name if built_in else os.path.relpath(path.resolve(), folder.resolve()),
-            "values": dict(self.values), "sharing": self.sharing, "step": self.step, "followed": self.followed,
+            "hash": _hash(self.case), "values": dict(self.values), "sharing": self.sharing, "step": self.step,
+            "followed": self.followed,
             "left_out": max(0, len(self.rows) - fit),
             "rows": [asdict(side) for side in self.rows[:fit]], "columns": [asdict(side) for side in self.columns],
             "cells": [[_told(cell) for cell in row] for row in self.cells[:fit]],
         }  # fmt: skip
         save_json(content, staging / CELLS)
         return staging / CELLS
+
+
+def _hash(case: Case) -> str:
+    """Of what a case and its parameter files say."""
+    values = [file.values if isinstance(file, ParameterFile) else file for file in case.parameter_files.values()]
+    return hashlib.sha256(f"{case.text}{values}".encode()).hexdigest()
+
+
+def check_case(study: Mapping[str, Any], case: Case, folder: Path) -> None:
+    """Refuse a case that is not the one of the study."""
+    if study["hash"] != _hash(case):
+        raise InputError(
+            f"{folder / CELLS}: {case.path} is not as it was when the study was computed, or is another file; compute "
+            "the study anew, or give the case itself"
+        )
 
 
 def _told(cell: Cell | None) -> dict[str, Any] | None:
@@ -85,6 +103,7 @@ class _Kept:
     format: int
     title: str
     case: str
+    hash: str
     scenario: str
     range: tuple[float, float]
     values: dict[str, Value]
@@ -113,8 +132,12 @@ def read_cells(folder: Path) -> dict[str, Any]:
             )
         if len(kept.cells) != len(kept.rows) or any(len(row) != len(kept.columns) for row in kept.cells):
             raise ValueError("rows and columns do not fit the cells")
+        if kept.case in built_in_cases():
+            return found
         near = (folder / kept.case).resolve()
-        return found | {"case": str(near) if near.is_file() else kept.case}
+        if not near.is_file():
+            raise InputError(f"{file}: its case {near} is not there; put the folder where it was, beside its case")
+        return found | {"case": str(near)}
     except (ValueError, TypeError, OSError, RecursionError) as error:
         text = str(error).splitlines()[0] if not isinstance(error, ValidationError) else "; ".join(
             f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()[:3]

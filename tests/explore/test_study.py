@@ -83,8 +83,8 @@ def test_cells_of_a_sweep_are_its_followed_modes(tmp_path):
 ])  # fmt: skip
 def test_what_is_no_study_is_refused_by_name(tmp_path, capsys, change, text):
     if change is not None:
-        whole = {"format": 1, "title": "", "case": "wscc9", "scenario": "gfor", "range": [0.1, 2.0], "values": {},
-                 "sharing": None, "followed": False, "rows": [{"name": "a"}], "columns": [{"name": "b"}],
+        whole = {"format": 1, "title": "", "case": "wscc9", "hash": "", "scenario": "gfor", "range": [0.1, 2.0],
+                 "values": {}, "sharing": None, "followed": False, "rows": [{"name": "a"}], "columns": [{"name": "b"}],
                  "cells": [[None]]}  # fmt: skip
         (tmp_path / "cells.json").write_text(json.dumps(whole | change), encoding="utf-8")
     assert main(["explore", str(tmp_path), "--no-browser"]) == 2

@@ -115,7 +115,7 @@ function paintElement() {
   const onOff = (name, text) => {
     const tick = make("input", { type: "checkbox" });
     tick.checked = isOn(name);
-    tick.addEventListener("change", () => setOnes({ [name]: tick.checked ? null : false }, error));
+    tick.addEventListener("change", () => setOnes({ [name]: tick.checked ? (original(name) === false ? true : null) : false }, error));
     return make("label", { class: "block" }, tick, ` ${text}`);
   };
   const times = (label, now, low, high, apply) => {

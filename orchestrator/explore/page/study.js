@@ -86,6 +86,7 @@ function beginStudy() {
   $("tab-study").hidden = false;
   $("study-title").textContent = s.title;
   $("study-scale").textContent = `Orange: below 5 %; blue: above, full at ${FULL} %; U: unstable; –: nothing below the limit of the search; ?, grey: not judged.${s.left_out ? ` ${s.left_out} rows are not shown: they are better than these.` : ""}`;
+  if (s.rows[0].values === null) $("study-said").textContent = "These cells are systems of the study's own; none opens as a live case.";
   if (!location.hash) state.tab = "study";
   const moved = Object.keys(s.columns[0]?.values ?? {});
   if (s.followed && moved.length < 4) for (const name of moved) if (!state.controls.includes(name)) state.controls.push(name);
