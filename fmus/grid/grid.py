@@ -5,19 +5,7 @@ that the devices inject: the FMU has direct feed-through there, and declares it.
 
 from math import pi
 
-from fmus.grid.elements import (
-    Branch,
-    Bus,
-    add_stray,
-    branch_equation,
-    declare_bus,
-    declare_injection,
-    declare_line,
-    declare_load,
-    declare_network_outputs,
-    declare_port,
-    declare_shunt,
-)
+from fmus.grid import elements
 from fmus.grid.fault import declare_fault, declare_fault_outputs
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Network
@@ -33,33 +21,33 @@ def grid(network: Network) -> Model:
     m = ModelBuilder(network.name, f"EMT network {network.name} in the frame turning at ω_b", kind="network")
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     omega_b = 2 * pi * f_n
-    buses = {bus: declare_bus(m, bus) for bus in network.buses}
-    fed = [declare_port(m, port, buses) for port in network.ports]
-    lines = [declare_line(m, line, buses) for line in network.lines]
+    buses = {bus: elements.declare_bus(m, bus) for bus in network.buses}
+    fed = [elements.declare_port(m, port, buses) for port in network.ports]
+    lines = [elements.declare_line(m, line, buses) for line in network.lines]
     transformers = [declare_transformer(m, data, buses) for data in network.transformers]
-    others: list[Branch] = []
+    others: list[elements.Branch] = []
     following: list[FollowingLoad] = []
     for load in network.loads:
-        declared = declare_load(m, load, buses, alone=network.hangs_on(load))
+        declared = elements.declare_load(m, load, buses, alone=network.hangs_on(load))
         others += declared.branches
         if load.follows:
             following.append(declare_following_load(m, load, declared, buses, omega_b))
     for shunt in network.shunts:
-        others += declare_shunt(m, shunt, buses)
-    add_stray(m, network, buses)
+        others += elements.declare_shunt(m, shunt, buses)
+    elements.add_stray(m, network, buses)
     for name in network.injections:
-        declare_injection(m, name, buses)
+        elements.declare_injection(m, name, buses)
     faults = [declare_fault(m, bus, buses) for bus in network.faults]
     others += faults
     for name, bus in buses.items():
         _bus_voltage(m, name, bus, omega_b, network)
     for branch in (*lines, *others):
-        branch_equation(m, branch, buses, omega_b)
+        elements.branch_equation(m, branch, buses, omega_b)
     for transformer in transformers:
         transformer_equations(m, transformer, buses, omega_b)
     for following_load in following:
         following_load_equations(m, following_load)
-    declare_network_outputs(m, network, buses, [line.drawn for line in lines], fed)
+    elements.declare_network_outputs(m, network, buses, [line.drawn for line in lines], fed)
     for transformer in transformers:
         declare_winding_powers(m, transformer, buses)
     for fault in faults:
@@ -71,7 +59,7 @@ def grid(network: Network) -> Model:
     return m.build(integrator="sdirk" if stiff else "runge_kutta")
 
 
-def _bus_voltage(m: ModelBuilder, name: str, bus: Bus, omega_b: Expr, network: Network) -> None:
+def _bus_voltage(m: ModelBuilder, name: str, bus: elements.Bus, omega_b: Expr, network: Network) -> None:
     """(B/ω_b)·dv/dt = Σ i − (G + jB)·v, or v = Σ i / G where there is no capacitance."""
     dynamic = network.has_capacitance(name)
     if network.loads_decide(name):

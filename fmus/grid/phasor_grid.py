@@ -12,18 +12,7 @@ from functools import partial
 from math import pi
 from typing import Literal
 
-from fmus.grid.elements import (
-    Branch,
-    Bus,
-    LineValues,
-    add_stray,
-    declare_bus,
-    declare_injection,
-    declare_line_values,
-    declare_load,
-    declare_network_outputs,
-    declare_shunt,
-)
+from fmus.grid import elements
 from fmus.grid.fault import declare_fault_outputs, fault_admittance
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Line, Network, Port
@@ -71,19 +60,19 @@ def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) ->
     omega_b: Expr | None = None
     if any(load.follows and (load.k_pf or load.k_qf) for load in network.loads):
         omega_b = 2 * pi * m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
-    buses = {bus: declare_bus(m, bus) for bus in network.buses}
+    buses = {bus: elements.declare_bus(m, bus) for bus in network.buses}
     Y: Admittances = {bus: {} for bus in buses}
     sources = [_declare_source(m, port, buses, Y) for port in network.ports]
-    lines = [declare_line_values(m, line, buses) for line in network.lines]
+    lines = [elements.declare_line_values(m, line, buses) for line in network.lines]
     for load in network.loads:
-        declared = declare_load(m, load, buses, alone=False, inductor=_susceptance)
+        declared = elements.declare_load(m, load, buses, alone=False, inductor=_susceptance)
         if load.follows:
             following.append(declare_following_load(m, load, declared, buses, omega_b, phasors=True))
     for shunt in network.shunts:
-        declare_shunt(m, shunt, buses, inductor=_susceptance)
-    add_stray(m, network, buses)
+        elements.declare_shunt(m, shunt, buses, inductor=_susceptance)
+    elements.add_stray(m, network, buses)
     for name in network.injections:
-        declare_injection(m, name, buses)
+        elements.declare_injection(m, name, buses)
     for name, bus in buses.items():
         least = LEAST_CONDUCTANCE if network.floats(name) else 0.0
         add_admittance(Y, name, name, Phasor(bus.G + least, bus.B) if least else Phasor(bus.G, bus.B))
@@ -100,7 +89,7 @@ def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) ->
         following_load_equations(m, following_load)
     drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
     fed = [(e - buses[port.bus].v) * y for port, (e, y) in zip(network.ports, sources, strict=True)]
-    declare_network_outputs(m, network, buses, drawn, fed)
+    elements.declare_network_outputs(m, network, buses, drawn, fed)
     for transformer in transformers:
         declare_winding_powers(m, transformer, buses)
     for name, y in faults.items():
@@ -112,7 +101,11 @@ setattr(phasor_grid, SKETCH, _sketch)
 
 
 def _settle(
-    m: ModelBuilder, network: Network, buses: dict[str, Bus], Y: Admittances, solution: Literal["code", "data", "none"]
+    m: ModelBuilder,
+    network: Network,
+    buses: dict[str, elements.Bus],
+    Y: Admittances,
+    solution: Literal["code", "data", "none"],
 ) -> None:
     """Give every bus its voltage."""
     currents = {name: bus.injected for name, bus in buses.items()}
@@ -125,7 +118,9 @@ def _settle(
         bus.v = voltages.get(name, bus.v_0)
 
 
-def _declare_source(m: ModelBuilder, port: Port, buses: dict[str, Bus], Y: Admittances) -> tuple[Phasor, Phasor]:
+def _declare_source(
+    m: ModelBuilder, port: Port, buses: dict[str, elements.Bus], Y: Admittances
+) -> tuple[Phasor, Phasor]:
     """Declare a device's emf and admittance, add them to its bus, and return both."""
     with m.scope(port.name):
         e = Phasor(
@@ -142,13 +137,13 @@ def _declare_source(m: ModelBuilder, port: Port, buses: dict[str, Bus], Y: Admit
     return e, y
 
 
-def _susceptance(m: ModelBuilder, bus: Bus, name: str, X: Expr, scale: Scalar) -> list[Branch]:
+def _susceptance(m: ModelBuilder, bus: elements.Bus, name: str, X: Expr, scale: Scalar) -> list[elements.Branch]:
     """An inductor between a bus and earth, as an admittance."""
     bus.B -= scale / X
     return []
 
 
-def _add_line(Y: Admittances, line: Line, values: LineValues) -> None:
+def _add_line(Y: Admittances, line: Line, values: elements.LineValues) -> None:
     """Series admittance y behind the ratio t: y/|t|² and y on the diagonal, −y/t* and −y/t beside it."""
     y = _series(values)
     t = Phasor(1.0, 0.0) if values.ratio is None else values.ratio
@@ -158,7 +153,7 @@ def _add_line(Y: Admittances, line: Line, values: LineValues) -> None:
     add_admittance(Y, line.to_bus, line.from_bus, -y / t)
 
 
-def _drawn(line: Line, values: LineValues, buses: dict[str, Bus]) -> Phasor:
+def _drawn(line: Line, values: elements.LineValues, buses: dict[str, elements.Bus]) -> Phasor:
     """Current of a line at its from bus, without its charging."""
     v_from, v_to = buses[line.from_bus].v, buses[line.to_bus].v
     if values.ratio is None:
@@ -166,6 +161,6 @@ def _drawn(line: Line, values: LineValues, buses: dict[str, Bus]) -> Phasor:
     return (v_from / values.ratio - v_to) * _series(values) / values.ratio.conjugate()
 
 
-def _series(values: LineValues) -> Phasor:
+def _series(values: elements.LineValues) -> Phasor:
     X = values.X if values.X_C is None else values.X - values.X_C
     return Phasor(1.0, 0.0) / Phasor(values.R, X) * values.connected

@@ -5,16 +5,7 @@ each output and derivative depends on, so that a master can order its calls and 
 
 from xml.etree.ElementTree import Element, SubElement
 
-from fmus.toolchain.description_common import (
-    COMPONENT,
-    TOOL,
-    component_element,
-    described_variables,
-    root_element,
-    text_of,
-    unknowns,
-    write_definitions,
-)
+from fmus.toolchain import description_common as common
 from fmus.toolchain.model import Model
 
 _GROUPS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "InitialUnknown": "InitialUnknowns"}
@@ -32,7 +23,7 @@ def model_description(
     ``native``: Whether the FMU runs without Python; a native one gives directional derivatives too.
     ``listed``: Whether dependencies are listed; without them the text is there at once.
     ``source_file``: Name of the C file in the folder ``sources``; empty without one."""
-    root = root_element(model, "2.0", {"guid": guid}, tool)
+    root = common.root_element(model, "2.0", {"guid": guid}, tool)
     root.set("numberOfEventIndicators", "0")
     kind = SubElement(
         root, "CoSimulation", modelIdentifier=identifier, needsExecutionTool="false" if native else "true",
@@ -42,13 +33,14 @@ def model_description(
     )  # fmt: skip
     if source_file:
         SubElement(SubElement(kind, "SourceFiles"), "File", name=source_file)
-    write_definitions(root, model, "fmi2")
+    common.write_definitions(root, model, "fmi2")
     annotations = SubElement(root, "VendorAnnotations")
-    SubElement(SubElement(annotations, "Tool", name=TOOL), "ContinuousStates", settable="true")
-    SubElement(annotations, "Tool", name=COMPONENT).append(component_element(model))  # a Tool has one element
+    SubElement(SubElement(annotations, "Tool", name=common.TOOL), "ContinuousStates", settable="true")
+    # a Tool has one element
+    SubElement(annotations, "Tool", name=common.COMPONENT).append(common.component_element(model))
     _variables(root, model)
     _structure(root, model, listed=listed)
-    return text_of(root)
+    return common.text_of(root)
 
 
 def with_guid(text: str, guid: str, attribute: str = "guid") -> bytes:
@@ -63,7 +55,7 @@ def _index(reference: int) -> str:
 
 def _variables(root: Element, model: Model) -> None:
     variables = SubElement(root, "ModelVariables")
-    for variable in described_variables(model):
+    for variable in common.described_variables(model):
         state = variable.derivative_of
         more = {} if state is None else {"derivative": _index(state)}
         element = SubElement(variables, "ScalarVariable", dict(variable.attributes))
@@ -73,7 +65,7 @@ def _variables(root: Element, model: Model) -> None:
 def _structure(root: Element, model: Model, *, listed: bool) -> None:
     """Write outputs, derivatives and initial unknowns, each with the variables that it depends on."""
     element = SubElement(root, "ModelStructure")
-    for kind, group in unknowns(model, listed=listed).items():
+    for kind, group in common.unknowns(model, listed=listed).items():
         if group or kind == "InitialUnknown":
             parent = SubElement(element, _GROUPS[kind])
             for unknown in group:

@@ -2,16 +2,7 @@
 
 from xml.etree.ElementTree import Element, SubElement
 
-from fmus.toolchain.description_common import (
-    COMPONENT,
-    TOOL,
-    component_element,
-    described_variables,
-    root_element,
-    text_of,
-    unknowns,
-    write_definitions,
-)
+from fmus.toolchain import description_common as common
 from fmus.toolchain.model import Model
 
 _TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}  # FMI 2.0's name of a type → FMI 3.0's
@@ -22,19 +13,19 @@ def model_description_3(model: Model, token: str, identifier: str, tool: str) ->
 
     ``token``, ``identifier``: As in the standard; the identifier also names the binaries.
     ``tool``: Name and version for ``generationTool``."""
-    root = root_element(model, "3.0", {"instantiationToken": token}, tool)
+    root = common.root_element(model, "3.0", {"instantiationToken": token}, tool)
     SubElement(
         root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUState="true", canSerializeFMUState="true", providesDirectionalDerivatives="true",
         providesAdjointDerivatives="true",
     )  # fmt: skip
-    write_definitions(root, model, "fmi3")
+    common.write_definitions(root, model, "fmi3")
     _variables(root, model)
     _structure(root, model)
     annotations = SubElement(root, "Annotations")
-    SubElement(annotations, "Annotation", type=f"{TOOL}.ContinuousStates").text = "settable"
-    SubElement(annotations, "Annotation", type=COMPONENT).append(component_element(model))
-    return text_of(root)
+    SubElement(annotations, "Annotation", type=f"{common.TOOL}.ContinuousStates").text = "settable"
+    SubElement(annotations, "Annotation", type=common.COMPONENT).append(common.component_element(model))
+    return common.text_of(root)
 
 
 def build_description(identifier: str, source_file: str) -> bytes:
@@ -42,12 +33,12 @@ def build_description(identifier: str, source_file: str) -> bytes:
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     SubElement(SubElement(configuration, "SourceFileSet", language="C11"), "SourceFile", name=source_file)
-    return text_of(root)
+    return common.text_of(root)
 
 
 def _variables(root: Element, model: Model) -> None:
     variables = SubElement(root, "ModelVariables")
-    for variable in described_variables(model):
+    for variable in common.described_variables(model):
         state = variable.derivative_of
         more = {} if state is None else {"derivative": str(state)}
         SubElement(variables, _TYPES[variable.kind], {**variable.attributes, **variable.own, **more})
@@ -59,7 +50,7 @@ def _variables(root: Element, model: Model) -> None:
 
 def _structure(root: Element, model: Model) -> None:
     element = SubElement(root, "ModelStructure")
-    for kind, group in unknowns(model).items():
+    for kind, group in common.unknowns(model).items():
         for unknown in group:
             given = {} if unknown.known is None else {"dependencies": " ".join(map(str, unknown.known))}
             SubElement(element, kind, {"valueReference": str(unknown.reference), **given})

@@ -6,25 +6,16 @@ from fmus.toolchain.dependencies import structure
 from fmus.toolchain.description_common import TOOL, text_of, write_log_categories
 from fmus.toolchain.model import Model
 from fmus.toolchain.variables import UNITS, Input, Output
+from fmus.vendor_dll import source
 from fmus.vendor_dll.interface import DATA_TYPES, DllInterface, DllParameter
-from fmus.vendor_dll.source import (
-    CIRCUIT_INPUT,
-    CIRCUIT_PARAMETER,
-    CONSTANT_INPUT,
-    INITIAL,
-    INPUT,
-    OUTPUT,
-    PARAMETER,
-    HostVariable,
-)
 from fmus.vendor_dll.state_trial import Trial
 
 _LONGEST_WHY = 500
 
 
 def dll_description(
-    interface: DllInterface, trial: Trial, variables: tuple[HostVariable, ...], guid: str, identifier: str, tool: str,
-    circuit: Model | None = None,
+    interface: DllInterface, trial: Trial, variables: tuple[source.HostVariable, ...], guid: str, identifier: str,
+    tool: str, circuit: Model | None = None,
 ) -> bytes:  # fmt: skip
     """The file's text.
 
@@ -82,10 +73,10 @@ def _plain(words: str) -> str:
     return "".join(c if c.isprintable() else " " for c in words)[:_LONGEST_WHY]
 
 
-def _dependencies(variables: tuple[HostVariable, ...], circuit: Model | None) -> dict[int, list[int]]:
+def _dependencies(variables: tuple[source.HostVariable, ...], circuit: Model | None) -> dict[int, list[int]]:
     """Index of each output → indices of the inputs it follows at once; the DLL's are held since the last sample."""
     known: dict[int, list[int]] = {
-        place: [] for place, v in enumerate(variables, start=1) if v.role == OUTPUT and not v.local
+        place: [] for place, v in enumerate(variables, start=1) if v.role == source.OUTPUT and not v.local
     }
     if circuit is None:
         return known
@@ -96,19 +87,19 @@ def _dependencies(variables: tuple[HostVariable, ...], circuit: Model | None) ->
             continue
         follows = [names[k] for k in unknown.known or () if isinstance(circuit.variables[k], Input)]
         known[index[names[unknown.reference]]] = [
-            index[name] for name in follows if variables[index[name] - 1].role == CIRCUIT_INPUT
+            index[name] for name in follows if variables[index[name] - 1].role == source.CIRCUIT_INPUT
         ]
     return known
 
 
-def _write(listed: Element, reference: int, variable: HostVariable) -> None:
+def _write(listed: Element, reference: int, variable: source.HostVariable) -> None:
     real = variable.kind == "Real"
     own = {"unit": variable.unit} if variable.unit and real else {}
     start = repr(variable.start) if real else str(int(variable.start))
     if variable.kind == "Boolean":
         start = "true" if variable.start else "false"
     match variable.role:
-        case r if r in (PARAMETER, CIRCUIT_PARAMETER):
+        case r if r in (source.PARAMETER, source.CIRCUIT_PARAMETER):
             assert variable.parameter is not None
             of = {"causality": "parameter", "variability": "fixed" if variable.fixed else "tunable"}
             whole = DATA_TYPES[variable.data_type].kind == "Integer" and isinstance(variable.parameter, DllParameter)
@@ -116,16 +107,16 @@ def _write(listed: Element, reference: int, variable: HostVariable) -> None:
                 if bound is not None:
                     own[name] = str(int(bound)) if whole else repr(float(bound))
             own["start"] = start
-        case r if r == INITIAL:
+        case r if r == source.INITIAL:
             of = {"causality": "parameter", "variability": "fixed"}
             own["start"] = start
-        case r if r == CONSTANT_INPUT:
+        case r if r == source.CONSTANT_INPUT:
             of = {"causality": "parameter", "variability": "tunable"}
             own["start"] = start
-        case r if r in (INPUT, CIRCUIT_INPUT):
+        case r if r in (source.INPUT, source.CIRCUIT_INPUT):
             of = {"causality": "input", "variability": "continuous" if real else "discrete"}
             own["start"] = start
-        case r if not variable.local and (r == OUTPUT or isinstance(variable.declared, Output)):
+        case r if not variable.local and (r == source.OUTPUT or isinstance(variable.declared, Output)):
             of = {"causality": "output", "variability": "continuous" if real else "discrete"}
         case _:
             of = {"causality": "local", "variability": "discrete"}

@@ -12,34 +12,14 @@ from time import monotonic
 from typing import Any
 
 from fmus.toolchain.removal import remove_tree
+from orchestrator import errors
+from orchestrator.acceptance.checks import base
 from orchestrator.acceptance.checks.all import CHECKS, ORDER
-from orchestrator.acceptance.checks.base import (
-    Check,
-    CheckResult,
-    Verdict,
-    Whose,
-    failed,
-    not_applicable,
-    not_supported,
-    passed,
-    remarked,
-)
 from orchestrator.acceptance.checks.running import RUN_FOR
 from orchestrator.acceptance.checks.subject import Subject, Use
 from orchestrator.acceptance.process import FmuProcess, ProcessEndedError
 from orchestrator.binding.binding import bind, read_table
 from orchestrator.binding.misfits import likely_cause
-from orchestrator.errors import (
-    BindingError,
-    ComponentError,
-    CosimError,
-    EndedError,
-    ErrorKind,
-    FmuFileError,
-    HostileFmuError,
-    InputError,
-    UnsupportedFmuError,
-)
 from orchestrator.fmi.archive import extract, listed_twice
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
@@ -56,15 +36,15 @@ _PATIENCE = 10  # A check may take this many times the limit for one call
 class AcceptanceReport:
     fmu: Path
     binding: Path | None
-    results: list[CheckResult] = field(default_factory=list)
+    results: list[base.CheckResult] = field(default_factory=list)
     # what kept the FMU's process from the rest of the machine; empty where it was not started
     protections: tuple[Protection, ...] = ()
     used_as: str = ""  # component, scenario and operating point of the case, in words
     seed: int = 0  # of the dips, jumps and operating points that were drawn at random
 
     @property
-    def failures(self) -> list[CheckResult]:
-        return [r for r in self.results if r.verdict is Verdict.FAIL]
+    def failures(self) -> list[base.CheckResult]:
+        return [r for r in self.results if r.verdict is base.Verdict.FAIL]
 
     @property
     def faults(self) -> list[str]:
@@ -73,7 +53,7 @@ class AcceptanceReport:
     @property
     def not_supported(self) -> list[str]:
         """Names of what this program or machine lacks for this FMU, each once."""
-        return list(dict.fromkeys(r.fault for r in self.results if r.verdict is Verdict.NOT_SUPPORTED))
+        return list(dict.fromkeys(r.fault for r in self.results if r.verdict is base.Verdict.NOT_SUPPORTED))
 
     @property
     def not_judged(self) -> list[str]:
@@ -83,7 +63,7 @@ class AcceptanceReport:
     @property
     def binding_fails(self) -> bool:
         """Whether the binding is what failed, so that nothing is known of the FMU behind it."""
-        return any(r.whose is Whose.BINDING for r in self.failures)
+        return any(r.whose is base.Whose.BINDING for r in self.failures)
 
     @property
     def trusted(self) -> bool:
@@ -128,13 +108,15 @@ def check_fmu(
     unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
     if unknown:
         known = ", ".join([*FILE_CHECKS, *CHECKS])
-        raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
+        raise errors.InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
     if "binding" in only and binding is None:
-        raise InputError("the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)")
+        raise errors.InputError(
+            "the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)"
+        )
     if fmu.is_dir():
-        raise InputError(f"{fmu}: it is a folder; give the path of an .fmu")
+        raise errors.InputError(f"{fmu}: it is a folder; give the path of an .fmu")
     if not fmu.is_file():
-        raise InputError(f"{fmu}: there is no such file; give the path of an .fmu")
+        raise errors.InputError(f"{fmu}: there is no such file; give the path of an .fmu")
     if binding is not None:
         read_table(binding)  # what is wrong with its form is not the FMU's fault
     seed = int(hashlib.sha256(fmu.read_bytes()).hexdigest()[:6], 16) if seed is None else seed
@@ -142,12 +124,12 @@ def check_fmu(
     try:
         described = read_description(fmu)
         directory = extract(fmu)
-    except UnsupportedFmuError as error:
-        report.results.append(not_supported("archive", error))
+    except errors.UnsupportedFmuError as error:
+        report.results.append(base.not_supported("archive", error))
         return report
-    except FmuFileError as error:
-        fault = error.fault if isinstance(error, HostileFmuError) else "unreadable"
-        report.results.append(failed("archive", fault, str(error)))
+    except errors.FmuFileError as error:
+        fault = error.fault if isinstance(error, errors.HostileFmuError) else "unreadable"
+        report.results.append(base.failed("archive", fault, str(error)))
         return report
     try:
         report.results.append(_unpacked(fmu))
@@ -155,7 +137,7 @@ def check_fmu(
         wanted = [name for name in only if name in CHECKS] if only else list(CHECKS)
         if binding is not None and bound is None:
             # Without its port the FMU is asked in vain; what is wrong stands in a file that the user can mend at once.
-            report.results += [not_applicable(name, "because the binding does not fit") for name in wanted]
+            report.results += [base.not_applicable(name, "because the binding does not fit") for name in wanted]
             return report
         if not wanted:
             return report
@@ -172,12 +154,12 @@ def check_fmu(
     return report
 
 
-def _unpacked(fmu: Path) -> CheckResult:
+def _unpacked(fmu: Path) -> base.CheckResult:
     twice = listed_twice(fmu)
     if not twice:
-        return passed("archive", "unpacked within limits, and read")
+        return base.passed("archive", "unpacked within limits, and read")
     more = f" and {len(twice) - 3} more" if len(twice) > 3 else ""
-    return remarked(
+    return base.remarked(
         "archive",
         f"it lists {', '.join(twice[:3])}{more} twice, with equal bytes",
         "does no harm; other tools may refuse the file, tell whoever packed it",
@@ -188,19 +170,19 @@ def _bound(report: AcceptanceReport, described: FmuDescription, binding: Path) -
     """The FMU behind its binding; None, with a failure in the report, where that does not fit."""
     try:
         bound = bind(described, binding)
-    except BindingError as error:
-        differ = any(p.kind is ErrorKind.UNITS for p in error.problems)
+    except errors.BindingError as error:
+        differ = any(p.kind is errors.ErrorKind.UNITS for p in error.problems)
         says = "; ".join(map(str, error.problems))
-        result = failed("binding", "wrong units" if differ else "binding does not fit", f"{binding.name}: {says}")
+        result = base.failed("binding", "wrong units" if differ else "binding does not fit", f"{binding.name}: {says}")
         remedy = (
             "give the unit that the FMU declares, or have modelDescription.xml corrected" if differ else result.remedy
         )
-        report.results.append(replace(result, remedy=remedy, whose=Whose.BINDING))
+        report.results.append(replace(result, remedy=remedy, whose=base.Whose.BINDING))
         return None
     unlike = [f"the binding has {text}" for text in bound.unlike_delivered().values()]
     report.results.append(
-        remarked("binding", "; ".join(unlike), "give [rating] that of one unit as delivered") if unlike
-        else passed("binding", "all variables are there, with the units that it says")
+        base.remarked("binding", "; ".join(unlike), "give [rating] that of one unit as delivered") if unlike
+        else base.passed("binding", "all variables are there, with the units that it says")
     )  # fmt: skip
     return bound
 
@@ -236,10 +218,10 @@ class _Runner:
             results.append(self._with_whom(result))
             self._asked.append(name)
             if name == "runs" and (because := self._too_bad(result)):
-                results += [not_applicable(later, because) for later in names[place + 1 :]]
+                results += [base.not_applicable(later, because) for later in names[place + 1 :]]
                 return
 
-    def _with_whom(self, result: CheckResult) -> CheckResult:
+    def _with_whom(self, result: base.CheckResult) -> base.CheckResult:
         """A crash, with the checks before it where it does not come without them.
 
         A call that damages the FMU's memory is often survived; the process then ends in a later one."""
@@ -252,55 +234,57 @@ class _Runner:
         says = f"not so in a new process: what came before it, {', '.join(before[-_LAST:])}, damaged the FMU's memory"
         return replace(result, evidence=f"{result.evidence}; {says}")
 
-    def _too_bad(self, result: CheckResult) -> str:
+    def _too_bad(self, result: base.CheckResult) -> str:
         """Why nothing else is asked of an FMU that ran so; "" where there is more to learn."""
         if self._process is not None and not self._process.alive:
             return f"because it ended its process in 'runs' ({result.fault})"
         return "because it ends before it shows anything" if result.fault == "ends at once" else ""
 
-    def _answer(self, check: Check) -> CheckResult:
+    def _answer(self, check: base.Check) -> base.CheckResult:
         """The check's result; an FMU that refuses what every FMU must be able to do is at fault."""
         faulty = [r.check for r in self._report.results if r.fault]
         asked_of_the_file = ORDER.index(check.name) <= ORDER.index("loads")
         missing = [name for name in ("loads", *check.needs) if name in faulty and not asked_of_the_file]
         if missing == ["loads"] and self._report.not_supported:
-            return not_applicable(check.name, "because the FMU cannot run here")
+            return base.not_applicable(check.name, "because the FMU cannot run here")
         if missing:
-            return not_applicable(check.name, f"because it failed in {missing[0]!r}, without which this has no meaning")
+            return base.not_applicable(
+                check.name, f"because it failed in {missing[0]!r}, without which this has no meaning"
+            )
         self._subject.doing = ""
         try:
             return check.run(self._subject)
         except ProcessEndedError as error:
             doing = self._subject.doing
-            return failed(check.name, error.fault, f"{doing}: {error.how}" if doing else error.how)
-        except EndedError as error:
+            return base.failed(check.name, error.fault, f"{doing}: {error.how}" if doing else error.how)
+        except errors.EndedError as error:
             return _ended(check.name, self._subject, error)
-        except UnsupportedFmuError as error:
-            return not_supported(check.name, error)
-        except ComponentError as error:
-            return failed(check.name, _REFUSED.get(error.call, "refused call"), str(error))
-        except InputError:
+        except errors.UnsupportedFmuError as error:
+            return base.not_supported(check.name, error)
+        except errors.ComponentError as error:
+            return base.failed(check.name, _REFUSED.get(error.call, "refused call"), str(error))
+        except errors.InputError:
             raise
-        except CosimError as error:
-            return failed(check.name, "refused call", str(error))
+        except errors.CosimError as error:
+            return base.failed(check.name, "refused call", str(error))
         except Exception as error:  # a check that fails by itself must not hide the others, nor count as passed
             where = traceback.extract_tb(error.__traceback__)[-1]
             says = f"the check failed by itself: {error!r} in {Path(where.filename).name}, line {where.lineno}"
-            return failed(check.name, "no verdict", says)
+            return base.failed(check.name, "no verdict", says)
 
     def close(self) -> None:
         if self._process is not None:
             self._process.close()
 
 
-def _ended(name: str, subject: Subject, error: EndedError) -> CheckResult:
+def _ended(name: str, subject: Subject, error: errors.EndedError) -> base.CheckResult:
     """An orderly end is no fault; one that comes earlier than before is worth a word."""
     if subject.ends is None or error.ended_at < subject.ends * (1 - 1e-9):
         says = f"it ended its simulation by itself at t = {error.ended_at:.6g} s"
-        return remarked(
+        return base.remarked(
             name, f"{says}, earlier than otherwise", "no error, but this could not be checked; ask why it ends"
         )
-    return not_applicable(name, f"because it takes longer than the FMU runs, which is {error.ended_at:.6g} s")
+    return base.not_applicable(name, f"because it takes longer than the FMU runs, which is {error.ended_at:.6g} s")
 
 
 _REFUSED = {

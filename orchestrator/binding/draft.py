@@ -5,17 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from orchestrator.binding.hints import (
-    AMPERES,
-    START_TEXTS,
-    VOLTS,
-    WATTS,
-    is_drawn,
-    kind_of_current,
-    kind_of_voltage,
-    likely_unit,
-    undeclared,
-)
+from orchestrator.binding import hints
 from orchestrator.binding.tables import REQUIRED
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import START
@@ -60,9 +50,9 @@ def draft_binding(fmu: FmuDescription, beside: Path | None = None) -> str:
 
     Returns TOML. Lines with ``GUESS`` are to be confirmed; values that begin with ``REQUIRED`` are to be filled in, and
     `bind` accepts none of them."""
-    voltage = _find(fmu, "input", _VOLTAGE, VOLTS, ("rectangular", "dq", "polar", "abc"))
-    current = _find(fmu, "output", _CURRENT, AMPERES, ("rectangular", "dq", "polar", "abc"))
-    current = current or _find(fmu, "output", _POWER, WATTS, ("power",))
+    voltage = _find(fmu, "input", _VOLTAGE, hints.VOLTS, ("rectangular", "dq", "polar", "abc"))
+    current = _find(fmu, "output", _CURRENT, hints.AMPERES, ("rectangular", "dq", "polar", "abc"))
+    current = current or _find(fmu, "output", _POWER, hints.WATTS, ("power",))
     starts = {name: _start(fmu, name, taken=()) for name in START}
     taken = {v.name for guess in (voltage, current) if guess for v in guess.variables}
     file = fmu.path.name if beside is None else _relative(fmu.path, beside)
@@ -115,12 +105,12 @@ def _find(
         v
         for v in fmu.variables.values()
         if v.causality == causality and v.type == "Real" and (names.search(_last(v.name)) or names.search(v.description)
-                                                             or likely_unit(v) in units)
+                                                             or hints.likely_unit(v) in units)
     ]  # fmt: skip
     best: tuple[int, Guess] | None = None
     for form in forms:
         for found in _matches(candidates, _PARTS[form], loose=form == "power"):
-            score = sum(2 * bool(names.search(_last(v.name))) + (likely_unit(v) in units) for v in found) + len(found)
+            score = sum(1 + 2 * bool(names.search(_last(v.name))) + (hints.likely_unit(v) in units) for v in found)
             if best is None or score > best[0]:
                 best = score, Guess(form, found)
     return None if best is None else best[1]
@@ -158,7 +148,7 @@ def _start(fmu: FmuDescription, name: str, taken: Sequence[str]) -> VariableInfo
         close = [v for v in known if v.causality == causality and pattern.search(_last(v.name))]
         if exact or close:
             return (exact or close)[0]
-    text = START_TEXTS.get(name)
+    text = hints.START_TEXTS.get(name)
     told = [v for v in known if v.causality == "parameter" and text is not None and text.search(v.description)]
     return told[0] if told else None
 
@@ -183,11 +173,11 @@ def _rated_voltage(fmu: FmuDescription, ports: Iterable[Guess | None]) -> str:
     """V_n from a parameter of that name. Without such a parameter the user must fill it in if the port is in volts or
     amperes."""
     known = [v for v in fmu.variables.values() if v.causality == "parameter" and v.type == "Real" and v.start]
-    named = next((v for v in known if v.unit in VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None)
+    named = next((v for v in known if v.unit in hints.VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None)
     if named is not None:
         return f'V_n = "{named.start_number:g} {named.unit}"  # GUESS: start value of {_comment(named.name)}'
-    units = {likely_unit(v) for guess in ports if guess is not None for v in guess.variables}
-    if units & {*VOLTS, *AMPERES}:
+    units = {hints.likely_unit(v) for guess in ports if guess is not None for v in guess.variables}
+    if units & {*hints.VOLTS, *hints.AMPERES}:
         return f'V_n = "{REQUIRED}: rated line-to-line voltage at the port, such as 690 V"'
     return '# V_n = "690 V"  # rated line-to-line voltage at the port; needed where anything is in V or A'
 
@@ -204,7 +194,7 @@ def _phasor(table: str, guess: Guess | None, names: Sequence[str]) -> list[str]:
         lines += [f"# {v.name} [{v.unit or 'no unit'}]: {_comment(v.description)}" for v in guess.variables]
     lines += _units(table, guess)
     if table == "current":
-        drawn = guess is not None and any(map(is_drawn, guess.variables))
+        drawn = guess is not None and any(map(hints.is_drawn, guess.variables))
         way, other = ("into the converter", "into the grid") if drawn else ("into the grid", "into the converter")
         lines.append(f'direction = "{way}"  # GUESS{": from the description" * drawn}; or "{other}"')
     lines.append("# frame_angle = \"-90 deg\"  # by which the FMU's frame leads the network's")
@@ -216,9 +206,9 @@ def _units(table: str, guess: Guess | None) -> list[str]:
         kinds = "line-to-line rms, phase rms or phase peak" if table == "voltage" else "rms or peak"
         asked = [f'unit = "{REQUIRED}: pu, V, kV, A, kA, MW…"', f'# value = "…"  # of what is in V or A: {kinds}']
         return [*asked, 'base = "S_n"  # GUESS; or such as "100 MVA"'] if table == "current" else asked
-    first = likely_unit(guess.variables[0])
+    first = hints.likely_unit(guess.variables[0])
     lines = _unit(guess.variables[0], "pu, V, kV, A, kA, MW…")
-    if first in (*VOLTS, *AMPERES) and guess.form != "abc":
+    if first in (*hints.VOLTS, *hints.AMPERES) and guess.form != "abc":
         lines += _value(guess.variables, first)
     elif not first and guess.form != "abc":
         lines.append('# value = "…"  # of what is in V: line-to-line rms, phase rms or phase peak; in A: rms or peak')
@@ -235,19 +225,19 @@ def _units(table: str, guess: Guess | None) -> list[str]:
 
 
 def _unit(info: VariableInfo, such_as: str) -> list[str]:
-    if not undeclared(info):
+    if not hints.undeclared(info):
         return []
-    unit = likely_unit(info)
+    unit = hints.likely_unit(info)
     return [f'unit = "{unit}"  # GUESS: from the description' if unit else f'unit = "{REQUIRED}: {such_as}"']
 
 
 def _value(variables: Sequence[VariableInfo], unit: str) -> list[str]:
     """Which value of an alternating quantity in V or A is meant."""
     text = " ".join(v.description for v in variables)
-    kind = kind_of_voltage(text) if unit in VOLTS else kind_of_current(text)
+    kind = hints.kind_of_voltage(text) if unit in hints.VOLTS else hints.kind_of_current(text)
     if kind:
         return [f'value = "{kind}"  # GUESS: from the description']
-    kinds = "line-to-line rms, phase rms or phase peak" if unit in VOLTS else "rms or peak"
+    kinds = "line-to-line rms, phase rms or phase peak" if unit in hints.VOLTS else "rms or peak"
     return [f'value = "{REQUIRED}: {kinds}"']
 
 
@@ -259,9 +249,9 @@ def _starts(starts: dict[str, VariableInfo | None]) -> list[str]:
             continue
         lines += [f"[start.{name}]", f"variable = {_quoted(info.name)}  # GUESS: {_comment(info.description)}"]
         lines += _unit(info, "the FMU declares none")
-        if name == "v_0" and likely_unit(info) in VOLTS:
-            lines += _value([info], likely_unit(info))
-        if name in ("P_0", "Q_0") and is_drawn(info):
+        if name == "v_0" and hints.likely_unit(info) in hints.VOLTS:
+            lines += _value([info], hints.likely_unit(info))
+        if name in ("P_0", "Q_0") and hints.is_drawn(info):
             lines.append("sign = -1  # GUESS: from the description")
     return lines
 

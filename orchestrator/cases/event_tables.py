@@ -5,32 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 from fmus.grid.names import lines_among
+from orchestrator.cases import schema
 from orchestrator.cases.assignment import convert_value
 from orchestrator.cases.draft import Draft, Findings
 from orchestrator.cases.fault_tables import component_events, note_conflicts, wire_events
 from orchestrator.cases.islands import question_islands
 from orchestrator.cases.names import close_names
-from orchestrator.cases.schema import (
-    BranchChangeTable,
-    BusFaultTable,
-    ComponentFaultTable,
-    EventTable,
-    ForcingTable,
-    GridEventBase,
-    LineReclosingTable,
-    LineTripTable,
-    LoadChangeTable,
-    LoadReconnectionTable,
-    LoadTripTable,
-    ParameterChangeTable,
-    ReferenceChangeTable,
-    SettingEventTable,
-    ShuntReconnectionTable,
-    ShuntTripTable,
-    UnitReconnectionTable,
-    UnitTripTable,
-    WireEventTable,
-)
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import (
     BranchChange,
@@ -69,7 +49,7 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
             if own
             else draft.given.place("events", index)
         )
-        where = table.place if isinstance(table, ForcingTable) and table.place else where
+        where = table.place if isinstance(table, schema.ForcingTable) and table.place else where
         if not _is_point(draft, clock, table.time, "the event", where):
             continue
         if table.time >= stop:
@@ -96,7 +76,7 @@ def other_scenarios(draft: Draft, wanted: Collection[str]) -> Iterator[Problem]:
             where = draft.given.place("scenarios", name, "events", index)
             if table.time >= draft.given.case.solver.stop_time:
                 _note_late(other, table.time, draft.given.case.solver.stop_time, where)
-            if isinstance(table, GridEventBase) and not isinstance(table, UnitTripTable | UnitReconnectionTable):
+            if isinstance(table, schema.GridEventBase) and not isinstance(table, schema.UnitSwitchingTable):
                 for event in _events_of(other, table, where):
                     _checked(other, event, {}, where)
         yield from (
@@ -123,33 +103,33 @@ def _note_late(draft: Draft, time: float, stop: float, where: str) -> None:
         draft.found.questions.append(Problem(where, f"{text} (--stop)"))
 
 
-def _endless(table: EventTable, stop: float) -> Iterator[str]:
+def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
     """Questions about what ends only after the run, or lasts so long that its unit is in doubt."""
-    if isinstance(table, BusFaultTable) and table.duration is not None:
+    if isinstance(table, schema.BusFaultTable) and table.duration is not None:
         seen = f"duration = {table.duration:g} s"
         slip = f"; if {table.duration:g} ms is meant, write '{table.duration:g} ms'" if table.has_bare_duration else ""
         if table.time + table.duration > stop:
             yield f"{seen}: the fault is not cleared before the run stops at {stop:g} s{slip}"
         elif table.has_bare_duration and table.duration > _LONG_FAULT:
             yield f"{seen}, without a unit: a fault is cleared within a second{slip}, else '{table.duration:g} s'"
-    reclose = table.reclose_after if isinstance(table, LineTripTable) else None
+    reclose = table.reclose_after if isinstance(table, schema.LineTripTable) else None
     if reclose is not None and table.time + reclose > stop:
         yield f"reclose_after = {reclose:g} s: the line recloses only after the run, which stops at {stop:g} s"
 
 
-def _all_events_of(draft: Draft, table: EventTable, clock: Clock, stop: float, where: str) -> list[Event]:
-    if isinstance(table, WireEventTable):
+def _all_events_of(draft: Draft, table: schema.EventTable, clock: Clock, stop: float, where: str) -> list[Event]:
+    if isinstance(table, schema.WireEventTable):
         return wire_events(draft, table, clock, stop, where)
-    if isinstance(table, ComponentFaultTable):
+    if isinstance(table, schema.ComponentFaultTable):
         return component_events(draft, table, where)
-    if isinstance(table, ForcingTable):
+    if isinstance(table, schema.ForcingTable):
         return forcing_events(draft, table, clock, stop, where)
     return _events_of(draft, table, where)
 
 
-def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event]:
+def _events_of(draft: Draft, table: schema.SettingEventTable, where: str) -> list[Event]:
     """What a table stands for; its values are still as the file has them. Nothing for a component that is removed."""
-    if isinstance(table, ReferenceChangeTable | ParameterChangeTable):
+    if isinstance(table, schema.ReferenceChangeTable | schema.ParameterChangeTable):
         component = table.component
     elif table.component is None and draft.found.network_failed:
         return []
@@ -158,15 +138,15 @@ def _events_of(draft: Draft, table: SettingEventTable, where: str) -> list[Event
         return []
     else:
         component = table.component or draft.grid or ""
-    concerned = {component, table.unit if isinstance(table, UnitTripTable | UnitReconnectionTable) else component}
+    concerned = {component, table.unit if isinstance(table, schema.UnitSwitchingTable) else component}
     if concerned & set(draft.given.scenario.remove):
         return []
-    if isinstance(table, UnitTripTable | UnitReconnectionTable):
+    if isinstance(table, schema.UnitSwitchingTable):
         return _unit_switching(draft, table, component)
     return _grid_or_reference_events(table, component)
 
 
-def forcing_events(draft: Draft, table: ForcingTable, clock: Clock, stop: float, where: str) -> list[Event]:
+def forcing_events(draft: Draft, table: schema.ForcingTable, clock: Clock, stop: float, where: str) -> list[Event]:
     plan = draft.system.components.get(table.component)
     if plan is None:
         if table.component not in draft.given.scenario.remove:
@@ -201,45 +181,47 @@ def _reference_of(variable: str) -> str:
     return f"{scope}.{name.removeprefix('delta_')}".removeprefix(".")
 
 
-def _unit_switching(draft: Draft, table: UnitTripTable | UnitReconnectionTable, grid: str) -> list[Event]:
+def _unit_switching(draft: Draft, table: schema.UnitSwitchingTable, grid: str) -> list[Event]:
     plan = draft.system.components.get(table.unit)
     if plan is None and table.unit in draft.known:
         return []  # its share is 0, or its problem is noted already
     has_breaker = plan is not None and "connected" in plan.description.variables
-    return [UnitSwitching(table.time, grid, table.unit, isinstance(table, UnitReconnectionTable), has_breaker)]
+    return [UnitSwitching(table.time, grid, table.unit, isinstance(table, schema.UnitReconnectionTable), has_breaker)]
 
 
-def _grid_or_reference_events(table: EventTable, component: str) -> list[Event]:
+def _grid_or_reference_events(table: schema.EventTable, component: str) -> list[Event]:
     match table:
-        case LoadChangeTable():
+        case schema.LoadChangeTable():
             return [LoadChange(table.time, component, table.load, table.scale)]
-        case LoadTripTable():
+        case schema.LoadTripTable():
             return [LoadSwitching(table.time, component, table.load, 0.0)]
-        case LoadReconnectionTable():
+        case schema.LoadReconnectionTable():
             return [LoadSwitching(table.time, component, table.load, table.scale)]
-        case LineTripTable():
+        case schema.LineTripTable():
             opened = LineSwitching(table.time, component, table.line, False)
             if table.reclose_after is None:
                 return [opened]
             return [opened, replace(opened, time=table.time + table.reclose_after, connected=True)]
-        case ShuntTripTable() | ShuntReconnectionTable():
-            return [ShuntSwitching(table.time, component, table.shunt, isinstance(table, ShuntReconnectionTable))]
-        case BusFaultTable():
+        case schema.ShuntTripTable() | schema.ShuntReconnectionTable():
+            return [
+                ShuntSwitching(table.time, component, table.shunt, isinstance(table, schema.ShuntReconnectionTable))
+            ]
+        case schema.BusFaultTable():
             return _fault(table, component)
-        case LineReclosingTable():
+        case schema.LineReclosingTable():
             return [LineSwitching(table.time, component, table.line, True)]
-        case BranchChangeTable():
+        case schema.BranchChangeTable():
             return [BranchChange(table.time, component, table.line, table.X, table.R)]
-        case ReferenceChangeTable():
+        case schema.ReferenceChangeTable():
             return [ReferenceChange(table.time, component, table.reference, table.delta)]
-        case ParameterChangeTable():
+        case schema.ParameterChangeTable():
             value: Any = table.value  # the check converts it to the variable's type and unit
             return [ParameterChange(table.time, component, table.parameter, value)]
         case _:
             raise TypeError(f"{type(table).__name__} is no event of the grid or of a component")
 
 
-def _fault(table: BusFaultTable, grid: str) -> list[Event]:
+def _fault(table: schema.BusFaultTable, grid: str) -> list[Event]:
     """The fault, its end, and the opening of the line that clears it."""
     events: list[Event] = [BusFault(table.time, grid, table.bus, True, table.R, table.X)]
     if table.duration is not None:

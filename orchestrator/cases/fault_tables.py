@@ -3,17 +3,9 @@
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
+from orchestrator.cases import schema
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.imperfection_tables import connections_meant, imperfection_of, note_long_delay
-from orchestrator.cases.schema import (
-    ComponentFaultTable,
-    ComponentTripTable,
-    DelayTable,
-    EventTable,
-    NanOutputTable,
-    TimeOutTable,
-    WireEventTable,
-)
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.events import (
     Event,
@@ -33,7 +25,7 @@ from orchestrator.fmi.instance import is_isolated
 _BREAKER = "connected"
 
 
-def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, where: str) -> list[Event]:
+def wire_events(draft: Draft, table: schema.WireEventTable, clock: Clock, stop: float, where: str) -> list[Event]:
     """What an imperfection that begins at a time, and may end, does to every connection that is meant."""
     end = table.end
     if end is not None:
@@ -46,7 +38,7 @@ def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, 
         except InputError as error:
             draft.note(where, str(error))
             return []
-    if isinstance(table, DelayTable):
+    if isinstance(table, schema.DelayTable):
         note_long_delay(draft, table.delay, stop, where)
     events: list[Event] = []
     for connection in connections_meant(draft, table.connection, where):
@@ -61,16 +53,16 @@ def wire_events(draft: Draft, table: WireEventTable, clock: Clock, stop: float, 
     return events
 
 
-def component_events(draft: Draft, table: ComponentFaultTable, where: str) -> list[Event]:
+def component_events(draft: Draft, table: schema.ComponentFaultTable, where: str) -> list[Event]:
     name = table.component
     plan = draft.system.components.get(name)
     if plan is None:
         if name not in draft.known:
             draft.note(where, f"there is no component {name!r}; the case has: {', '.join(draft.tables)}")
         return []
-    if isinstance(table, ComponentTripTable):
+    if isinstance(table, schema.ComponentTripTable):
         return _trip(draft, table, where)
-    if isinstance(table, TimeOutTable):
+    if isinstance(table, schema.TimeOutTable):
         if not is_isolated(plan.description, plan.isolated):
             draft.note(
                 where,
@@ -85,17 +77,21 @@ def component_events(draft: Draft, table: ComponentFaultTable, where: str) -> li
     return [NotANumber(table.time, name)]
 
 
-def component_faults(tables: Iterable[EventTable], system: System) -> list[str]:
+def component_faults(tables: Iterable[schema.EventTable], system: System) -> list[str]:
     """Which components fail later, in words; those that a scenario removes do not."""
-    words = {ComponentTripTable: "trips", NanOutputTable: "gives no numbers", TimeOutTable: "answers no more"}
+    words = {
+        schema.ComponentTripTable: "trips",
+        schema.NanOutputTable: "gives no numbers",
+        schema.TimeOutTable: "answers no more",
+    }
     return [
         f"component {table.component!r} {words[type(table)]} at t = {table.time:g} s"
         for table in tables
-        if isinstance(table, ComponentFaultTable) and table.component in system.components
+        if isinstance(table, schema.ComponentFaultTable) and table.component in system.components
     ]
 
 
-def _trip(draft: Draft, table: ComponentTripTable, where: str) -> list[Event]:
+def _trip(draft: Draft, table: schema.ComponentTripTable, where: str) -> list[Event]:
     """Its breaker opens: that of the grid's port, and its own; where there is neither, what it gives becomes 0."""
     name, components = table.component, draft.system.components
     own = _BREAKER in components[name].description.variables

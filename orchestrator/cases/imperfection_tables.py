@@ -7,18 +7,9 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from orchestrator.cases import schema
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.names import close_names
-from orchestrator.cases.schema import (
-    BiasTable,
-    DelayTable,
-    DropOutTable,
-    FreezeTable,
-    ImperfectionTable,
-    NoiseTable,
-    QuantisationTable,
-    Value,
-)
 from orchestrator.cases.values import convert
 from orchestrator.coupling.clock import Clock
 from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Imperfection, Noise, Quantisation
@@ -47,7 +38,7 @@ def disturb_connections(draft: Draft, clock: Clock, stop: float) -> dict[str, fl
     for name, table in draft.given.scenario.imperfections.items():
         tables[name] = table, draft.given.place("scenarios", draft.given.name, KEY, name)
     for name, (table, where) in _overridden(draft, tables).items():
-        if isinstance(table, DelayTable):
+        if isinstance(table, schema.DelayTable):
             note_long_delay(draft, table.delay, stop, where)
         for connection in connections_meant(draft, table.connection, where):
             imperfection = imperfection_of(draft, table, connection, clock, where)
@@ -75,9 +66,9 @@ def note_long_delay(draft: Draft, delay: float, stop: float, where: str) -> None
 
 
 def _overridden(
-    draft: Draft, tables: Mapping[str, tuple[ImperfectionTable, str]]
-) -> dict[str, tuple[ImperfectionTable, str]]:
-    adapter: TypeAdapter[ImperfectionTable] = TypeAdapter(ImperfectionTable)
+    draft: Draft, tables: Mapping[str, tuple[schema.ImperfectionTable, str]]
+) -> dict[str, tuple[schema.ImperfectionTable, str]]:
+    adapter: TypeAdapter[schema.ImperfectionTable] = TypeAdapter(schema.ImperfectionTable)
     found = dict(tables)
     for layer in draft.given.layers:
         for key, value in layer.values.items():
@@ -97,7 +88,7 @@ def _overridden(
 
 
 def imperfection_of(
-    draft: Draft, table: ImperfectionTable, connection: Connection, clock: Clock, where: str
+    draft: Draft, table: schema.ImperfectionTable, connection: Connection, clock: Clock, where: str
 ) -> Imperfection | None:
     """What a table says of one connection, in the unit of its signal; None where it is wrong, which is noted."""
     info = signal_info(draft.system, connection)
@@ -116,31 +107,31 @@ def imperfection_of(
     return found
 
 
-def _converted(table: ImperfectionTable, info: VariableInfo) -> Imperfection:
+def _converted(table: schema.ImperfectionTable, info: VariableInfo) -> Imperfection:
     match table:
-        case BiasTable():
+        case schema.BiasTable():
             return Bias(_number(info, "value", table.value))
-        case NoiseTable():
+        case schema.NoiseTable():
             return Noise(_not_negative(info, "deviation", table.deviation), table.seed, table.bandwidth)
-        case FreezeTable():
+        case schema.FreezeTable():
             return DropOut()
-        case DropOutTable():
+        case schema.DropOutTable():
             if table.substitute == "hold":
                 return DropOut()
             return DropOut(0.0 if table.substitute == "zero" else _number(info, "substitute", table.substitute))
-        case DelayTable():
+        case schema.DelayTable():
             return Delay(table.delay)
-        case QuantisationTable():
+        case schema.QuantisationTable():
             return Quantisation(_not_negative(info, "step", table.step))
         case _:
             raise TypeError(f"{type(table).__name__} is no imperfection")
 
 
-def _number(info: VariableInfo, key: str, value: Value) -> float:
+def _number(info: VariableInfo, key: str, value: schema.Value) -> float:
     return float(convert(replace(info, name=key), value))
 
 
-def _not_negative(info: VariableInfo, key: str, value: Value) -> float:
+def _not_negative(info: VariableInfo, key: str, value: schema.Value) -> float:
     return float(convert(replace(info, name=key, minimum=0.0), value))
 
 
@@ -208,7 +199,7 @@ def _numbers(name: str, imperfection: Imperfection) -> dict[str, float | bool]:
     return {f"{KEY}.{name}.{key}": float(value) for key, value in values.items() if value is not None}
 
 
-def number_info(system: System, tables: Mapping[str, ImperfectionTable], key: str) -> VariableInfo:
+def number_info(system: System, tables: Mapping[str, schema.ImperfectionTable], key: str) -> VariableInfo:
     """The number that ``imperfections.NAME.KEY`` reaches, as a variable with its unit."""
     _, name, field = (*key.split(".", 2), "", "")[:3]
     if name not in tables:

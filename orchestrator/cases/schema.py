@@ -460,14 +460,15 @@ class ForcingTable(EventBase):
         return self
 
 
+UnitSwitchingTable = UnitTripTable | UnitReconnectionTable
+
 SettingEventTable = (
     LoadChangeTable
     | LoadTripTable
     | LoadReconnectionTable
     | LineTripTable
     | LineReclosingTable
-    | UnitTripTable
-    | UnitReconnectionTable
+    | UnitSwitchingTable
     | BranchChangeTable
     | BusFaultTable
     | ShuntTripTable

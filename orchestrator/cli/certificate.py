@@ -12,15 +12,10 @@ from rich.markup import escape
 from orchestrator.cases.devices import Device
 from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.certificate import Certificate, Judged
+from orchestrator.certification.codes import frequency_domain
 from orchestrator.certification.codes.bench_case import rated_frequency
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.declared import checked
-from orchestrator.certification.codes.frequency_domain import (
-    figures_of_stiffness,
-    measure_stiffness,
-    save_stiffness,
-    stiffness_in_words,
-)
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.inside import check_target, put_inside
@@ -119,7 +114,7 @@ def run_stiffness(options: argparse.Namespace, device: Device) -> int:
     if options.json:
         print_json(figures)
         return 0
-    for line in stiffness_in_words(figures):
+    for line in frequency_domain.stiffness_in_words(figures):
         console.print(escape(line), highlight=False)
     console.print(escape(figures["phase_jump"]["sentence"]), soft_wrap=True, highlight=False)
     console.print(escape(figures["sentence"][:1].upper() + figures["sentence"][1:]), soft_wrap=True)
@@ -132,6 +127,6 @@ def measured_figures(device: Device, folder: Path) -> tuple[dict[str, Any], list
     made_folder(folder, "--out")
     with said_stages() as report:
         f_n = rated_frequency(request, 50.0)
-        found = measure_stiffness(request, f_n, report)
-    files = save_stiffness(found, request.fmu.stem, f_n, folder)
-    return figures_of_stiffness(found, request.fmu.stem, f_n), files
+        found = frequency_domain.measure_stiffness(request, f_n, report)
+    files = frequency_domain.save_stiffness(found, request.fmu.stem, f_n, folder)
+    return frequency_domain.figures_of_stiffness(found, request.fmu.stem, f_n), files

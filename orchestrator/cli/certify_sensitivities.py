@@ -9,17 +9,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.asked import read_part
+from orchestrator.certification.codes import needs_record
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.change_point import ChangeTask
-from orchestrator.certification.codes.needs_record import (
-    confirmed_text,
-    left_out_text,
-    needs_json,
-    needs_table,
-    plan_text,
-    remarks_of,
-    save_needs,
-)
 from orchestrator.certification.codes.what_it_takes import CHANGE, confirm_changes, plan_changes, run_changes
 from orchestrator.cli.arguments import repeatable, switch
 from orchestrator.cli.executors import choose_executor
@@ -71,7 +63,7 @@ def find_needs(
     if not plan.rows:
         console.print("No row fails: there is nothing that a criterion would take.", highlight=False)
         return None
-    console.print(escape(plan_text(plan)), soft_wrap=True, highlight=False)
+    console.print(escape(needs_record.plan_text(plan)), soft_wrap=True, highlight=False)
     progress = Progressing(folder)
 
     def computed(study: Any) -> Any:
@@ -82,16 +74,16 @@ def find_needs(
         needs = computed(lambda executor, report: run_changes(plan, executor, report))
         if options.confirm:
             computed(lambda executor, report: confirm_changes(plan, needs, executor, report))
-        files = save_needs(plan, needs, folder)
+        files = needs_record.save_needs(plan, needs, folder)
     if not options.json:
         for need in needs:
-            console.print(needs_table(need))
-            for text in remarks_of(need):
+            console.print(needs_record.needs_table(need))
+            for text in needs_record.remarks_of(need):
                 console.print(escape(text), soft_wrap=True, highlight=False)
             if options.confirm:
-                console.print(escape(confirmed_text(need)), soft_wrap=True, highlight=False)
+                console.print(escape(needs_record.confirmed_text(need)), soft_wrap=True, highlight=False)
             console.print("")
-        if text := left_out_text(plan):
+        if text := needs_record.left_out_text(plan):
             console.print(escape(f"Not changed: {text}"), soft_wrap=True, highlight=False)
         console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
-    return needs_json(plan, needs)
+    return needs_record.needs_json(plan, needs)

@@ -10,18 +10,10 @@ from rich.markup import escape
 
 from orchestrator.api.scenario import Scenario, modes_of
 from orchestrator.asked import read_percent
+from orchestrator.cli import terminal
 from orchestrator.cli.arguments import add_request_arguments, asked_by, option, switch
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.excitation import add_excitation_arguments, excitation_given
-from orchestrator.cli.terminal import (
-    make_console,
-    print_json,
-    print_named_modes,
-    print_sources,
-    print_warnings,
-    said_stages,
-    say,
-)
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code, print_answers, print_details
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
@@ -81,7 +73,7 @@ def _compute(
     scenarios: Sequence[Scenario], request: ModesRequest, options: argparse.Namespace, folder: Path | None
 ) -> int:
     if request.black_box:
-        with said_stages() as report:
+        with terminal.said_stages() as report:
             results = [modes_of(scenario, replace(request, report=report)) for scenario in scenarios]
     else:
         prepared = [scenario.prepared for scenario in scenarios]
@@ -93,16 +85,16 @@ def _compute(
         written = write_modes(results, folder)
     weights = [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
     if options.json:
-        print_json(modes_json(results, weights))
+        terminal.print_json(modes_json(results, weights))
         return exit_code(options, [r.stability for r in results])
-    console = make_console()
+    console = terminal.make_console()
     print_answers(console, [of_modes(r) for r in results], results)
-    print_warnings(results)
-    say("question", weights)
+    terminal.print_warnings(results)
+    terminal.say("question", weights)
     for result in results:
         console.print(tables.all_modes(result), "")
-    print_named_modes(console, results)
-    print_sources(console, results)
+    terminal.print_named_modes(console, results)
+    terminal.print_sources(console, results)
     if options.details:
         print_details(console, results)
     if folder:

@@ -13,21 +13,12 @@ from rich.markup import escape
 
 from orchestrator.api.scenario import RunEndedWarning, Scenario
 from orchestrator.asked import read_whole
-from orchestrator.cli import checkpoints, federates, like, run_request
+from orchestrator.cli import checkpoints, federates, like, run_request, terminal
 from orchestrator.cli.arguments import option, repeatable, seconds, switch, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
 from orchestrator.cli.side_by_side import Outcome, Report, SideBySide, number_of_workers
-from orchestrator.cli.terminal import (
-    make_console,
-    make_errors,
-    print_findings,
-    print_json,
-    print_recording_questions,
-    print_warnings,
-    say,
-)
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
 from orchestrator.cores import MOST_THREADS, number_of_cores
 from orchestrator.coupling.progress import Progress
@@ -81,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         stack.enter_context(saying_how_it_goes_on(lambda: run_request.how_it_goes_on(options)))
         rules = like.rules_of(options)
         scenarios = chosen(options)
-        print_recording_questions([scenario.prepared for scenario in scenarios])
+        terminal.print_recording_questions([scenario.prepared for scenario in scenarios])
         engine = federates.choice(options, len(scenarios))
         options.checkpoint = run_request.interval(options)
         name = scenarios[0].prepared.case.name
@@ -100,7 +91,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     mend(folder)
     if options.resume is None:
         _say_unfinished(folder)
-    console = make_console(stderr=options.json)
+    console = terminal.make_console(stderr=options.json)
     kept = checkpoints.StudyCheckpoints([scenario.prepared for scenario in scenarios], folder, options)
     run_id = kept.run
     alone = engine is not None or not (options.workers or all(all_ours(one.prepared) for one in scenarios))
@@ -132,8 +123,8 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
         if workers > 1 and not isinstance(outcome.failure, ResultsError):
             outcome.dataset = open_whole(folder / scenarios[index].name / TRAJECTORY)
         results.append(outcome)
-        print_warnings([outcome.modes])
-        print_findings([outcome])
+        terminal.print_warnings([outcome.modes])
+        terminal.print_findings([outcome])
         if outcome.failure:
             stopped[scenarios[index].name] = outcome.failure
     if stopped and not results:
@@ -144,7 +135,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     early_end = _early_end(stopped, scenarios, results) if stopped else None
     plots = _save_together(results, folder, run_id, stopped, early_end)
     if options.json:
-        print_json([summary_of(r) for r in results])
+        terminal.print_json([summary_of(r) for r in results])
     else:
         print_run(console, results, early_end, details=options.details)
         written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
@@ -194,7 +185,7 @@ def _say_unfinished(folder: Path) -> None:
             f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; "
             "`gfor signal identify` and `compare` read them, and you may delete those that you do not need"
         )
-        say("warning", [text])
+        terminal.say("warning", [text])
 
 
 def _run_into(
@@ -250,5 +241,5 @@ def _end(stopped: Mapping[str, BaseException], folder: Path) -> int:
             where += f" ({', '.join(begun)})" if begun else ""
         head = "" if _is_interrupt(error) else "[bold red]error:[/bold red] "
         text += f"{head}{escape(f'scenario {scenario!r}: {str(error) or calls.how}')}\n"
-    make_errors().print(f"{text}{escape(f'What was computed until then is in {folder}{where}')}")
+    terminal.make_errors().print(f"{text}{escape(f'What was computed until then is in {folder}{where}')}")
     return INTERRUPTED if any(map(_is_interrupt, stopped.values())) else 1

@@ -29,6 +29,7 @@ from orchestrator.spelling import as_options
 Say = Callable[[dict[str, Any]], None]
 
 _FOLDER = Path("results") / "explore"
+_UNEXPECTED = (ArithmeticError, AttributeError, LookupError, MemoryError, RuntimeError, TypeError, ValueError)
 
 
 class Desk:
@@ -145,15 +146,7 @@ def main() -> None:
             say({"answer": desk.answer(json.loads(line), say)})
         except CosimError as error:
             say({"error": str(error), "kind": error.kind})
-        except (
-            ArithmeticError,
-            AttributeError,
-            LookupError,
-            MemoryError,
-            RuntimeError,
-            TypeError,
-            ValueError,
-        ) as error:
+        except _UNEXPECTED as error:
             say({"error": f"it failed in a way that nobody expected: {error!r}; the command may say more", "kind": ""})
 
 

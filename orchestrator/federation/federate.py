@@ -18,17 +18,8 @@ from importlib.metadata import version
 from typing import Any
 
 from orchestrator.errors import ComponentError, CosimError, InputError
+from orchestrator.federation import helics_calls
 from orchestrator.federation.choice import OVER, PROTOCOL
-from orchestrator.federation.helics_calls import (
-    FAULT_MARK,
-    OURS_MARK,
-    join,
-    library,
-    optional_subscription,
-    publication,
-    text_of,
-    text_publication,
-)
 from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import open_component
@@ -45,15 +36,15 @@ class OwnFederate:
         self._component: Component | None = None
 
     def run(self) -> None:
-        helics = library()
+        helics = helics_calls.library()
         with open_component(self.name, self._description, isolated=True) as component:
             self._component = component
             try:
-                self._federate = join(self.name, self._broker, self._to_join)
+                self._federate = helics_calls.join(self.name, self._broker, self._to_join)
             except helics.HelicsException as error:
                 raise InputError(
-                    f"broker {self._broker} does not take the federate {self.name!r}: {text_of(error)}; look whether "
-                    "it runs there, and whether the name is taken"
+                    f"broker {self._broker} does not take the federate {self.name!r}: {helics_calls.text_of(error)}; "
+                    "look whether it runs there, and whether the name is taken"
                 ) from error
             self._register()
             threading.Thread(target=self._listen, daemon=True).start()
@@ -62,9 +53,9 @@ class OwnFederate:
                 self._configured.wait()
                 self._steps()
             except helics.HelicsException as error:
-                if OVER in text_of(error):
+                if OVER in helics_calls.text_of(error):
                     return
-                raise ComponentError(self.name, "the federation", "an end", text_of(error)) from error
+                raise ComponentError(self.name, "the federation", "an end", helics_calls.text_of(error)) from error
             with suppress(helics.HelicsException):
                 helics.helicsFederateDisconnect(self._federate)
 
@@ -77,14 +68,16 @@ class OwnFederate:
     def _register(self) -> None:
         variables = self._description.variables
         outputs = [v for v in self._description.outputs if variables[v].type == "Real"]
-        self._outputs = [publication(self._federate, f"{self.name}.{v}", variables[v].unit) for v in outputs]
+        self._outputs = [
+            helics_calls.publication(self._federate, f"{self.name}.{v}", variables[v].unit) for v in outputs
+        ]
         self._inputs = {
-            v: optional_subscription(self._federate, f"{self.name}.{v}", variables[v].unit)
+            v: helics_calls.optional_subscription(self._federate, f"{self.name}.{v}", variables[v].unit)
             for v in self._description.inputs
             if variables[v].type == "Real"
         }
-        self._fault = text_publication(self._federate, f"{self.name}/{FAULT_MARK}")
-        text_publication(self._federate, f"{self.name}/{OURS_MARK}")
+        self._fault = helics_calls.text_publication(self._federate, f"{self.name}/{helics_calls.FAULT_MARK}")
+        helics_calls.text_publication(self._federate, f"{self.name}/{helics_calls.OURS_MARK}")
         self._read = RealBatch(self._fmu(), outputs)
 
     def _fmu(self) -> Component:
@@ -94,7 +87,7 @@ class OwnFederate:
     # -- steps -----------------------------------------------------------------------------------
 
     def _steps(self) -> None:
-        helics = library()
+        helics = helics_calls.library()
         period, offset = self._setting["period"], self._setting["offset"]
         step_size: float = self._setting["step_size"]
         handles = [self._inputs[v] for v in self._setting["inputs"]]
@@ -121,7 +114,7 @@ class OwnFederate:
     # -- commands --------------------------------------------------------------------------------
 
     def _listen(self) -> None:
-        helics = library()
+        helics = helics_calls.library()
         try:
             while True:
                 text = helics.helicsFederateWaitCommand(self._federate)

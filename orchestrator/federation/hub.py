@@ -14,19 +14,8 @@ from difflib import get_close_matches
 from types import ModuleType
 from typing import Any, NoReturn
 
-from orchestrator.federation import frames
+from orchestrator.federation import frames, helics_calls
 from orchestrator.federation.choice import FIRST_NS, OVER, OWN_NAME
-from orchestrator.federation.helics_calls import (
-    CORE,
-    FAULT_MARK,
-    OURS_MARK,
-    ask,
-    join,
-    library,
-    optional_subscription,
-    publication,
-    text_of,
-)
 
 _END = json.dumps({"number": 0, "command": "end", "arguments": []})
 _END_OF_OTHERS = "end"
@@ -65,8 +54,8 @@ class Hub:
             self.leave("gfor ended")
         except _FederationError as error:
             self._fail(error.fault)
-        except library().HelicsException as error:
-            self._fail({"component": "", "status": "an error of HELICS", "text": text_of(error)})
+        except helics_calls.library().HelicsException as error:
+            self._fail({"component": "", "status": "an error of HELICS", "text": helics_calls.text_of(error)})
 
     def _answer(self, kind: bytes, content: bytes) -> None:
         match kind:
@@ -87,20 +76,21 @@ class Hub:
     # -- beginning -------------------------------------------------------------------------------
 
     def _begin(self) -> None:
-        helics, own = library(), self._request["own_broker"]
+        helics, own = helics_calls.library(), self._request["own_broker"]
         if own is not None:
             others = "--ipv4" if own["everywhere"] else "--local_interface=tcp://127.0.0.1"
             self._broker = helics.helicsCreateBroker(
-                CORE, "", f"-f {len(self._parts) + 1} --port={own['port']} {others} --loglevel=error"
+                helics_calls.CORE, "", f"-f {len(self._parts) + 1} --port={own['port']} {others} --loglevel=error"
             )
             if not helics.helicsBrokerIsConnected(self._broker):
                 raise _FederationError("no broker", f"a broker cannot be started at port {own['port']}")
         broker, seconds = self._request["broker"], self._request["to_join"]
         try:
-            self._federate = join(OWN_NAME, broker, seconds)
+            self._federate = helics_calls.join(OWN_NAME, broker, seconds)
         except helics.HelicsException as error:
             raise _FederationError(
-                "no broker", f"the broker {broker} does not take the federate {OWN_NAME!r}: {text_of(error)}"
+                "no broker",
+                f"the broker {broker} does not take the federate {OWN_NAME!r}: {helics_calls.text_of(error)}",
             ) from error
         self._register(helics)
 
@@ -110,21 +100,27 @@ class Hub:
         self._optional = set()
         for part in self._parts:
             name, units = part["name"], part["units"]
-            self._inputs[name] = [publication(federate, f"{name}.{v}", units[v]) for v in part["inputs"]]
-            self._outputs[name] = {v: optional_subscription(federate, f"{name}.{v}", units[v]) for v in part["outputs"]}
-            self._faults[name] = optional_subscription(federate, f"{name}/{FAULT_MARK}", "")
-            self._optional |= {f"{name}.{v}" for v in part["outputs"]} | {f"{name}/{FAULT_MARK}"}
+            self._inputs[name] = [helics_calls.publication(federate, f"{name}.{v}", units[v]) for v in part["inputs"]]
+            self._outputs[name] = {
+                v: helics_calls.optional_subscription(federate, f"{name}.{v}", units[v]) for v in part["outputs"]
+            }
+            self._faults[name] = helics_calls.optional_subscription(federate, f"{name}/{helics_calls.FAULT_MARK}", "")
+            self._optional |= {f"{name}.{v}" for v in part["outputs"]} | {f"{name}/{helics_calls.FAULT_MARK}"}
             slot = self._request["slots"][part["slot"]]
             for variable, value in part["start"].items():
                 if variable not in part["inputs"]:
-                    self._start.append((publication(federate, f"{name}.{variable}", units[variable]), value))
+                    self._start.append(
+                        (helics_calls.publication(federate, f"{name}.{variable}", units[variable]), value)
+                    )
             for mark, value in (("period", self._request["period"]), ("offset", slot["compute"])):
-                self._start.append((publication(federate, f"{name}/{mark}", "s"), value * 1e-9))
+                self._start.append((helics_calls.publication(federate, f"{name}/{mark}", "s"), value * 1e-9))
 
     def _all_join(self) -> dict[str, Any]:
-        helics, names = library(), [part["name"] for part in self._parts]
+        helics, names = helics_calls.library(), [part["name"] for part in self._parts]
         deadline = time.monotonic() + self._request["to_join"]
-        while missing := [name for name in names if name not in set(ask(self._federate, "root", "federates") or ())]:
+        while missing := [
+            name for name in names if name not in set(helics_calls.ask(self._federate, "root", "federates") or ())
+        ]:
             if time.monotonic() > deadline:
                 raise self._not_joined(missing)
             time.sleep(_LOOK)
@@ -148,7 +144,7 @@ class Hub:
 
     def _published(self, part: dict[str, Any]) -> dict[str, Any]:
         name = part["name"]
-        published = list(ask(self._federate, name, "publications") or ())
+        published = list(helics_calls.ask(self._federate, name, "publications") or ())
         for variable in part["needed"]:
             wanted = f"{name}.{variable}"
             if wanted not in published:
@@ -160,11 +156,11 @@ class Hub:
                 )  # fmt: skip
         outputs = [v for v in part["outputs"] if f"{name}.{v}" in published]
         self._outputs[name] = {v: self._outputs[name][v] for v in outputs}
-        return {"ours": f"{name}/{OURS_MARK}" in published, "outputs": outputs}
+        return {"ours": f"{name}/{helics_calls.OURS_MARK}" in published, "outputs": outputs}
 
     def _refuse_unknown_names(self) -> None:
         """A subscription that nobody feeds stays at 0 for ever."""
-        found = ask(self._federate, "root", "unconnected_interfaces")
+        found = helics_calls.ask(self._federate, "root", "unconnected_interfaces")
         unknown = set(found.get("unknown_publications", ())) if isinstance(found, dict) else set()
         known = [f"{part['name']}.{v}" for part in self._parts for v in (*part["inputs"], *part["start"])]
         for name in sorted(unknown - self._optional):
@@ -178,7 +174,7 @@ class Hub:
     # -- commands to federates of ours -----------------------------------------------------------
 
     def _command(self, component: str, text: str) -> str:
-        helics = library()
+        helics = helics_calls.library()
         number = json.loads(text)["number"]
         helics.helicsFederateSendCommand(self._federate, component, text)
         deadline, pause = time.monotonic() + self._request["patience"], 1e-4
@@ -199,14 +195,14 @@ class Hub:
         return json.dumps({p["name"]: self._values(p) for p in self._parts if p["name"] in foreign}).encode()
 
     def _values(self, part: dict[str, Any]) -> list[float]:
-        helics, name = library(), part["name"]
+        helics, name = helics_calls.library(), part["name"]
         if helics.helicsInputIsUpdated(self._faults[name]) and (
             text := helics.helicsInputGetString(self._faults[name])
         ):
             raise _FederationError("a fault", text, name)
         silent = [v for v, handle in self._outputs[name].items() if not helics.helicsInputIsUpdated(handle)]
         if silent:
-            there = name in set(ask(self._federate, "root", "federates") or ()) and ask(
+            there = name in set(helics_calls.ask(self._federate, "root", "federates") or ()) and helics_calls.ask(
                 self._federate, name, "state"
             ) not in ("disconnected", "error", "finished", "finalize")
             why = (
@@ -220,7 +216,7 @@ class Hub:
 
     def _step(self, content: bytes) -> bytes:
         """Publish the inputs of one slot's federates, let them compute, and return their outputs."""
-        helics = library()
+        helics = helics_calls.library()
         index, number = struct.unpack_from("<qq", content)
         slot = self._request["slots"][number]
         parts = [part for part in self._parts if part["slot"] == number]
@@ -240,7 +236,7 @@ class Hub:
     def _request_time(self, nanoseconds: int, slot: int | None) -> None:
         names = [p["name"] for p in self._parts if slot is None or p["slot"] == slot]
         self._waiting = (time.monotonic() + self._request["patience"], " ".join(names))
-        granted = library().helicsFederateRequestTime(self._federate, nanoseconds * 1e-9)
+        granted = helics_calls.library().helicsFederateRequestTime(self._federate, nanoseconds * 1e-9)
         self._waiting = None
         if round(granted * 1e9) != nanoseconds:
             raise _FederationError("an end", "the broker or a federate ended the federation", names[0])
@@ -265,7 +261,7 @@ class Hub:
         among = [name for name in waited.split() if name in names] or names
         late = []
         for name in among:
-            times = ask(self._federate, name, "current_time")
+            times = helics_calls.ask(self._federate, name, "current_time")
             if not isinstance(times, dict) or times.get("requested_time", 0.0) * 1e9 <= self._now + 1:
                 late.append(name)
         who = late or among
@@ -284,7 +280,7 @@ class Hub:
 
     def leave(self, reason: str) -> None:
         """Leave the federation; with a reason it ends for all."""
-        helics = library()
+        helics = helics_calls.library()
         worker = threading.Thread(target=self._leave, args=(helics, reason), daemon=True)
         worker.start()
         worker.join(3.0 if reason else 1.0 + 1e-3 * _TO_LEAVE)  # a call of HELICS may wait for somebody who is gone

@@ -10,24 +10,9 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from orchestrator.fmi import wine
+from orchestrator.fmi import protection, wine
 from orchestrator.fmi.landlock import landlock_version, restrict
 from orchestrator.fmi.linux import drop_capabilities, no_new_privileges, on_known_machine
-from orchestrator.fmi.protection import (
-    ATTRIBUTES,
-    CPU,
-    DISK,
-    END,
-    ENVIRONMENT,
-    MEMORY,
-    NETWORK,
-    PROCESSES,
-    READING,
-    TASKS,
-    WRITING,
-    Protection,
-    in_order,
-)
 from orchestrator.fmi.seccomp import filter_calls
 
 LAYERS = ("namespaces", "landlock", "seccomp")  # means that can be left out one by one: tests try each alone
@@ -117,7 +102,7 @@ def python_folders() -> list[Path]:
     return sorted(path for path in found if path != home and path not in home.parents)
 
 
-def protections(means: Means, lacking: Iterable[str]) -> tuple[Protection, ...]:
+def protections(means: Means, lacking: Iterable[str]) -> tuple[protection.Protection, ...]:
     spaces, filtered, linux = not means.namespaces, not means.seccomp, sys.platform == "linux"
     landlock, files = means.landlock or "", "read-only mounts"
     no_spaces = f"no namespaces: {means.namespaces}"
@@ -128,27 +113,29 @@ def protections(means: Means, lacking: Iterable[str]) -> tuple[Protection, ...]:
         return bool(used), " and ".join(used) if used else otherwise
 
     found = {
-        END: first((spaces and means.supervised, "a process namespace"),
-                   (not spaces and means.supervised and linux, "a supervisor that adopts orphans"),
-                   (means.supervised and not linux, "a supervisor, for its process group only"),
-                   otherwise="nobody watches over it"),
-        PROCESSES: first((spaces, "a process namespace"), (means.version >= 6, "Landlock"),
-                         (filtered and not spaces and means.version < 6, "a filter of system calls"),
-                         otherwise=no_spaces),
-        NETWORK: first((filtered, "a filter of system calls"), otherwise=(
+        protection.END: first((spaces and means.supervised, "a process namespace"),
+            (not spaces and means.supervised and linux, "a supervisor that adopts orphans"),
+            (means.supervised and not linux, "a supervisor, for its process group only"),
+            otherwise="nobody watches over it"),
+        protection.PROCESSES: first((spaces, "a process namespace"), (means.version >= 6, "Landlock"),
+            (filtered and not spaces and means.version < 6, "a filter of system calls"),
+            otherwise=no_spaces),
+        protection.NETWORK: first((filtered, "a filter of system calls"), otherwise=(
             f"sockets of a path only are left open; {means.seccomp}" if spaces else f"no filter: {means.seccomp}")),
-        WRITING: first((not landlock, "Landlock"), (means.read_only, files), otherwise=no_landlock),
-        ATTRIBUTES: first((means.read_only, files), (filtered and not means.read_only, "a filter of system calls"),
-                          otherwise=no_spaces),
-        READING: first((not landlock, "Landlock"), otherwise=no_landlock),
-        ENVIRONMENT: (True, "a new environment"),
-        MEMORY: first((True, "a limit for each process"), (linux and means.supervised, "a watch over their sum"),
-                      otherwise=""),
-        DISK: first((True, "a limit for each file"), (means.read_only, "a folder in memory of limited size"),
-                    (linux and means.supervised and not means.read_only, "a watch over their sum"), otherwise=""),
-        TASKS: first((spaces, "limits of its namespaces"), (linux and means.supervised, "a watch"),
-                     otherwise="nothing on this system limits it"),
-        CPU: (True, "a limit for each process"),
+        protection.WRITING: first((not landlock, "Landlock"), (means.read_only, files), otherwise=no_landlock),
+        protection.ATTRIBUTES: first((means.read_only, files),
+            (filtered and not means.read_only, "a filter of system calls"),
+            otherwise=no_spaces),
+        protection.READING: first((not landlock, "Landlock"), otherwise=no_landlock),
+        protection.ENVIRONMENT: (True, "a new environment"),
+        protection.MEMORY: first((True, "a limit for each process"),
+            (linux and means.supervised, "a watch over their sum"),
+            otherwise=""),
+        protection.DISK: first((True, "a limit for each file"), (means.read_only, "a folder in memory of limited size"),
+            (linux and means.supervised and not means.read_only, "a watch over their sum"), otherwise=""),
+        protection.TASKS: first((spaces, "limits of its namespaces"), (linux and means.supervised, "a watch"),
+            otherwise="nothing on this system limits it"),
+        protection.CPU: (True, "a limit for each process"),
     }  # fmt: skip
     found |= dict.fromkeys(lacking, (False, "this system does not limit it"))
-    return in_order(Protection(name, *said) for name, said in found.items())
+    return protection.in_order(protection.Protection(name, *said) for name, said in found.items())

@@ -7,13 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 from weakref import WeakValueDictionary
 
-from fmpy import calloc, free
-from fmpy.fmi2 import (
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
+from fmpy import calloc, fmi2, free
 
 FLOODED = 97  # exit code of a process whose FMU logs without end
 _KEPT = 50
@@ -68,7 +62,7 @@ def _receive(environment: int | None, _instance: bytes, status: int, _category: 
             guard(messages)
 
 
-_receive_pointer = fmi2CallbackLoggerTYPE(_receive)
+_receive_pointer = fmi2.fmi2CallbackLoggerTYPE(_receive)
 
 
 def callbacks_for(messages: Messages) -> Any:
@@ -78,10 +72,10 @@ def callbacks_for(messages: Messages) -> Any:
     given; the component is told by its environment pointer."""
     environment = next(_next_environment)
     _message_lists[environment] = messages
-    callbacks = fmi2CallbackFunctions()
+    callbacks = fmi2.fmi2CallbackFunctions()
     callbacks.logger = _receive_pointer
-    callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-    callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
     callbacks.componentEnvironment = environment
     if fmpy_logging is not None:
         fmpy_logging.addLoggerProxy(ctypes.byref(callbacks))

@@ -20,19 +20,10 @@ from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import AnalysisError, InputError
+from orchestrator.pod_design import lead_lag as leads
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.pod_design.guard import Naming, Surroundings, breach, surroundings
 from orchestrator.pod_design.kept import figures_of
-from orchestrator.pod_design.lead_lag import (
-    NO_COMPENSATION,
-    LeadLag,
-    angle_deg,
-    bounded,
-    lead_lag,
-    predicted_mode,
-    required_gain,
-    sensitivity,
-)
 from orchestrator.pod_design.margins import Margins, compute_margins
 from orchestrator.pod_design.refinement import Judgement, Refinement, refine, sweep
 from orchestrator.pod_design.target import (
@@ -51,7 +42,7 @@ from orchestrator.study.naming import named_modes
 
 StageReport = Callable[[str], None]
 
-_OFF = PodSetting(0.0, NO_COMPENSATION)
+_OFF = PodSetting(0.0, leads.NO_COMPENSATION)
 _MET = 5e-4  # a requirement counts as met if the damping ratio falls short of it by less: 0.05 points
 
 
@@ -140,7 +131,7 @@ class PodDesign:
     required_damping: float
     predicted: complex
     sensitivities: GainSensitivities
-    filters: LeadLag
+    filters: leads.LeadLag
     gain_non_compensated: float
     gain_compensated: float
     gain: float
@@ -294,7 +285,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     request, off, before = start.request, start.off, start.before
     initial = off.eigenvalue
     required = _required(request, initial)
-    predicted = predicted_mode(required, initial)
+    predicted = leads.predicted_mode(required, initial)
 
     def around(placed: Placed) -> Surroundings:
         return surroundings(loop.model(placed.setting), placed.eigenvalue, start.naming)
@@ -314,12 +305,12 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
 
     report("sensitivity of the mode")
     bare = loop.place(off, request.delta_gain)
-    S = sensitivity(bare.eigenvalue, initial, request.delta_gain)
-    filters = lead_lag(angle_deg(S), initial.imag, start.target.stages)
+    S = leads.sensitivity(bare.eigenvalue, initial, request.delta_gain)
+    filters = leads.lead_lag(leads.angle_deg(S), initial.imag, start.target.stages)
     turned = loop.place(off, request.delta_gain, filters)
-    S_turned = sensitivity(turned.eigenvalue, initial, request.delta_gain)
-    gains = [required_gain(predicted, initial, abs(value)) for value in (S, S_turned)]
-    gain = bounded(gains[request.compensated_gain], request.gain_bounds)
+    S_turned = leads.sensitivity(turned.eigenvalue, initial, request.delta_gain)
+    gains = [leads.required_gain(predicted, initial, abs(value)) for value in (S, S_turned)]
+    gain = leads.bounded(gains[request.compensated_gain], request.gain_bounds)
 
     report("closed loop with the design")
     final = designed = loop.place(off, gain, filters)

@@ -12,17 +12,9 @@ import numpy as np
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.errors import AnalysisError
+from orchestrator.pod_design import lead_lag as leads
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.pod_design.guard import extremes
-from orchestrator.pod_design.lead_lag import (
-    LARGEST_TURN,
-    LeadLag,
-    angle_deg,
-    compensation_deg,
-    lead_lag,
-    lead_lag_turning,
-    local_non_compensated,
-)
 
 
 @dataclass(frozen=True)
@@ -56,7 +48,7 @@ class GainSweep:
     """The target mode over the range of the gain, with one lead/lag."""
 
     why: str
-    filters: LeadLag
+    filters: leads.LeadLag
     points: tuple[Placed, ...]
     chosen: Placed  # the smallest gain that meets the requirement, else the gain of the best damping
     # the gains with which the system is unstable [pu]; empty for systems of more than `_MOST_STATES` states, which are
@@ -84,7 +76,7 @@ class Refinement:
 
 
 def refine(
-    loop: PodLoop, off: Placed, filters: LeadLag, required: float, bounds: tuple[float, float], judge: Judge,
+    loop: PodLoop, off: Placed, filters: leads.LeadLag, required: float, bounds: tuple[float, float], judge: Judge,
     search: SearchSettings, *, evenly: bool = False,
 ) -> Refinement:  # fmt: skip
     """Search gain and lead/lag on the closed loop.
@@ -131,7 +123,7 @@ def refine(
 
 
 def sweep(
-    loop: PodLoop, off: Placed, filters: LeadLag, required: float, bounds: tuple[float, float], why: str,
+    loop: PodLoop, off: Placed, filters: leads.LeadLag, required: float, bounds: tuple[float, float], why: str,
     special: float | None = None,
 ) -> GainSweep:  # fmt: skip
     """The target over the range of the gain, and the gain that meets the requirement or comes nearest to it.
@@ -198,7 +190,7 @@ def _peak(loop: PodLoop, points: Sequence[Placed]) -> Placed:
     return best
 
 
-def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[tuple[str, LeadLag]]:
+def _candidates(loop: PodLoop, result: Refinement, first: leads.LeadLag) -> Iterator[tuple[str, leads.LeadLag]]:
     """Lead/lag settings to try; each follows from the results of the sweeps before it."""
     yield "as designed", first
     if first.N_S == 0 or not result.sweeps:
@@ -225,7 +217,7 @@ def _candidates(loop: PodLoop, result: Refinement, first: LeadLag) -> Iterator[t
             turn, reached = turn + direction * _TURN, result.score
 
 
-def _searched(result: Refinement, search: SearchSettings) -> Iterator[tuple[str, LeadLag, float | None]]:
+def _searched(result: Refinement, search: SearchSettings) -> Iterator[tuple[str, leads.LeadLag, float | None]]:
     """The settings of a search, which is made only if no other setting has met the requirement."""
     try:
         found = search()
@@ -236,28 +228,28 @@ def _searched(result: Refinement, search: SearchSettings) -> Iterator[tuple[str,
         yield why, setting.filters, setting.gain
 
 
-def _turned(base: Placed, turn: float) -> LeadLag | None:
+def _turned(base: Placed, turn: float) -> leads.LeadLag | None:
     """The lead/lag of a setting with another angle, centred on the mode of this setting; None if its stages cannot give
     this angle."""
     filters = base.setting.filters
     total = filters.N_S * filters.stage_angle_deg + turn
-    if abs(total) >= LARGEST_TURN * filters.N_S or base.eigenvalue.imag <= 0:
+    if abs(total) >= leads.LARGEST_TURN * filters.N_S or base.eigenvalue.imag <= 0:
         return None
-    return lead_lag_turning(total, base.eigenvalue.imag, filters.N_S)
+    return leads.lead_lag_turning(total, base.eigenvalue.imag, filters.N_S)
 
 
-def recentred(loop: PodLoop, here: Placed) -> LeadLag:
+def recentred(loop: PodLoop, here: Placed) -> leads.LeadLag:
     """The lead/lag by the design's formulas, with the present mode and its present sensitivity."""
     gain, filters = here.setting.gain, here.setting.filters
     change = 0.01 * gain or _SMALL_GAIN
     moved = loop.place(here, gain + change)
     slope = (moved.eigenvalue - here.eigenvalue) / change
-    phase = angle_deg(local_non_compensated(slope, here.eigenvalue, filters))
+    phase = leads.angle_deg(leads.local_non_compensated(slope, here.eigenvalue, filters))
     if here.eigenvalue.imag <= 0:
         raise AnalysisError(f"at a gain of {gain:.4g} the mode no longer oscillates, so there is nothing to centre on")
-    if abs(compensation_deg(phase)) >= LARGEST_TURN * filters.N_S:
+    if abs(leads.compensation_deg(phase)) >= leads.LARGEST_TURN * filters.N_S:
         raise AnalysisError(f"the sensitivity at a gain of {gain:.4g} points to {phase:.0f}°, too far for its stages")
-    return lead_lag(phase, here.eigenvalue.imag, filters.N_S)
+    return leads.lead_lag(phase, here.eigenvalue.imag, filters.N_S)
 
 
 def _guarded(loop: PodLoop, found: GainSweep, judge: Judge, notes: list[str]) -> Placed | None:

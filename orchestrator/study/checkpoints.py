@@ -10,13 +10,7 @@ from urllib.parse import quote
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.run_state import RunState, why_not_kept
 from orchestrator.errors import ComponentError, InputError, ResultsError
-from orchestrator.results.checkpoint_file import (
-    CHECKPOINT,
-    DamagedCheckpointError,
-    previous,
-    read_checkpoint,
-    write_checkpoint,
-)
+from orchestrator.results import checkpoint_file
 from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder
 from orchestrator.results.taken_back import take_back
 from orchestrator.safe_files import write_text
@@ -53,7 +47,7 @@ class Checkpoints:
     ) -> None:
         self._name, self._say, self._every = prepared.name, say, every
         self._mark, self._step_size, self._recorded = mark_of(prepared), prepared.step_size, prepared.record
-        self._path = folder / f"{quote(prepared.name, safe='')}{CHECKPOINT}"
+        self._path = folder / f"{quote(prepared.name, safe='')}{checkpoint_file.CHECKPOINT}"
         self._case, self._text, self._file = folder / CASE, prepared.case.text, prepared.case.path
         self._written = False
         self._kept: RunState | None = None
@@ -104,7 +98,7 @@ class Checkpoints:
         self._kept = None
 
     def clear(self) -> None:
-        for path in (self._path, previous(self._path)):
+        for path in (self._path, checkpoint_file.previous(self._path)):
             path.unlink(missing_ok=True)
         if not any(path.suffix == self._path.suffix for path in self._path.parent.glob("*")):
             self._case.unlink(missing_ok=True)
@@ -137,7 +131,7 @@ class Checkpoints:
         try:
             if not (self._written or self._case.exists()):
                 write_text(self._case, self._text)
-            write_checkpoint(self._path, {"mark": self._mark}, arrays)
+            checkpoint_file.write_checkpoint(self._path, {"mark": self._mark}, arrays)
             self._written = True
         except ResultsError as error:
             self._give_up(str(error))
@@ -152,13 +146,13 @@ class Checkpoints:
 
     def _found(self) -> RunState | None:
         damaged = []
-        for path in (self._path, previous(self._path)):
+        for path in (self._path, checkpoint_file.previous(self._path)):
             try:
-                header, arrays = read_checkpoint(path)
+                header, arrays = checkpoint_file.read_checkpoint(path)
                 state = RunState.of_arrays(arrays)
             except FileNotFoundError:
                 continue
-            except (DamagedCheckpointError, KeyError, ValueError) as error:
+            except (checkpoint_file.DamagedCheckpointError, KeyError, ValueError) as error:
                 damaged.append(str(error))
                 continue
             self._compare(header.get("mark", {}))

@@ -12,16 +12,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from orchestrator.analysis.continuation import (
-    CAREFUL,
-    COSTLY,
-    Eigenpair,
-    ModesMeetError,
-    Strides,
-    between,
-    follow_along,
-    pair_of,
-)
+from orchestrator.analysis import continuation
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.mode_names import LEFT_OVER, Naming
 from orchestrator.analysis.modes import Mode, damping_percent
@@ -82,7 +73,7 @@ class _Way:
     """From another system (0) to this one (1); ``common`` as `follow_along`."""
 
     model_at: Callable[[float], LinearModel]
-    strides: Strides = CAREFUL
+    strides: continuation.Strides = continuation.CAREFUL
     common: tuple[str, ...] = ()
 
 
@@ -92,7 +83,7 @@ class _Origin:
 
     place: str
     mode: Mode
-    start: Eigenpair
+    start: continuation.Eigenpair
     way: _Way
     sure: bool
 
@@ -102,8 +93,8 @@ def _settle(name: str, system: NamedSystem, origin: _Origin) -> Naming:
     best, measure = naming.fits[name]
     was = f"the mode of {_figures(origin.mode.eigenvalue)} {origin.place}"
     try:
-        value = follow_along(origin.start, way.model_at, 0.0, 1.0, way.strides, way.common).eigenvalue
-    except ModesMeetError as error:
+        value = continuation.follow_along(origin.start, way.model_at, 0.0, 1.0, way.strides, way.common).eigenvalue
+    except continuation.ModesMeetError as error:
         where = f"meets another one {error.beyond:.0%} of the way from there, at {_figures(error.eigenvalue)}"
         return _without(naming, name, f"{was} {where}, and cannot be told from it beyond", sure=sure)
     except CosimError as error:
@@ -200,7 +191,7 @@ class _Others:
             self.lost = self.lost or place
             return None
         mode, names = system.naming.named[name], system.model.names
-        start = pair_of(mode, names)
+        start = continuation.pair_of(mode, names)
         if way.common:
             start = start.within([names.index(state) for state in way.common])
         return _Origin(place, mode, start, way, sure)
@@ -209,7 +200,7 @@ class _Others:
         """Where the operating point moves, a mixture of both models is none that a parameter takes."""
         one, two = other.point.states, self._system.point.states
         stays = one.keys() == two.keys() and all(abs(one[k] - x) <= _STAYS * max(1.0, abs(x)) for k, x in two.items())
-        if stays and (mixed := between(other.model, self._system.model)) is not None:
+        if stays and (mixed := continuation.between(other.model, self._system.model)) is not None:
             return _Way(mixed)
         return self._way_of_values(other)
 
@@ -234,7 +225,7 @@ class _Others:
 
         ours = set(self._system.model.names)
         common = tuple(n for n in other.model.names if n in ours and n.partition(".")[0] not in fitted)
-        return _Way(model_at, COSTLY, common if fitted or models[0].names != models[1].names else ())
+        return _Way(model_at, continuation.COSTLY, common if fitted or models[0].names != models[1].names else ())
 
     def _differs_in_foreign(self) -> bool:
         """Whether a value of somebody else's FMU is another than in the scenario before, or in the case's file."""

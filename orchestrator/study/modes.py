@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.analysis import modes as spectra
 from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.critical_modes import find_critical_modes
 from orchestrator.analysis.device_start import misfits_of, sentences
@@ -20,14 +21,6 @@ from orchestrator.analysis.external_exciters import settled_warnings, start_warn
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
 from orchestrator.analysis.linearization import Blocks, continuous_model
 from orchestrator.analysis.mode_names import Naming
-from orchestrator.analysis.modes import (
-    ALL_VECTORS,
-    ELECTROMECHANICAL_HZ,
-    HIGHEST_SWING_HZ,
-    Mode,
-    Spectrum,
-    find_spectrum,
-)
 from orchestrator.analysis.periodic import model_of
 from orchestrator.analysis.stability import Hidden, Stability, hidden, whole_spectrum
 from orchestrator.analysis.steady_state import OperatingPoint, find_operating_point
@@ -60,8 +53,8 @@ class ModesResult:
     prepared: PreparedScenario
     operating_point: OperatingPoint
     model: LinearModel
-    modes: list[Mode]
-    named: dict[str, Mode]  # the modes that the case looks for by their shape, as far as they are in range
+    modes: list[spectra.Mode]
+    named: dict[str, spectra.Mode]  # the modes that the case looks for by their shape, as far as they are in range
     references: dict[str, ReferenceModeTable]  # somebody else's figures for them, where their conditions hold
     warnings: tuple[str, ...]
     swing: tuple[str, ...]  # states that show who swings against whom, mostly speeds
@@ -85,7 +78,7 @@ class ModesResult:
         return f"{self.prepared.title}: UNSTABLE, {rate:+.3g} 1/s"
 
     @property
-    def electromechanical(self) -> Mode | None:
+    def electromechanical(self) -> spectra.Mode | None:
         return next(iter(self.named.values()), None)
 
     @property
@@ -93,21 +86,21 @@ class ModesResult:
         """How the linear model of every component was found: perturbed, directional, packed or identified."""
         return dict(self.model.sources)
 
-    def name_of(self, mode: Mode) -> str | None:
+    def name_of(self, mode: spectra.Mode) -> str | None:
         return next((name for name, named in self.named.items() if named is mode), None)
 
-    def by_area(self, mode: Mode) -> dict[str, float]:
+    def by_area(self, mode: spectra.Mode) -> dict[str, float]:
         """Participation of every area, largest first; components without an area are left out."""
         return mode.by_group(lambda state: self.areas.get(state.partition(".")[0]))
 
-    def swing_of(self, mode: Mode) -> tuple[list[str], list[str]]:
+    def swing_of(self, mode: spectra.Mode) -> tuple[list[str], list[str]]:
         """Components that swing together in a mode, and those that swing against them; each largest first."""
         together, against = mode.swing(self.swing)
         return [s.partition(".")[0] for s in together], [s.partition(".")[0] for s in against]
 
 
 def compute_modes(
-    prepared: PreparedScenario, frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    prepared: PreparedScenario, frequency_range: tuple[float, float] = spectra.ELECTROMECHANICAL_HZ,
     critical: float | None = None, *, directional: bool = False,
 ) -> ModesResult:  # fmt: skip
     """Initialise a scenario's FMUs, verify their steady state, and linearise around it.
@@ -181,7 +174,7 @@ class Linearised:
         self.named: NamedSystem | None = None
 
     def begin(self, pool: Executor) -> None:
-        if self._system is not None and len(self._model.names) <= ALL_VECTORS:
+        if self._system is not None and len(self._model.names) <= spectra.ALL_VECTORS:
             # SciPy's `eig` lets no other thread of Python run in a small system, so that the other spectrum must be on
             # its way, in NumPy's `eigvals`, before that begins.
             _ = self._system.A
@@ -191,15 +184,15 @@ class Linearised:
             self._found = pool.submit(self._spectrum_of_map)
             self._of_system = pool.submit(self._spectrum_of_system)
 
-    def _spectrum_of_system(self) -> Spectrum | None:
+    def _spectrum_of_system(self) -> spectra.Spectrum | None:
         return None if self._system is None else whole_spectrum(self._system)
 
-    def _spectrum_of_map(self) -> tuple[Spectrum | None, list[Mode]]:
+    def _spectrum_of_map(self) -> tuple[spectra.Spectrum | None, list[spectra.Mode]]:
         """The step map's spectrum, and the critical modes where only they are asked for."""
         if self._critical is not None:
             return whole_spectrum(self._model), find_critical_modes(self._model, *self._range, self._critical)
         first, last = _named_range(self._range)
-        return find_spectrum(self._model, first, max(last, HIGHEST_SWING_HZ)), []
+        return spectra.find_spectrum(self._model, first, max(last, spectra.HIGHEST_SWING_HZ)), []
 
     def _at_gains(self, gains: Mapping[str, float]) -> LinearModel:
         """The model with other values of parameters that leave the operating point where it is."""
@@ -273,8 +266,8 @@ def _faults(misfits: Mapping[str, list[Misfit]]) -> list[str]:
 
 
 def identified(
-    prepared: PreparedScenario, point: OperatingPoint, model: LinearModel, modes: Sequence[Mode],
-    frequency_range: tuple[float, float] = ELECTROMECHANICAL_HZ,
+    prepared: PreparedScenario, point: OperatingPoint, model: LinearModel, modes: Sequence[spectra.Mode],
+    frequency_range: tuple[float, float] = spectra.ELECTROMECHANICAL_HZ,
     known: Mapping[str, NamedSystem] = MappingProxyType({}),
     at_gains: Callable[[Mapping[str, float]], LinearModel] | None = None, *, directional: bool = False,
     black_boxes: BlackBoxes | None = None,
@@ -287,7 +280,7 @@ def identified(
     first, last = _named_range(frequency_range)
 
     def named(other: PreparedScenario, at: OperatingPoint, linear: LinearModel) -> NamedSystem:
-        found = [mode for mode in find_spectrum(linear, first, last).modes if mode.is_oscillation]
+        found = [mode for mode in spectra.find_spectrum(linear, first, last).modes if mode.is_oscillation]
         return NamedSystem(other, at, linear, found, named_modes(other.case, linear, found))
 
     def computed(other: PreparedScenario) -> NamedSystem:
@@ -335,10 +328,10 @@ def _set(master: Master, key: str, value: float) -> None:
 
 def _named_range(shown: tuple[float, float]) -> tuple[float, float]:
     """Names are given before the range is applied, so that a mode outside it leaves its name to no other [Hz]."""
-    return min(shown[0], ELECTROMECHANICAL_HZ[0]), max(shown[1], ELECTROMECHANICAL_HZ[1])
+    return min(shown[0], spectra.ELECTROMECHANICAL_HZ[0]), max(shown[1], spectra.ELECTROMECHANICAL_HZ[1])
 
 
-def _is_swing(mode: Mode, speeds: Sequence[str]) -> bool:
+def _is_swing(mode: spectra.Mode, speeds: Sequence[str]) -> bool:
     """Whether one of the states that show who swings against whom is among those that take part most."""
     states = [state for state, _ in mode.participation[:_LEADING]]
     return any(fnmatch.fnmatchcase(state, pattern) for state in states for pattern in speeds)

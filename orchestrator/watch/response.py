@@ -8,28 +8,14 @@ from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
+from orchestrator.watch import oscillation as oscillations
+from orchestrator.watch import swing_findings
 from orchestrator.watch.confirmation import STEADY, change, doubt, irregular_doubt, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.watch.machine_limits import is_inner
-from orchestrator.watch.oscillation import (
-    LEAST_PERIODS,
-    Oscillation,
-    crossings_hz,
-    strongest_oscillation,
-    too_fast,
-    without_trend,
-)
 from orchestrator.watch.seen import Seen, is_derivative, unit
 from orchestrator.watch.stretches import Stretch
 from orchestrator.watch.swing import KEPT, Swing
-from orchestrator.watch.swing_findings import (
-    doubtful_irregular_swing,
-    doubtful_swing,
-    growing,
-    irregular_swing,
-    sustained,
-    swing_rises,
-)
 
 FEWEST_LOOKS = 60
 """Least number of looks in the judged part: the last three quarters of the time from one event to the next, or to the
@@ -87,9 +73,9 @@ def unsettled_response(
     swings.sort(key=lambda s: (_component(s.name) not in units, -s.size))
     # An oscillation faster than the looks appears in the signals as a slower one, therefore it is searched first.
     quick = [s for s in swings if s.turns_hz is not None]
-    others = [s for s in swings if s.turns_hz is None and not (quick and too_fast(s.times, s.signal))]
+    others = [s for s in swings if s.turns_hz is None and not (quick and oscillations.too_fast(s.times, s.signal))]
     if noisy:
-        grown = [s for s in swings if swing_rises(s)]
+        grown = [s for s in swings if swing_findings.swing_rises(s)]
         told = _told(grown[:_TRIED], system, stretch, irregular_as_well=not stretch.breaks)
         smooth = sorted((s for s in swings if s.turns_hz is None), key=_roughness)[:_SMOOTHEST]
         return told or _told(smooth, system, stretch, irregular_as_well=False, clean=True)
@@ -132,13 +118,13 @@ def _told(
             if not why:
                 told[finding.kind] = finding
             elif not doubtful:
-                doubtful.append(doubtful_swing(swing, oscillation, why, stretch))
+                doubtful.append(swing_findings.doubtful_swing(swing, oscillation, why, stretch))
         elif irregular_as_well and _is_irregular(swing):
-            why = "" if swing_rises(swing) else irregular_doubt(swing)
+            why = "" if swing_findings.swing_rises(swing) else irregular_doubt(swing)
             if not why:
-                irregular.append(irregular_swing(swing, unit(swing.name, system), stretch))
+                irregular.append(swing_findings.irregular_swing(swing, unit(swing.name, system), stretch))
             elif not doubtful:
-                doubtful.append(doubtful_irregular_swing(swing, why, unit(swing.name, system), stretch))
+                doubtful.append(swing_findings.doubtful_irregular_swing(swing, why, unit(swing.name, system), stretch))
     return [*told.values()] or irregular[:1] or doubtful
 
 
@@ -174,7 +160,7 @@ def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | 
     return Swing(name, last / scale, scale, (times, signal), times[rows], signal[rows])
 
 
-def _goes_on(swing: Swing, oscillation: Oscillation, breaks: Sequence[float]) -> bool:
+def _goes_on(swing: Swing, oscillation: oscillations.Oscillation, breaks: Sequence[float]) -> bool:
     """Whether one oscillation, with one phase, makes the swing before and after each of these times."""
     if not breaks:
         return True
@@ -186,8 +172,8 @@ def _goes_on(swing: Swing, oscillation: Oscillation, breaks: Sequence[float]) ->
         middles = [float(np.median(rest[rows])) for rows in pieces]
         return max(middles) - min(middles) < ONE
     turn = np.exp((oscillation.rate + 2j * np.pi * oscillation.frequency_hz) * since)
-    shapes = [without_trend(np.column_stack([turn[rows].real, turn[rows].imag])) for rows in pieces]
-    swings = [without_trend(swing.signal[rows]) for rows in pieces]
+    shapes = [oscillations.without_trend(np.column_stack([turn[rows].real, turn[rows].imag])) for rows in pieces]
+    swings = [oscillations.without_trend(swing.signal[rows]) for rows in pieces]
     share = np.linalg.lstsq(np.concatenate(shapes), np.concatenate(swings), rcond=None)[0]
     return all(np.linalg.norm(y - shape @ share) < ONE * np.linalg.norm(y)
                for shape, y in zip(shapes, swings, strict=True))  # fmt: skip
@@ -207,11 +193,14 @@ def _roughness(swing: Swing) -> float:
     return float(np.std(np.diff(swing.signal))) / (swing.size * swing.scale)
 
 
-def _is_clean(swing: Swing, oscillation: Oscillation) -> bool:
+def _is_clean(swing: Swing, oscillation: oscillations.Oscillation) -> bool:
     """Whether one oscillation, with one phase, makes the whole swing, so that its growth is certain."""
     since = swing.times - swing.times[-1]
     turn = np.exp((oscillation.rate + 2j * np.pi * oscillation.frequency_hz) * since)
-    shape, whole = without_trend(np.column_stack([turn.real, turn.imag])), without_trend(swing.signal)
+    shape, whole = (
+        oscillations.without_trend(np.column_stack([turn.real, turn.imag])),
+        oscillations.without_trend(swing.signal),
+    )
     rest = whole - shape @ np.linalg.lstsq(shape, whole, rcond=None)[0]
     part = float(np.linalg.norm(rest) / np.linalg.norm(whole))
     return part < (CLEAN if change(swing, oscillation.rate) > STEADY + 2 * part else CLEAN / 3)
@@ -246,33 +235,33 @@ def _fast_swing(name: str, seen: Seen, first: int, begin: float) -> Swing | None
     return Swing(name, size, scale, (times, ripple), times[stretch], ripple[stretch], hz)
 
 
-def _regular(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding | None:
+def _regular(swing: Swing, oscillation: oscillations.Oscillation, unit: str, stretch: Stretch) -> Finding | None:
     grown = change(swing, oscillation.rate)
     if grown < -STEADY:
         return None
-    return (growing if grown > STEADY else sustained)(swing, oscillation, unit, stretch)
+    return (swing_findings.growing if grown > STEADY else swing_findings.sustained)(swing, oscillation, unit, stretch)
 
 
 def _is_irregular(swing: Swing) -> bool:
-    passes = 2 * crossings_hz(swing.times, swing.signal) * float(swing.times[-1] - swing.times[0]) / 3
+    passes = 2 * oscillations.crossings_hz(swing.times, swing.signal) * float(swing.times[-1] - swing.times[0]) / 3
     return swing.turns_hz is None and swing.size >= IRREGULAR and passes >= _PASSES
 
 
-def _single(swing: Swing) -> Oscillation | None:
+def _single(swing: Swing) -> oscillations.Oscillation | None:
     """The oscillation that makes the swing; None if there is no such oscillation, or if the second half of the stretch
     does not show it."""
     half = len(swing.times) // 2
-    whole = strongest_oscillation(swing.times, swing.signal)
-    late = strongest_oscillation(swing.times[half:], swing.signal[half:], least_periods=1)
+    whole = oscillations.strongest_oscillation(swing.times, swing.signal)
+    late = oscillations.strongest_oscillation(swing.times[half:], swing.signal[half:], least_periods=1)
     if whole is None or late is None or whole.amplitude < EXPLAINED * np.sqrt(2) * swing.size * swing.scale:
         return None
     if abs(whole.frequency_hz - late.frequency_hz) > SAME_FREQUENCY * whole.frequency_hz:
         return None
-    enough = late.frequency_hz * float(swing.times[-1] - swing.times[half]) >= LEAST_PERIODS
+    enough = late.frequency_hz * float(swing.times[-1] - swing.times[half]) >= oscillations.LEAST_PERIODS
     return late if enough else whole
 
 
-def _fast(swing: Swing) -> Oscillation | None:
+def _fast(swing: Swing) -> oscillations.Oscillation | None:
     """Frequency from the turns, growth rate from the extent. A rate within its own uncertainty is taken as 0."""
     if swing.turns_hz is None or not (swing.signal > 0).all():
         return None
@@ -282,4 +271,4 @@ def _fast(swing: Swing) -> Oscillation | None:
     scatter = float(np.std(sizes - rate * times - start))
     if abs(rate) * float(times[-1] - times[0]) < scatter:
         rate = 0.0
-    return Oscillation(swing.turns_hz, rate, float(swing.signal[-max(1, len(sizes) // 10) :].mean()) / 2)
+    return oscillations.Oscillation(swing.turns_hz, rate, float(swing.signal[-max(1, len(sizes) // 10) :].mean()) / 2)

@@ -13,7 +13,7 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.acceptance.checks import signs
+from orchestrator.acceptance.checks import droop
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.api.acceptance import Acceptance
 from orchestrator.fmi.limits import Limits
@@ -167,7 +167,7 @@ def test_power_that_moves_in_steps_is_told(tmp_path):
 
 def test_what_was_not_judged_stands_in_the_verdict(gallery, monkeypatch):
     """A droop of reactive power whose law is not seen, of the wrong sign besides."""
-    monkeypatch.setattr(signs, "droop", lambda found: None)
+    monkeypatch.setattr(droop, "droop", lambda found: None)
     found = check_fmu(*gallery("q_measured"), LIMITS, ("steady_state", "power_balance", "signs"), run_for=0.3)
     assert found.trusted
     assert found.not_judged == ["the sign of its droop of reactive power"]

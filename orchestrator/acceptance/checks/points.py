@@ -5,18 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from orchestrator.acceptance.checks import port
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.droop import FREQUENCY, VOLTAGE
-from orchestrator.acceptance.checks.port import (
-    DRIFT,
-    WHY,
-    cannot_import,
-    current_limit,
-    currents,
-    followed,
-    present_current,
-    rating_of,
-)
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.binding.misfits import BALANCE, NO_LIMIT
@@ -60,16 +51,16 @@ def _points(subject: Subject) -> Iterator[tuple[str, OperatingAt]]:
 )
 def operating_points(subject: Subject) -> CheckResult:
     if not subject.starts:
-        return not_applicable("operating_points", WHY["no start" if subject.port else "no port"])
+        return not_applicable("operating_points", port.WHY["no start" if subject.port else "no port"])
     tried, left_out, found = 0, [], []
     for words, point in _points(subject):
-        if reason := cannot_import(subject, point):
+        if reason := port.cannot_import(subject, point):
             left_out.append(reason)
             continue
         try:
             with subject.running(point=point) as running:
-                begin = present_current(running)
-                moved = np.abs(currents(running, 0j, affordable(subject, _RESTS)) - begin).max()
+                begin = port.present_current(running)
+                moved = np.abs(port.currents(running, 0j, affordable(subject, _RESTS)) - begin).max()
         except ComponentError as error:
             left_out.append(f"{words} it refuses to work: {error.log or error.status}")
             continue
@@ -81,9 +72,9 @@ def operating_points(subject: Subject) -> CheckResult:
             return failed("operating_points", "not a number", f"{words} its current is no number")
         if abs(power - complex(point.P, point.Q)) > BALANCE:
             return failed("operating_points", "power not as asked", f"{says}, and is as asked at other points")
-        if moved > DRIFT and point not in _FULL:
+        if moved > port.DRIFT and point not in _FULL:
             return failed("operating_points", "no steady state", f"{words} its current moves by {moved:.3g} pu")
-        if moved > DRIFT:
+        if moved > port.DRIFT:
             left_out.append(f"{words} its current moves by {moved:.3g} pu")
     seen = f"it starts and rests at {tried} points, among them {'none' if not tried else 'no power and full power'}"
     if coarse := _coarse(found):
@@ -112,9 +103,9 @@ def ratings(subject: Subject) -> CheckResult:
         return not_applicable("ratings", "because it takes no rating (the binding has no [start.S_n])")
     draw, seen, refused, otherwise = subject.random("ratings"), [], [], []
     with subject.running() as running:
-        own = rating_of(running)
+        own = port.rating_of(running)
     usual, answer = _in_a_dip(subject, own)[1], _answer(subject, own)
-    limit = current_limit(subject)
+    limit = port.current_limit(subject)
     for bounds in (_SMALLER, _LARGER):
         part = round(draw.uniform(*bounds), 3)
         words = f"at S_n = {part * own:.4g} MVA, {part:g} of what it has"
@@ -153,9 +144,9 @@ def _in_a_dip(subject: Subject, rating: float) -> tuple[complex, float]:
     """The power from which it starts at a rating [MVA], and the current over the last cycle of a dip [pu, S_n]."""
     h = subject.step_size
     with subject.running(parameters={"S_n": rating}) as running:
-        power = subject.start_voltage * present_current(running).conjugate()
-        currents(running, 0j, max(1, round(_CYCLE / h)))
-        during = currents(running, (_DIP - 1) * subject.start_voltage, max(1, round(_DIP_LASTS / h)))
+        power = subject.start_voltage * port.present_current(running).conjugate()
+        port.currents(running, 0j, max(1, round(_CYCLE / h)))
+        during = port.currents(running, (_DIP - 1) * subject.start_voltage, max(1, round(_DIP_LASTS / h)))
     return power, float(np.abs(during[-max(1, round(_CYCLE / h)) :]).mean())
 
 
@@ -164,7 +155,7 @@ def _answer(subject: Subject, rating: float) -> complex:
     h = subject.step_size
     steps = affordable(subject, round(_ANSWERS / h))
     with subject.running(parameters={"S_n": rating}) as running:
-        begin = present_current(running)
+        begin = port.present_current(running)
         change = (1 - VOLTAGE) * np.exp(-100j * np.pi * FREQUENCY * h * np.arange(steps))
-        current = followed(running, change)
+        current = port.followed(running, change)
     return complex((current * np.abs(change) / change)[-max(1, round(_CYCLE / h)) :].mean() - begin)

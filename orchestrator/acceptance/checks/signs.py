@@ -7,19 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.acceptance.checks import droop as droops
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.droop import (
-    ABSORBING,
-    CHARGING,
-    FREQUENCY,
-    POINT,
-    SETTLED,
-    VOLTAGE,
-    DroopAnswer,
-    Way,
-    droop,
-    further,
-)
 from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
@@ -103,21 +92,21 @@ def signs(subject: Subject) -> CheckResult:
         return not_applicable(
             "signs", f"because {steps} steps of {subject.step_size:g} s show too little of its answer"
         )
-    places = [POINT]
+    places = [droops.POINT]
     if subject.starts:
         draw = subject.random("signs")
         high, low = (OperatingAt(round(draw.uniform(*bounds), 3), 0.0, 0.6, 0.1) for bounds in (_HIGH, _LOW))
-        places += [p for p in (subject.use.point, ABSORBING, CHARGING, high, low) if p is not None]
+        places += [p for p in (subject.use.point, droops.ABSORBING, droops.CHARGING, high, low) if p is not None]
     seen, refused = list[CheckResult](), []
     for point in places:
-        if point is CHARGING and cannot_import(subject, point):
+        if point is droops.CHARGING and cannot_import(subject, point):
             continue  # which 'power_balance' tells
         try:
             result = _at(subject, steps, point)
-            if point is CHARGING and seen and not result.fault:
+            if point is droops.CHARGING and seen and not result.fault:
                 result = _evenly(_summary(seen), result)
         except ComponentError as error:
-            if point is CHARGING:
+            if point is droops.CHARGING:
                 continue
             refused.append(f"small changes of voltage or frequency at {_named(point)} end with an error: {error}")
             continue
@@ -143,7 +132,7 @@ def _evenly(giving: CheckResult, taking: CheckResult) -> CheckResult:
     """The result while it takes power; a failure where its droop of the reactive power is another one than before.
 
     It lowers the answer to the voltage from the first cycle on, or raises it: not by turns."""
-    settled = all(result.figures["moving"][0] < SETTLED for result in (giving, taking))
+    settled = all(result.figures["moving"][0] < droops.SETTLED for result in (giving, taking))
     kept, kept_now = (result.figures["Q_in_parts_of_the_first_cycle"] for result in (giving, taking))
     if settled and min(kept, kept_now) < 1 - _TURNED and max(kept, kept_now) > 1 + _TURNED:
         says = f"of the reactive power that less voltage brings in the first cycle {kept_now:.0%} are left in the end "
@@ -195,17 +184,17 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     return passed("signs", said, **figures)
 
 
-def _answers(subject: Subject, steps: int, point: OperatingAt) -> tuple[DroopAnswer, DroopAnswer]:
-    omega = 2 * pi * _rated(subject) * FREQUENCY
+def _answers(subject: Subject, steps: int, point: OperatingAt) -> tuple[droops.DroopAnswer, droops.DroopAnswer]:
+    omega = 2 * pi * _rated(subject) * droops.FREQUENCY
     return (
-        _answer(subject, steps, point, lambda sign, time: np.full(len(time), 1 - sign * VOLTAGE, complex)),
+        _answer(subject, steps, point, lambda sign, time: np.full(len(time), 1 - sign * droops.VOLTAGE, complex)),
         _answer(subject, steps, point, lambda sign, time: np.exp(-1j * sign * omega * time)),
     )
 
 
 def _answer(
     subject: Subject, steps: int, point: OperatingAt, factor: Callable[[float, Numbers], Complex]
-) -> DroopAnswer:
+) -> droops.DroopAnswer:
     """Change the voltage by a factor of time, up and down."""
     h = subject.step_size
     time: Numbers = np.arange(steps, dtype=np.float64) * h
@@ -230,19 +219,19 @@ def _answer(
     half = [(a - b) / 2 for a, b in zip(*found, strict=True)]
     i, s = ([part[window].mean() for window in windows] for part in half)
     moving, far = float(_apart(s[1], s[2])), max(way.far for way in ways)
-    return DroopAnswer(complex(i[2]), complex(s[0]), complex(s[2]), moving, far, (ways[0], ways[1]))
+    return droops.DroopAnswer(complex(i[2]), complex(s[0]), complex(s[2]), moving, far, (ways[0], ways[1]))
 
 
-def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> Way:
+def _way(power: Complex, omega: Numbers | None, windows: list[slice]) -> droops.Way:
     late, later = (complex(power[window].mean()) for window in windows[1:])
     far = float(np.nan_to_num(np.abs(power), nan=np.inf).max())
     part = len(power) // 3
     (before, _), (at_last, crossings) = _swing(power[part : 2 * part]), _swing(power[-part:])
     ringing = before, at_last, crossings
     if omega is None:
-        return Way(later, _apart(late, later), far, None, 0.0, ringing)
+        return droops.Way(later, _apart(late, later), far, None, 0.0, ringing)
     tail = omega[windows[1].start :]
-    return Way(later, _apart(late, later), far, float(omega[windows[2]].mean()), float(np.ptp(tail)), ringing)
+    return droops.Way(later, _apart(late, later), far, float(omega[windows[2]].mean()), float(np.ptp(tail)), ringing)
 
 
 def _swing(power: Complex) -> tuple[float, int]:
@@ -262,7 +251,7 @@ def _windows(end: float) -> tuple[tuple[float, float], ...]:
     return _EARLY, (0.7 * end, 0.8 * end), (0.9 * end, end)
 
 
-def _wrong(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> tuple[str, str] | None:
+def _wrong(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer) -> tuple[str, str] | None:
     if frequency.far > _AWAY and voltage.far > _AWAY:
         return "unstable", "small changes of voltage and of frequency at a stiff bus make its power run away"
     for answer, kind in zip((voltage, frequency), ("voltage", "frequency"), strict=True):
@@ -291,16 +280,16 @@ def _wrong(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> 
 
 def _least(point: OperatingAt) -> float:
     """Constant current or impedance takes so much reactive power with the voltage, and is no answer."""
-    return 3 * VOLTAGE * abs(point.Q) + _SOME
+    return 3 * droops.VOLTAGE * abs(point.Q) + _SOME
 
 
-def _rests(way: Way) -> bool:
+def _rests(way: droops.Way) -> bool:
     return way.far <= _AWAY and way.moving < max(_SOME, _SETTLED * abs(way.power))
 
 
-def _lost(*answers: DroopAnswer) -> str:
+def _lost(*answers: droops.DroopAnswer) -> str:
     """Which change makes it run away, where the opposite one does not; "" where there is none."""
-    for answer, kind, size in zip(answers, ("voltage", "frequency"), (VOLTAGE, FREQUENCY), strict=True):
+    for answer, kind, size in zip(answers, ("voltage", "frequency"), (droops.VOLTAGE, droops.FREQUENCY), strict=True):
         for here, there, word in zip(answer.ways, answer.ways[::-1], _WORDS, strict=True):
             if here.far > _AWAY and here.moving > _LOST and there.far < _AWAY / 2:
                 return (
@@ -310,28 +299,28 @@ def _lost(*answers: DroopAnswer) -> str:
     return ""
 
 
-def _wrong_omega(frequency: DroopAnswer) -> tuple[str, str] | None:
+def _wrong_omega(frequency: droops.DroopAnswer) -> tuple[str, str] | None:
     """In synchronism its frequency is the network's, which the changes moved."""
     for sign, way in zip(_SIGNS, frequency.ways, strict=True):
         if way.omega is None or not _rests(way) or way.omega_moving > _OMEGA_APART / 10:
             continue
-        network = 1 - sign * FREQUENCY
+        network = 1 - sign * droops.FREQUENCY
         if abs(way.omega - network) > _OMEGA_APART:
             return "wrong frequency", f"omega settles at {way.omega:.6g} where the network's frequency is {network:.6g}"
     return None
 
 
-def _lag(frequency: DroopAnswer) -> str:
+def _lag(frequency: droops.DroopAnswer) -> str:
     """How far an omega is behind that still moves where the power rests: where its angle rests, it has arrived."""
     for sign, way in zip(_SIGNS, frequency.ways, strict=True):
-        network = 1 - sign * FREQUENCY
-        if way.omega is not None and way.moving < SETTLED and abs(way.omega - network) > _OMEGA_APART:
+        network = 1 - sign * droops.FREQUENCY
+        if way.omega is not None and way.moving < droops.SETTLED and abs(way.omega - network) > _OMEGA_APART:
             return f"omega is {way.omega:.6g} and still on its way to the network's {network:.6g}, and its power rests"
     return ""
 
 
 def _wrong_droop(
-    subject: Subject, steps: int, point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer
+    subject: Subject, steps: int, point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer
 ) -> tuple[tuple[str, str] | None, str]:
     """Look closer where lower voltage brings more reactive power in the end than in the first cycle.
 
@@ -341,18 +330,18 @@ def _wrong_droop(
         return None, ""
     if not subject.starts or not voltage.early_power.imag > 0:
         return None, f"{not_judged}it takes no start values, or gives no reactive power at first"
-    if max(voltage.moving, frequency.moving) > SETTLED:
+    if max(voltage.moving, frequency.moving) > droops.SETTLED:
         steps *= 3
-    found = [] if max(voltage.moving, frequency.moving) > SETTLED else [(point, voltage, frequency)]
-    for other in (point, *further(point))[len(found) :]:
+    found = [] if max(voltage.moving, frequency.moving) > droops.SETTLED else [(point, voltage, frequency)]
+    for other in (point, *droops.further(point))[len(found) :]:
         try:
             answers = _answers(subject, steps, other)
         except ComponentError:
             continue  # it may not be able to work there
-        if max(answer.moving for answer in answers) > SETTLED:
+        if max(answer.moving for answer in answers) > droops.SETTLED:
             return None, f"{not_judged}it does not settle in time"
         found.append((other, *answers))
-    slope = droop(found) if found else None
+    slope = droops.droop(found) if found else None
     if slope is None:
         return None, f"{not_judged}it follows no linear law"
     if slope > 0:
@@ -361,10 +350,10 @@ def _wrong_droop(
     return ("wrong sign", f"{says}: look for the sign of Q in its droop"), ""
 
 
-def _said(point: OperatingAt, voltage: DroopAnswer, frequency: DroopAnswer) -> str:
+def _said(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer) -> str:
     q, p = voltage.power.imag, frequency.power.real
-    first = f"{100 * VOLTAGE:g} % less voltage gives {q:+.3g} pu of reactive power"
-    second = f"{100 * FREQUENCY:g} % less frequency {p:+.3g} pu of active power"
+    first = f"{100 * droops.VOLTAGE:g} % less voltage gives {q:+.3g} pu of reactive power"
+    second = f"{100 * droops.FREQUENCY:g} % less frequency {p:+.3g} pu of active power"
     if abs(q) < _least(point):
         first += " (it does not support the voltage)"
     if abs(p) < _SOME:
