@@ -12,7 +12,6 @@ from time import monotonic
 from typing import Any
 
 from fmus.toolchain.removal import remove_tree
-from orchestrator import errors
 from orchestrator.acceptance.checks import base
 from orchestrator.acceptance.checks.all import CHECKS, ORDER
 from orchestrator.acceptance.checks.running import RUN_FOR
@@ -20,6 +19,17 @@ from orchestrator.acceptance.checks.subject import Subject, Use
 from orchestrator.acceptance.process import FmuProcess, ProcessEndedError
 from orchestrator.binding.binding import bind, read_table
 from orchestrator.binding.misfits import likely_cause
+from orchestrator.errors import (
+    BindingError,
+    ComponentError,
+    CosimError,
+    EndedError,
+    ErrorKind,
+    FmuFileError,
+    HostileFmuError,
+    InputError,
+    UnsupportedFmuError,
+)
 from orchestrator.fmi.archive import extract, listed_twice
 from orchestrator.fmi.description import FmuDescription, read_description
 from orchestrator.fmi.instance import compile_adapters
@@ -108,15 +118,13 @@ def check_fmu(
     unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
     if unknown:
         known = ", ".join([*FILE_CHECKS, *CHECKS])
-        raise errors.InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
+        raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
     if "binding" in only and binding is None:
-        raise errors.InputError(
-            "the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)"
-        )
+        raise InputError("the check 'binding' needs a binding; give one with --binding (`gfor fmu bind` drafts one)")
     if fmu.is_dir():
-        raise errors.InputError(f"{fmu}: it is a folder; give the path of an .fmu")
+        raise InputError(f"{fmu}: it is a folder; give the path of an .fmu")
     if not fmu.is_file():
-        raise errors.InputError(f"{fmu}: there is no such file; give the path of an .fmu")
+        raise InputError(f"{fmu}: there is no such file; give the path of an .fmu")
     if binding is not None:
         read_table(binding)  # what is wrong with its form is not the FMU's fault
     seed = int(hashlib.sha256(fmu.read_bytes()).hexdigest()[:6], 16) if seed is None else seed
@@ -124,11 +132,11 @@ def check_fmu(
     try:
         described = read_description(fmu)
         directory = extract(fmu)
-    except errors.UnsupportedFmuError as error:
+    except UnsupportedFmuError as error:
         report.results.append(base.not_supported("archive", error))
         return report
-    except errors.FmuFileError as error:
-        fault = error.fault if isinstance(error, errors.HostileFmuError) else "unreadable"
+    except FmuFileError as error:
+        fault = error.fault if isinstance(error, HostileFmuError) else "unreadable"
         report.results.append(base.failed("archive", fault, str(error)))
         return report
     try:
@@ -170,8 +178,8 @@ def _bound(report: AcceptanceReport, described: FmuDescription, binding: Path) -
     """The FMU behind its binding; None, with a failure in the report, where that does not fit."""
     try:
         bound = bind(described, binding)
-    except errors.BindingError as error:
-        differ = any(p.kind is errors.ErrorKind.UNITS for p in error.problems)
+    except BindingError as error:
+        differ = any(p.kind is ErrorKind.UNITS for p in error.problems)
         says = "; ".join(map(str, error.problems))
         result = base.failed("binding", "wrong units" if differ else "binding does not fit", f"{binding.name}: {says}")
         remedy = (
@@ -257,15 +265,15 @@ class _Runner:
         except ProcessEndedError as error:
             doing = self._subject.doing
             return base.failed(check.name, error.fault, f"{doing}: {error.how}" if doing else error.how)
-        except errors.EndedError as error:
+        except EndedError as error:
             return _ended(check.name, self._subject, error)
-        except errors.UnsupportedFmuError as error:
+        except UnsupportedFmuError as error:
             return base.not_supported(check.name, error)
-        except errors.ComponentError as error:
+        except ComponentError as error:
             return base.failed(check.name, _REFUSED.get(error.call, "refused call"), str(error))
-        except errors.InputError:
+        except InputError:
             raise
-        except errors.CosimError as error:
+        except CosimError as error:
             return base.failed(check.name, "refused call", str(error))
         except Exception as error:  # a check that fails by itself must not hide the others, nor count as passed
             where = traceback.extract_tb(error.__traceback__)[-1]
@@ -277,7 +285,7 @@ class _Runner:
             self._process.close()
 
 
-def _ended(name: str, subject: Subject, error: errors.EndedError) -> base.CheckResult:
+def _ended(name: str, subject: Subject, error: EndedError) -> base.CheckResult:
     """An orderly end is no fault; one that comes earlier than before is worth a word."""
     if subject.ends is None or error.ended_at < subject.ends * (1 - 1e-9):
         says = f"it ended its simulation by itself at t = {error.ended_at:.6g} s"

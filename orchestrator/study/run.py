@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from orchestrator import errors
 from orchestrator.analysis.coupling_growth import coupling_growth
 from orchestrator.analysis.critical_modes import nearest_eigenvalue
 from orchestrator.analysis.device_start import misfits_of, sentences
@@ -21,6 +20,14 @@ from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.run_state import NOT_KEPT
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.statistics import StepStatistics
+from orchestrator.errors import (
+    AnalysisError,
+    ComponentError,
+    CosimError,
+    NotTakenUpError,
+    ResultsError,
+    RunInterruptedError,
+)
 from orchestrator.federation.choice import Federates
 from orchestrator.federation.component import obstacle_of
 from orchestrator.federation.federation import Federation
@@ -67,7 +74,7 @@ class RunResult:
     ring_down: IdentifiedMode | None = None
     shifts: list[ModeShift] = field(default_factory=list)
     linear: xr.Dataset | None = None
-    failure: errors.CosimError | None = None  # the error that ended the run before its time
+    failure: CosimError | None = None  # the error that ended the run before its time
     # what the run did wrong, each said once, in the order of its beginning
     findings: list[Finding] = field(default_factory=list)
     # what kept each foreign FMU from the rest of the machine, by component
@@ -121,7 +128,7 @@ def run_scenario(
             return _run(ready, frequency_range, observers, linear, recording, None, threads, boxes, federation)
     try:
         return _run(prepared, frequency_range, observers, linear, recording, checkpoints, threads, boxes)
-    except errors.NotTakenUpError as error:
+    except NotTakenUpError as error:
         if checkpoints is None:
             raise
         checkpoints.forget(str(error))
@@ -135,7 +142,7 @@ def _run(
 ) -> RunResult:  # fmt: skip
     watch = Watch(prepared, recording)
     statistics = None
-    failure: errors.CosimError | None = None
+    failure: CosimError | None = None
     with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
@@ -157,12 +164,12 @@ def _run(
             statistics = master.run(
                 prepared.stop_time, prepared.events, [*watch.observers, *observers], checkpoints or NOT_KEPT
             )
-        except errors.NotTakenUpError:
+        except NotTakenUpError:
             raise
-        except errors.CosimError as error:
+        except CosimError as error:
             failure = error
         except KeyboardInterrupt:
-            failure = errors.RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
+            failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
     dataset, failure = _recorded(watch, prepared, recording, failure)
     findings = watch.findings(failure, master.late_starts, modes.misfits)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
@@ -186,13 +193,13 @@ def _diverging(master: Master) -> list[str]:
     boxes = [name for name, component in master.components.items() if obstacle(component)]
     try:
         return coupling_growth(master, boxes)
-    except (errors.AnalysisError, errors.ComponentError):
+    except (AnalysisError, ComponentError):
         return []  # they cannot be looked at so, which is no fault of theirs
 
 
 def _recorded(
-    watch: Watch, prepared: PreparedScenario, recording: RecordingFolder | None, failure: errors.CosimError | None
-) -> tuple[xr.Dataset, errors.CosimError | None]:
+    watch: Watch, prepared: PreparedScenario, recording: RecordingFolder | None, failure: CosimError | None
+) -> tuple[xr.Dataset, CosimError | None]:
     """What was recorded, and the failure, which may be that it cannot be written."""
     further = {} if failure is None else {ENDED_EARLY: str(failure)}
     if recording is None:
@@ -200,11 +207,11 @@ def _recorded(
     try:
         recording.join(recording.folder.parent / TRAJECTORY, further)
         return open_whole(recording.folder.parent / TRAJECTORY), failure
-    except errors.ResultsError as error:
+    except ResultsError as error:
         kept = trajectory_dataset(watch.recorder, prepared)  # the looks, which are in memory
-        if failure is None or isinstance(failure, errors.ResultsError):
+        if failure is None or isinstance(failure, ResultsError):
             return kept, failure or error
-        return kept, errors.ResultsError(f"{failure}; and what was recorded is not published: {error}")
+        return kept, ResultsError(f"{failure}; and what was recorded is not published: {error}")
 
 
 def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
@@ -213,7 +220,7 @@ def _shifts(master: Master, modes: ModesResult) -> list[ModeShift]:
         return []
     try:
         exact = nearest_eigenvalue(modes.system, modes.electromechanical.eigenvalue)
-    except errors.AnalysisError:
+    except AnalysisError:
         return []
     schedules = {master.schedule.name: master.schedule}
     if not master.schedule.is_second_order:  # else components are not told the step, as they would be under jacobi
