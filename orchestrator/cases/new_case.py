@@ -36,12 +36,14 @@ _MOST_CURVES = 12
 
 @dataclass(frozen=True)
 class WantedConverter:
-    """``bus 9, 300 MVA, 200 MW, less sg3``; ``less`` is the machine that feeds so much less."""
+    """``bus 9, 300 MVA, 200 MW, less sg3``; ``less`` is the machine that feeds so much less, or, with ``instead of``,
+    that it replaces."""
 
     bus: str
     rating_mva: float
     p_mw: float
     less: str | None = None
+    replaces: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,9 @@ def read_converter(text: str) -> WantedConverter:
     """Read ``bus 9, 300 MVA, 200 MW, less sg3``, in any order.
 
     Raises `InputError` with what is missing, given twice or not understood."""
-    how = "write it like 'bus 9, 300 MVA, 200 MW, less sg3' (the last part may be left out)"
+    how = "write it like 'bus 9, 300 MVA, 200 MW, less sg3' (or 'instead of sg3'; the last part may be left out)"
     found: dict[str, str] = {}
+    replaces = False
     for part in (part.strip() for part in text.split(",")):
         quantity = re.fullmatch(r"[-+\d.eE]+\s*(MVA|GVA|kVA|MW|GW|kW)", part)
         word, _, rest = part.partition(" ")
@@ -89,6 +92,8 @@ def read_converter(text: str) -> WantedConverter:
             key = "MVA" if quantity[1].endswith("VA") else "MW"
         elif word in ("bus", "less") and rest.strip():
             key = word
+        elif part.startswith("instead of "):
+            key, rest, replaces = "less", part.removeprefix("instead of "), True
         elif re.fullmatch(r"bus_\w+", part):
             key, rest = "bus", part
         else:
@@ -102,7 +107,7 @@ def read_converter(text: str) -> WantedConverter:
     rating, power = to_unit(found["MVA"], "MVA"), to_unit(found["MW"], "MW")
     if not 0 < rating < math.inf or not abs(power) <= rating:
         raise InputError(f"--converter {text!r}: {power:g} MW with a rating of {rating:g} MVA; {how}")
-    return WantedConverter(found["bus"], rating, power, found.get("less"))
+    return WantedConverter(found["bus"], rating, power, found.get("less"), replaces)
 
 
 def write_case(wanted: WantedCase) -> NewCase:
@@ -194,6 +199,8 @@ class _Place:
     @property
     def changed(self) -> dict[str, str]:
         """Values of every scenario with the converter."""
+        if self.wanted.replaces:
+            return {}
         left = (self.before_mw - self.wanted.p_mw) / self.rating_mva
         return {f"{self.less}.P_0": f"{left:.6f}"} if self.less else {}
 
@@ -219,6 +226,13 @@ def _placed(wanted: WantedConverter, base: PreparedScenario) -> _Place:
                          f"{close_names(wanted.less, units, known)}")  # fmt: skip
     rating = plans[wanted.less].number("S_n")
     power = flow.powers[wanted.less].real * rating
+    if wanted.replaces:
+        if wanted.less in at_slack:
+            raise InputError(f"--converter: instead of {wanted.less}: it is at the slack; replace another, or write "
+                             "another slack into the files")  # fmt: skip
+        return replace(found, less=wanted.less, before_mw=power, rating_mva=rating)
+    if wanted.less not in at_slack and abs(wanted.p_mw - power) < 1e-6:
+        raise InputError(f"--converter: {wanted.less} would feed nothing; write 'instead of {wanted.less}'")
     if wanted.p_mw > power + 1e-6:
         raise InputError(
             f"--converter: {wanted.less} feeds {power:.5g} MW and cannot feed {wanted.p_mw:g} MW less; give the "
@@ -279,7 +293,9 @@ class _Text:
         if self._place is not None:
             p, w = self._place, self._place.wanted
             dispatch = f"the slack ({p.slack}) feeds {w.p_mw:g} MW less"
-            if p.less:
+            if w.replaces:
+                dispatch = f"{p.less} is gone ({p.before_mw:.5g} MW before); the slack ({p.slack}) feeds the difference"
+            elif p.less:
                 dispatch = f"{p.less} feeds {w.p_mw:g} MW less ({p.before_mw:.5g} before), with its rating and inertia"
             ours = "ours, with the POD gains of the paper's system (`gfor design` finds others)"
             what = ours if device is None else device.name
@@ -382,8 +398,9 @@ class _Text:
         p = self._place
         values = [f'"{key}" = {value}' for key, value in p.changed.items()] if p else []
         values += [f'"{enabled}" = true'] if enabled else []
-        less = f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW" if p and p.less else ""
-        settings = [f"set = {{ {', '.join(values)} }}{less}"] if values else []
+        less = f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW" if p and p.changed else ""
+        settings = [f'remove = ["{p.less}"]'] if p and p.wanted.replaces else []
+        settings += [f"set = {{ {', '.join(values)} }}{less}"] if values else []
         return [f"[scenarios.{name}]", f'title = "{title}"', *settings]
 
     def _plots(self) -> list[list[str]]:

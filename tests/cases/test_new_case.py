@@ -101,6 +101,15 @@ def test_the_slack_needs_no_new_power(files):
     assert case.scenarios["converter"].set == {}
 
 
+def test_a_converter_can_replace_a_machine(files):
+    case, new = made(files, "bus 13, 200 MVA, 160 MW, instead of sg3")
+    assert "sg3 is gone (160 MW before)" in "".join(new.assumed)
+    base, converter = case.prepare(["base", "converter"])
+    assert "sg3" in base.system.components
+    assert "sg3" not in converter.system.components
+    assert compute_modes(converter).stability.stable
+
+
 def test_without_dynamics_data_the_machines_are_typical_and_said(files):
     _, new = made(files[:1])
     assert "machines: no dynamics data" in "".join(new.assumed)
@@ -112,6 +121,8 @@ def test_without_dynamics_data_the_machines_are_typical_and_said(files):
         ("bus 31, 100 MVA, 60 MW", "the network has no bus '31'"),
         ("bus 13, 100 MVA, 60 MW, less sg33", "no unit 'sg33' to feed less; did you mean sg3"),
         ("bus 13, 300 MVA, 200 MW, less sg3", "sg3 feeds 160 MW and cannot feed 200 MW less"),
+        ("bus 13, 300 MVA, 160 MW, less sg3", "sg3 would feed nothing; write 'instead of sg3'"),
+        ("bus 13, 300 MVA, 60 MW, instead of sg5", "it is at the slack"),
         ("100 MVA, 60 MW", "the bus is missing"),
         ("bus 13", "the rating in MVA and the power in MW is missing"),
         ("bus 13, 100 MVA, 60 MW, cheap", "'cheap' is not understood"),
