@@ -62,7 +62,7 @@ class Hidden:
     least_damped: complex | None
     electromechanical: tuple[complex, ...] = ()
 
-    def sentence(self) -> str:
+    def sentence(self, *, remedy: bool = True) -> str:
         low, high = self.frequency_range
         words = "oscillatory mode lies" if self.count == 1 else "oscillatory modes lie"
         text = f"{self.count} {words} outside {low:g} to {high:g} Hz"
@@ -75,7 +75,8 @@ class Hidden:
         more = f" and {len(shown) - _SWINGS_SHOWN} more" if len(shown) > _SWINGS_SHOWN else ""
         highest = max(z.imag for z in self.electromechanical) / (2 * np.pi)
         wide = f"{min(low, self._lowest_swing):.2g}:{max(high, np.ceil(10 * highest) / 10):g}"
-        return f"{text}; electromechanical: {'; '.join(shown[:_SWINGS_SHOWN])}{more}: show them by --range {wide}"
+        text += f"; electromechanical: {'; '.join(shown[:_SWINGS_SHOWN])}{more}"
+        return f"{text}: show them by --range {wide}" if remedy else text
 
     def as_json(self) -> dict[str, Any]:
         """The number and the least damped of the hidden modes as JSON's types."""

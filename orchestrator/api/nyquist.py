@@ -24,7 +24,7 @@ def nyquist(
     device: str | Path, network: str | Path | None = None, *, frequency: float | str = 50.0, compensation: float = 0.0,
     angle: float | None = None, voltage: float | str | None = None, bus: str | None = None,
     components: Sequence[str] = (), scenario: str | None = None, values: Mapping[str, Any] | None = None,
-    scr: float | None = None, rating: float | str | None = None,
+    scr: float | None = None, x_r: float = 10.0, rating: float | str | None = None,
 ) -> Nyquist:  # fmt: skip
     """Judge a device at a network.
 
@@ -50,6 +50,8 @@ def nyquist(
         ``component.parameter`` of the case, or variables of the FMU.
     scr
         Short-circuit ratio of an ideal source that stands for the network.
+    x_r
+        Reactance over resistance of its impedance.
     rating
         Of the device [MVA], where it states none.
 
@@ -73,7 +75,7 @@ def nyquist(
     return Asked(
         str(device), None if network is None else str(network), scenario, plain(values),
         frequency=to_unit(frequency, "Hz"), compensation=compensation / 100, angle=angle, bus=bus,
-        components=tuple(components), scr=scr, rating_mva=rated,
+        components=tuple(components), scr=scr, x_r=x_r, rating_mva=rated,
         kilovolt=None if voltage is None else to_unit(voltage, "kV"),
     ).judged()  # fmt: skip
 

@@ -90,7 +90,7 @@ class Desk:
             "modes": modes.as_json(),
             "title": scenario.title,
             "verdict": modes.stability.sentence(),
-            "outside": None if hidden is None else hidden.sentence().partition(": show them by ")[0],
+            "outside": None if hidden is None else hidden.sentence(remedy=False),
             "swings": [modes.result.swing_of(mode) for mode in modes],
             "copied": copied(
                 case.file, self._word, scenario.name, values, frequencies, question.get("events"),

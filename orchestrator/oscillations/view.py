@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from orchestrator.cases.given import Time, moment
-from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import CosimError
 from orchestrator.late import pd, xr
 from orchestrator.oscillations.measurements import Measurements
@@ -15,6 +14,9 @@ from orchestrator.oscillations.reading import measurements_of
 from orchestrator.oscillations.verdict import Located, locate
 from orchestrator.report.notebook import page
 from orchestrator.report.tables import PlainTable, make_table
+
+if TYPE_CHECKING:
+    from orchestrator.cases.prepare import PreparedScenario
 
 _SHOWN = 5
 

@@ -22,7 +22,7 @@ OTHERS = ("certification", "interop", "cli", "report/pdf.py", "cases/new_case.py
 
 COMMANDS_ALONE = {
     *("broker", "broker_port", "external", "like", "engine", "against", "contest", "details", "generator", "junit"),
-    *("method", "no_csv", "json", "with_linear_model", "per_unit", "units_checked", "scr"),
+    *("method", "no_csv", "json", "with_linear_model", "per_unit", "units_checked", "scr", "retune"),
 }
 """Options of errors that no function of the face has."""
 

@@ -74,7 +74,7 @@ def test_another_figure_is_computed_anew(changed, module, file, old, new):
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
-        ("sweep/point.py", "Prepare, find the steady state, linearise, find the modes.", "Prepare; find the modes."),
+        ("sweep/point.py", "its task and its result.", "task and result."),
         ("sweep/tables.py", "import", "import sys\nimport"),
         ("sweep/trajectories.py", "\n\n\n", "\n\n\nMOST = 3\n\n\n"),
         ("analysis/steady_state.py", "no steady state found: {changes};", "no steady state found, {changes};"),

@@ -60,7 +60,7 @@ def test_a_named_mode_is_followed_through_a_crossing(gfor, case, tmp_path):
     code, text, err = gfor(case, "--vary", "a1.gain=3:12:7", "--workers", 1, "--out", out)
     assert (code, err) == (0, "")
     assert "Trajectories over a1.gain [1/s]" in text
-    assert f"14 points computed. Results in {out}: sweep.nc, sweep.csv, trajectories.png" in text
+    assert f"14 points computed. Results in {out}: sweep.nc, sweep.csv, cells.json, trajectories.png" in text
     with xr.open_dataset(out / "sweep.nc") as data:
         assert dict(data.sizes) == {"scenario": 2, "a1.gain": 7, "trajectory": 2, "state": 2, "component": 5}
         gain = data["a1.gain"].values
