@@ -22,6 +22,11 @@ class OptionValues(ParameterFile):
         return f"{COMMAND_LINE} {key}"
 
 
+def joined_values(layers: Sequence[ParameterFile]) -> dict[str, Value]:
+    """Values by ``component.variable``, those of the strongest layer that has the key; the weakest comes first."""
+    return {key: value for layer in layers for key, value in layer.values.items()}
+
+
 def value_layers(draft: Draft, parameters: Sequence[ParameterFile], overrides: Mapping[str, Value]) -> list[Layer]:
     """All layers, weakest first: files of the scenario, the scenario, files of the command line, values of the command
     line."""

@@ -46,31 +46,22 @@ def copied(
     ]  # fmt: skip
     return {
         "command": shlex.join(words),
-        "toml": as_scenario(file, scenario, values, places),
+        "toml": tomli_w.dumps(explored(file, scenario, values, places)),
         "python": "\n".join(lines),
     }
 
 
 def events_of(file: CaseFile, scenario: str) -> list[dict[str, Any]]:
     """The events of a scenario, as its file has them."""
-    try:
-        raw = tomllib.loads(file.text)
-        own = raw["scenarios"][scenario].get("events")
-        return list(own if own is not None else raw.get("events", []))
-    except (tomllib.TOMLDecodeError, KeyError):  # of an SSP
-        own = file.scenarios[scenario].events
-        return [
-            event.model_dump(mode="json", exclude_unset=True) for event in (file.table.events if own is None else own)
-        ]
+    own = _as_written(file, scenario).get("events")
+    return list(own if own is not None else _tables(file).get("events", []))
 
 
-def saved(file: CaseFile, toml: str, folder: Path) -> Path:
-    """Write a copy of the case file with one scenario more, as `as_scenario` gives it; the file as it is stays."""
-    try:
-        tables = tomllib.loads(file.text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file.path}: it is no TOML file, so that no scenario can be added: {error}") from error
-    added = tomllib.loads(toml)
+def saved(file: CaseFile, added: Mapping[str, Any], folder: Path) -> Path:
+    """Write a copy of the case file with one scenario more, as `explored` gives it; the file as it is stays."""
+    tables = _tables(file)
+    if "name" not in tables:
+        raise InputError(f"{file.path}: it is no TOML file, so that no scenario can be added")
     scenarios, places = tables.setdefault("scenarios", {}), tables.get("diagram", {}).get("positions", {})
     if EXPLORED in scenarios:
         raise InputError(f"{file.path}: it has a scenario {EXPLORED!r} already; rename that one, then save again")
@@ -82,16 +73,27 @@ def saved(file: CaseFile, toml: str, folder: Path) -> Path:
     return place
 
 
-def as_scenario(
+def explored(
     file: CaseFile, scenario: str, values: Mapping[str, Value], places: Mapping[str, Sequence[float]] | None = None
-) -> str:
-    """A scenario of the case with further values, to be put at the end of its file."""
-    try:
-        table: dict[str, Any] = dict(tomllib.loads(file.text)["scenarios"][scenario])
-    except (tomllib.TOMLDecodeError, KeyError):  # of an SSP: what it comes to
-        table = file.scenarios[scenario].model_dump(mode="json", exclude_unset=True)
+) -> dict[str, Any]:
+    """Tables for a case file: a scenario of the case with further values, and places of buses."""
+    table = _as_written(file, scenario)
     kept = {".".join(path): value for path, value in flatten(table.get("set", {})) if ".".join(path) not in values}
     table["set"] = {**kept, **values}
     table["title"] = f"{table.get('title') or scenario}, explored"
     diagram = {"diagram": {"positions": {bus: list(xy) for bus, xy in places.items()}}} if places else {}
-    return tomli_w.dumps({"scenarios": {EXPLORED: table}, **diagram})
+    return {"scenarios": {EXPLORED: table}, **diagram}
+
+
+def _tables(file: CaseFile) -> dict[str, Any]:
+    """Of a case file; of an SSP none but the events that it comes to."""
+    try:
+        return tomllib.loads(file.text)
+    except tomllib.TOMLDecodeError:
+        return {"events": [event.model_dump(mode="json", exclude_unset=True) for event in file.table.events]}
+
+
+def _as_written(file: CaseFile, scenario: str) -> dict[str, Any]:
+    """A scenario's table; of an SSP what it comes to."""
+    found = _tables(file).get("scenarios", {}).get(scenario)
+    return dict(found) if found is not None else file.scenarios[scenario].model_dump(mode="json", exclude_unset=True)

@@ -17,7 +17,7 @@ from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import CosimError
-from orchestrator.explore.copied import as_scenario, copied, events_of, saved
+from orchestrator.explore.copied import copied, events_of, explored, saved
 from orchestrator.explore.diagram import diagram
 from orchestrator.explore.responses import linear, plotted, simulated
 from orchestrator.explore.slopes import slopes
@@ -66,7 +66,7 @@ class Desk:
             ),
             "response": lambda: linear(scenario(values), signals),
             "save": lambda: {
-                "file": str(saved(original.file, as_scenario(case.file, name, values, question.get("places")), _FOLDER))
+                "file": str(saved(original.file, explored(case.file, name, values, question.get("places")), _FOLDER))
             },
             "run": lambda: simulated(scenario(values), signals, lambda part: say({"part": part})),
         }

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from rich.markup import escape as escape_markup
 
+from orchestrator.cases.layers import joined_values
 from orchestrator.late import pd
 from orchestrator.operating_points.item import Status
 from orchestrator.report.cells import CELLS, Cell, CellLine, Cells
@@ -136,7 +137,7 @@ def _cells(summary: Summary) -> Cells:
         [CellLine(name, out=taken[name]) for name in outages],
         [CellLine(one.name, one.values, out=one.out) for one in plan.points],
         [[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
-        {key: value for layer in plan.layers for key, value in layer.values.items()},
+        joined_values(plan.layers),
         plan.tasks[0].study.step_size, plan.tasks[0].sharing,
     )  # fmt: skip
 

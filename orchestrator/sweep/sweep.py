@@ -12,6 +12,7 @@ from orchestrator.analysis.mode_tracking import ModeSet, is_ambiguous
 from orchestrator.cases.build_choices import ALPHA
 from orchestrator.cases.case import Case
 from orchestrator.cases.idle_values import Idle, idle_everywhere
+from orchestrator.cases.layers import joined_values
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -43,7 +44,7 @@ class SweepPlan:
     @property
     def overrides(self) -> dict[str, Value]:
         """Values by ``component.variable`` that hold for all points, those of the strongest layer that has the key."""
-        return {key: value for layer in self.layers for key, value in layer.values.items()}
+        return joined_values(self.layers)
 
     @property
     def number_of_points(self) -> int:
