@@ -46,7 +46,8 @@ def copied(
     ]  # fmt: skip
     return {
         "command": shlex.join(words),
-        "toml": tomli_w.dumps(explored(file, scenario, values, places)),
+        "toml": ("" if step is None else f"# with --step '{step!r} s'\n")
+        + tomli_w.dumps(explored(file, scenario, values, places)),
         "python": "\n".join(lines),
     }
 

@@ -10,6 +10,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cli import main
+from orchestrator.explore.copied import copied
 from orchestrator.explore.server import Explorer
 from orchestrator.explore.worker import Desk
 from orchestrator.report.cells import read_cells
@@ -91,6 +92,13 @@ def test_what_is_no_study_is_refused_by_name(tmp_path, capsys, change, text):
     error = capsys.readouterr().err
     assert text in error
     assert str(tmp_path) in error
+
+
+def test_what_is_copied_names_the_step_of_the_study():
+    found = copied(gfor.load("infinite_bus").file, "infinite_bus", "dip", {}, (0.1, 2.0), step=5e-4)
+    assert found["command"].endswith("--step '0.0005 s'")
+    assert "step=0.0005)" in found["python"]
+    assert found["toml"].startswith("# with --step '0.0005 s'\n[scenarios.explored]")
 
 
 @contextmanager
