@@ -35,6 +35,8 @@ class ScenarioFolder:
         self.path = folder / f"{scenario}{PARTIAL}{run}"
         try:
             self.path.mkdir(parents=True, exist_ok=True)
+            for left in self.path.rglob(f"{PARTIAL}*"):  # a resumed run has the id of the one that was killed
+                left.unlink()
         except OSError as error:
             raise not_written(self.path, error) from error
 

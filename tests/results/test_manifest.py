@@ -187,6 +187,16 @@ def test_folders_of_runs_that_did_not_end_are_listed(tmp_path):
     assert [p.name for p in unfinished(tmp_path)] == ["one.part-r1"]
 
 
+def test_a_resumed_run_removes_what_its_kill_left_half_written(tmp_path):
+    killed = ScenarioFolder(tmp_path, "one", "r1")
+    for name in ("trajectory.nc", "recording/000000000000.nc"):
+        write_text(killed.path / name, "whole")
+        write_text((killed.path / name).with_name(f".part-7-{name[-5:]}"), "half")
+    place = ScenarioFolder(tmp_path, "one", "r1").publish()
+    files = {path.relative_to(place).as_posix() for path in place.rglob("*") if path.is_file()}
+    assert files == {"trajectory.nc", "recording/000000000000.nc", MANIFEST}
+
+
 def test_each_file_is_listed_with_its_run(tmp_path):
     write(tmp_path, "r1")
     content = json.loads((tmp_path / "one" / MANIFEST).read_text(encoding="utf-8"))
