@@ -3,7 +3,9 @@
 A declaration becomes a line of the modelDescription, a row of the README's table, the bounds that
 the slave enforces and the unit that a case file is checked against."""
 
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 VariableType = Literal["Real", "Integer", "Boolean"]
@@ -46,6 +48,13 @@ class Usual:
 
     def fits(self, value: float) -> bool:
         return self.low <= value <= self.high or (self.or_zero and value == 0)
+
+
+def usual_beside(module: str, file: str = "usual.toml") -> dict[str, Usual]:
+    """Usual ranges by parameter, of a file beside a module."""
+    tables = tomllib.loads(Path(module).with_name(file).read_text(encoding="utf-8"))["usual"]
+    return {name: Usual(*ends, table["why"], table.get("or_zero", False))
+            for table in tables for name, ends in table["ranges"].items()}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
