@@ -62,7 +62,8 @@ def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
         "X_L": v.X_L, "accepted": v.accepted, "judged": v.judged, "faults": list(v.faults), "unknown": v.unknown,
         "modes": [mode_json(m) for m in v.modes], "modes_beside": [mode_json(m) for m in v.neighbours],
         "modes_without": [] if without is None else [_figures(x) for x in without.eigenvalues.tolist()],
-        "lowered": [_lowered_json(m) for m in v.lowered],
+        "lowered": [{"frequency_hz": m.frequency_hz, "from_percent": m.before_percent, "to_percent": m.damping_percent}
+                    for m in v.lowered],
         "growth": {name: number(p.growth) for name, p in points.items()},
         "stability": {name: p.stability for name, p in points.items()},
         "residual": {name: number(p.residual) for name, p in points.items()}, "power": having.power,
@@ -100,10 +101,6 @@ def mode_json(m: ModeVerdict) -> dict[str, Any]:
         "without": without, "likeness": m.similarity, "components": m.components, "accepted": m.accepted,
         "reason": m.reason, **({"doubt": m.doubt} if m.doubt else {}),
     }  # fmt: skip
-
-
-def _lowered_json(m: ModeVerdict) -> dict[str, Any]:
-    return {"frequency_hz": m.frequency_hz, "from_percent": m.before_percent, "to_percent": m.damping_percent}
 
 
 def _figures(value: complex) -> dict[str, float]:
