@@ -115,11 +115,6 @@ class Spectrum:
     # the mode of the largest real part at any frequency, zeros left out; None if all eigenvalues are zeros
     rightmost: Mode | None
 
-    @property
-    def growth_rate(self) -> float:
-        """Largest real part [1/s]."""
-        return float(self.eigenvalues.real.max(initial=-np.inf))
-
 
 def eigenvalues(model: LinearModel) -> NDArray[np.complex128]:
     """All eigenvalues [rad/s] without eigenvectors; ln(μ)/H for a step map."""

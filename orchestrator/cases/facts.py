@@ -12,8 +12,6 @@ _NAMES = {zip_: name for name, zip_ in LAWS.items()}
 
 @dataclass(frozen=True)
 class Facts:
-    """The network of a scenario, with its power flow."""
-
     sources: tuple[str, ...]  # files, as the case names them
     frequency_hz: float | None  # rated; None where no component has one
     # buses, machines, converters: how many; units out of service do not count

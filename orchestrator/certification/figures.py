@@ -104,7 +104,6 @@ def mode_json(m: ModeVerdict) -> dict[str, Any]:
 
 
 def _figures(value: complex) -> dict[str, float]:
-    """An eigenvalue [rad/s]."""
     return eigenvalue_json(value, 100 * damping_ratio(value))
 
 

@@ -75,8 +75,6 @@ class LineSwitching(Event):
 
 @dataclass(frozen=True, slots=True)
 class ShuntSwitching(Event):
-    """A shunt is disconnected, or connected again."""
-
     shunt: str
     connected: bool
 
