@@ -13,25 +13,8 @@ VariableType = Literal["Real", "Integer", "Boolean"]
 Kind = Literal["converter", "machine", "network", "load", ""]
 """A component's role in a power system; empty for none of these, such as a controller alone."""
 
-UNITS: dict[str, dict[str, float]] = {
-    # unit -> exponents of SI base units, with the factor to them (FMI 2.0, section 2.2.2)
-    "1": {},
-    "pu": {},
-    "pu/s": {"s": -1},
-    "rad": {"rad": 1},
-    "rad/s": {"rad": 1, "s": -1},
-    "s": {"s": 1},
-    "s/s": {},
-    "1/s": {"s": -1},
-    "Hz": {"s": -1},
-    "MVA": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
-    "MW": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
-    "Mvar": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
-    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
-    "kV": {"kg": 1, "m": 2, "s": -3, "A": -1, "factor": 1e3},
-    "A": {"A": 1},
-    "kA": {"A": 1, "factor": 1e3},
-}
+UNITS: dict[str, dict[str, float]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+"""Unit → exponents of SI base units, with the factor to them."""
 
 
 @dataclass(frozen=True, slots=True)
