@@ -15,7 +15,7 @@ from orchestrator.certification.environment import environment
 from orchestrator.certification.form import NORM
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.parameters import parameter_rows
-from orchestrator.certification.point import COMPUTED, CONVERTER, PointResult
+from orchestrator.certification.point import COMPUTED, CONVERTER
 from orchestrator.certification.request import REACTANCES
 from orchestrator.certification.study import Certification
 from orchestrator.certification.swings import RecordedSwing, SwingTest
@@ -67,7 +67,10 @@ def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
         "growth": {name: number(p.growth) for name, p in points.items()},
         "stability": {name: p.stability for name, p in points.items()},
         "residual": {name: number(p.residual) for name, p in points.items()}, "power": having.power,
-        "findings": {name: p.findings for name, p in points.items()}, "converter_model": _model_json(having),
+        "findings": {name: p.findings for name, p in points.items()}, "converter_model": {
+            "source": having.linearised.get(CONVERTER), "order": having.identified,
+            "fit_error": having.fit_errors.get(CONVERTER),
+        },
         "warnings": {name: list(p.warnings) for name, p in points.items()},
         "time": None if v.time is None else time_json(v.time),
         "time_without": None if v.base_time is None else time_json(v.base_time),
@@ -88,11 +91,6 @@ def commands(X_L: float, scenario: str, *, identified: bool) -> dict[str, str]:
 def number(value: float) -> float | None:
     """Plain values for JSON, which has no NaN."""
     return value if math.isfinite(value) else None
-
-
-def _model_json(point: PointResult) -> dict[str, Any]:
-    error = point.fit_errors.get(CONVERTER)
-    return {"source": point.linearised.get(CONVERTER), "order": point.identified, "fit_error": error}
 
 
 def mode_json(m: ModeVerdict) -> dict[str, Any]:

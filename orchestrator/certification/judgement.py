@@ -151,7 +151,7 @@ def judge(
     if not having.failure and not modes:
         faults.append("no mode from 0.1 to 1.5 Hz was found, so that the eigenvalue criterion judged nothing")
     signal = watched(pod)
-    time, base = (_judge_response(point, signal, event_time) for point in (having, lacking))
+    time, base = (judge_response(point, signal, event_time) for point in (having, lacking))
     if time is not None and not time.accepted:
         faults.append(f"response of {signal}: {time.swings.reason}; and by its modes: {time.modal.reason}")
     if time is None and not having.failure:
@@ -197,18 +197,13 @@ def _small(moved: float, values: Numbers) -> str:
     return f"moves by {moved:.2g} pu, less than {_LEAST_MOVEMENT:g} pu"
 
 
-def _judge_response(point: PointResult, signal: str, event_time: float) -> TimeVerdict | None:
-    y = point.signals.get(signal)
-    return None if y is None or point.failure else judge_response(point.times, y, signal, event_time)
-
-
-def judge_response(times: Numbers, y: Numbers, signal: str, event_time: float) -> TimeVerdict:
-    y = slow_part(times, y)
+def judge_response(point: PointResult, signal: str, event_time: float) -> TimeVerdict | None:
+    if signal not in point.signals or point.failure:
+        return None
+    times, y = point.times, slow_part(point.times, point.signals[signal])
+    with_first = swing_test(times, y, event_time, drop_first=False)
     return TimeVerdict(
-        signal,
-        swing_test(times, y, event_time),
-        swing_test(times, y, event_time, drop_first=False),
-        modal_test(times, y, event_time + SETTLING),
+        signal, swing_test(times, y, event_time), with_first, modal_test(times, y, event_time + SETTLING)
     )
 
 
