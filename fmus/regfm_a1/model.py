@@ -14,6 +14,7 @@ from fmus.toolchain.variables import usual_beside
 
 S_N, P_0 = 1500.0, 0.9
 """Default rating [MVA] and dispatch [pu]: those of the two-area system's converter, whose place it can take."""
+USUAL = usual_beside(__file__)
 
 
 def regfm_a1_phasor() -> Model:
@@ -22,7 +23,7 @@ def regfm_a1_phasor() -> Model:
         "regfm_a1_phasor",
         "Droop-controlled grid-forming inverter REGFM_A1 of the WECC (phasor type)",
         kind="converter",
-        usual=usual_beside(__file__),
+        usual=USUAL,
     )
     port = device_port(m, S_n=S_N, P_0=P_0)
     RL = m.parameter("RL", 0.0, "pu", "Coupling resistance", base="S_n", minimum=0, source="chosen here")
