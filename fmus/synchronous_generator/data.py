@@ -3,6 +3,7 @@
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 NTS631 = "Norma técnica de supervisión 631 v2.0 (2020), sections 5.9-5.10"
 PAPER = "Mateu-Barriendos et al. 2024, appendix, synchronous generator parameters"
@@ -46,9 +47,10 @@ class GovernorData:
     source: str
 
 
-_DATA = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-SG1, SG2, IEEE118 = (MachineData(**_DATA[name]) for name in ("SG1", "SG2", "IEEE118"))
-IEEEG1_NTS631, IEEEG1_STAMP = (
-    GovernorData(**{key: tuple(value) if isinstance(value, list) else value for key, value in _DATA[name].items()})
-    for name in ("IEEEG1_NTS631", "IEEEG1_STAMP")
-)
+def _data(name: str) -> dict[str, Any]:
+    table = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))[name]
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
+
+
+SG1, SG2, IEEE118 = (MachineData(**_data(name)) for name in ("SG1", "SG2", "IEEE118"))
+IEEEG1_NTS631, IEEEG1_STAMP = (GovernorData(**_data(name)) for name in ("IEEEG1_NTS631", "IEEEG1_STAMP"))

@@ -36,8 +36,8 @@ class Usual:
 def usual_beside(module: str, file: str = "usual.toml") -> dict[str, Usual]:
     """Usual ranges by parameter, of a file beside a module."""
     tables = tomllib.loads(Path(module).with_name(file).read_text(encoding="utf-8"))["usual"]
-    return {name: Usual(*ends, table["why"], table.get("or_zero", False))
-            for table in tables for name, ends in table["ranges"].items()}  # fmt: skip
+    return {name: Usual(low, high, table["why"], table.get("or_zero", False))
+            for table in tables for name, (low, high) in table["ranges"].items()}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
