@@ -204,7 +204,6 @@ def make_mode(
 ) -> Mode:
     """A mode from its eigenvalue λ [rad/s] and the eigenvectors of A and Aᴴ, each of shape (n,).
 
-    ``value``: λ [rad/s].
     ``left``: eigenvector of Aᴴ, shape (n,), of any length and angle.
     ``right``: eigenvector of A, shape (n,), of any length and angle."""
     factors = np.abs(left.conj() * right)
