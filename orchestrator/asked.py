@@ -25,8 +25,6 @@ _LARGEST = 10**308  # of a whole number that a floating-point number can hold
 
 @dataclass(frozen=True)
 class FieldKind:
-    """What a field may be."""
-
     metavar: str
     # from an option's text, or a `ValueError` that says what is wrong with it; None for a switch
     read: Callable[[str], Any] | None
@@ -75,7 +73,6 @@ def asked(
 
 
 def asked_of(request: type) -> dict[str, Asked]:
-    """What a user may set of a request, by field."""
     found = {}
     for one in fields(request):
         if _ASKED in one.metadata:

@@ -35,17 +35,14 @@ class WrittenDll:
     sheet: Path
 
 
-def control_names() -> tuple[str, ...]:
-    return tuple(sorted({entry.name for entry in entry_points(group=GROUP)}))
-
-
 def control_part_of(name: str) -> ControlPart:
     for entry in entry_points(group=GROUP):
         if entry.name == name:
             part = entry.load()()
             assert isinstance(part, ControlPart)
             return part
-    raise ControlDllError(f"{name!r} has no control part to write as a DLL; choose from: {', '.join(control_names())}")
+    known = ", ".join(sorted({entry.name for entry in entry_points(group=GROUP)}))
+    raise ControlDllError(f"{name!r} has no control part to write as a DLL; choose from: {known}")
 
 
 def with_values(part: ControlPart, values: Mapping[str, float], sample_time: float) -> ControlPart:

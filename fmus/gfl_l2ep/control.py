@@ -1,18 +1,79 @@
-"""PLL, outer control and current control of the benchmark's converter.
+"""PLL with its freezing, current limit, outer control and current control of the benchmark's converter.
 
 Gains are those of the benchmark itself, so that its data can be entered as they are published."""
 
 from dataclasses import dataclass
 
-from fmus.gfl_l2ep.electrical import COLIB, Transformer, declare_transformer, transformer_equation
-from fmus.gfl_l2ep.freezing import running
-from fmus.gfl_l2ep.limits import Limits, declare_limits, limited
+from fmus.gfl_l2ep.electrical import COLIB, Start, Transformer, declare_transformer, transformer_equation
 from fmus.grid_following.pll import Frame, LoopDefaults, phase_locked_loop
 from fmus.toolchain.blocks import clamp, low_pass
 from fmus.toolchain.frames import Phasor, power, qd_state
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import BREAKER_TIME, DevicePort
-from fmus.toolchain.symbols import Expr, if_else, logic_and, logic_or, sqrt
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or, sqrt
+
+MEMORY = 1e-3
+"""Time constant [s] of the state that remembers; it passes the middle 0.7 ms after a threshold."""
+
+
+def running(m: ModelBuilder, v: Expr) -> Expr:
+    """1 while the PLL runs, 0 while it stands: below ``V_low``, and from there until ``V_high``.
+
+    ``v``: magnitude of the bus voltage [pu]."""
+    with m.scope("pll"), m.scope("freezing"):
+        low = m.parameter(
+            "V_low", 0.4, "pu", "Voltage below which the PLL stands; 0: never", base="bus", minimum=0.0, source=COLIB
+        )
+        high = m.parameter("V_high", 0.5, "pu", "Voltage above which it runs again", base="bus", source=COLIB)
+        m.require(high - low, "pll.freezing.V_high must be above pll.freezing.V_low")
+        awake = m.state("awake", 1.0, "1", "Memory of the thresholds: the PLL runs above 0.5")
+        runs = if_else(awake > 0.5, 1.0, 0.0)
+        m.derivative(awake, (if_else(v < low, 0.0, if_else(v > high, 1.0, runs)) - awake) / MEMORY)
+    return runs
+
+
+SMALLEST = 1e-3
+"""Least part of the limit's square under a root, for a finite derivative."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Largest current, largest active current now, and largest reactive current of the voltage control [pu, S_n]."""
+
+    I_max: Expr
+    active: Expr
+    reactive: Expr
+
+
+def declare_limits(m: ModelBuilder, start: Start, reactive: Expr) -> Limits:
+    """Declare the limit and the state that carries the active current's share.
+
+    ``start``: the operating point. It leaves sqrt(I_max² − i_q0²) for the reactive current of the voltage control;
+    ``reactive``: reactive current in the converter [pu, S_n]."""
+    with m.scope("current_limit"):
+        I_max = m.parameter("I_max", 1.0, "pu", "Largest current", base="S_n", minimum=0.1, source=COLIB)
+        T = m.parameter("tau", 0.002, "s", "Lag of the active current's limit", minimum=1e-3, source=COLIB)
+        recovery = m.parameter(
+            "recovery", 0.5, "pu/s", "Fastest recovery of the active current's limit", base="S_n", minimum=0.01,
+            source=COLIB,
+        )  # fmt: skip
+        m.require(
+            I_max - start.i.magnitude(),
+            "the power flow asks for more current than current_limit.I_max: lower P_0 or Q_0, or raise S_n",
+        )
+        most = m.state("I_active", _rest(I_max, start.i.im), "pu", "Largest active current", base="S_n")
+        m.derivative(most, fmin((_rest(I_max, reactive) - most) / T, recovery))
+    return Limits(I_max, clamp(most, 0, I_max), _rest(I_max, start.i.re))
+
+
+def limited(limits: Limits, active: Expr, reactive: Expr) -> Phasor:
+    """The current that is allowed [pu, S_n]."""
+    return Phasor(clamp(active, -limits.active, limits.active), clamp(reactive, -limits.I_max, limits.I_max))
+
+
+def _rest(most: Expr, other: Scalar) -> Expr:
+    return sqrt(fmax(most**2 - other**2, SMALLEST * most**2))
+
 
 LOOP = LoopDefaults(f_0=7.957747154594767, xi=1.0, source=f"{COLIB}: 5/(2π·0.1 s), from its gains 10/T and 25/T²")
 MODES = f"{COLIB}, mode 0; 0.1667 and 50 in mode 1"

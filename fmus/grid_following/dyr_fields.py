@@ -7,31 +7,17 @@ on references is not taken over; `approximation` names every field that it leave
 Sources: the order of fields as ANDES' reader and GridPACK's take it; the block diagrams as WECC's guide for generic
 wind and solar models shows them."""
 
+import tomllib
 from collections.abc import Mapping
+from pathlib import Path
 
 MODEL = "gfl_phasor"
 
-_ELECTRICAL = (
-    "Vdip Vup Trv dbd1 dbd2 Kqv Iqh1 Iql1 Vref0 {frozen} Tp QMax QMin VMAX VMIN Kqp Kqi Kvp Kvi {bias} Tiq dPmax dPmin "
-    "PMAX PMIN Imax Tpord"
-)
-_CURVES = " ".join(f"V{kind}{k} I{kind}{k}" for kind in "qp" for k in range(1, 5))
-
 CONVERTER = "REGCA1"
-# fmt: off
 FIELDS: dict[str, tuple[str, ...]] = {
-    CONVERTER: (
-        "Lvplsw", "Tg", "Rrpwr", "Brkpt", "Zerox", "Lvpl1", "Volim", "Lvpnt1", "Lvpnt0", "Iolim", "Tfltr", "Khv",
-        "Iqrmax", "Iqrmin", "Accel",
-    ),
-    "REECA1": tuple(
-        f"BUSR PFFLAG VFLAG QFLAG PFLAG PQFLAG {_ELECTRICAL} {_CURVES}".format(
-            frozen="Iqfrz Thld Thld2", bias="Vbias"
-        ).split()
-    ),
-    "REECB1": tuple(f"BUSR PFFLAG VFLAG QFLAG PQFLAG {_ELECTRICAL}".format(frozen="", bias="").split()),
+    record: tuple(fields.split())
+    for record, fields in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")).items()
 }
-# fmt: on
 """Fields behind the identifier of the machine, in the file's order, by PSS/E's name of the record."""
 
 PLANT = "REPCA1"

@@ -2,7 +2,6 @@
 
 Names of parameters and signals are those of the specification (PNNL-32278, September 2023)."""
 
-from fmus.converter_parts.usual import FILTER, VOLTAGE_DROOP
 from fmus.regfm_a1.droops import SPECIFICATION, active_droop, internal_voltage
 from fmus.toolchain.blocks import low_pass
 from fmus.toolchain.frames import Phasor, power
@@ -11,18 +10,11 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import DevicePort, device_port
 from fmus.toolchain.symbols import Expr, fmax, sqrt
-from fmus.toolchain.variables import Usual
+from fmus.toolchain.variables import usual_beside
 
 S_N, P_0 = 1500.0, 0.9
 """Default rating [MVA] and dispatch [pu]: those of the two-area system's converter, whose place it can take."""
-
-
-USUAL = {
-    "mp": Usual(0.001, 0.3, "droops of 0.5 to 10 % of rated frequency; rad/s would be 314 times as much"),
-    "mq": Usual(0.001, 0.5, VOLTAGE_DROOP, or_zero=True),
-    "XL": Usual(0.02, 0.6, FILTER),
-    "ImaxF": Usual(0.5, 10, "usual fault currents: 1 to 3 of the rated current"),
-}
+USUAL = usual_beside(__file__)
 
 
 def regfm_a1_phasor() -> Model:

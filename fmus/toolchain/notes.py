@@ -20,7 +20,7 @@ from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
 from fmus.toolchain.extras import installed_version
 
 _OWN = ("fmus", "gfor_fmu")
-_ENDINGS = {".py", ".c", ".h"}
+_ENDINGS = {".py", ".c", ".h", ".toml"}
 _LIBRARIES = ("gfor-cosim", "numpy", "pythonfmu", "scipy", "ziglang")
 
 

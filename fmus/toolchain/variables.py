@@ -3,7 +3,9 @@
 A declaration becomes a line of the modelDescription, a row of the README's table, the bounds that
 the slave enforces and the unit that a case file is checked against."""
 
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 VariableType = Literal["Real", "Integer", "Boolean"]
@@ -11,25 +13,8 @@ VariableType = Literal["Real", "Integer", "Boolean"]
 Kind = Literal["converter", "machine", "network", "load", ""]
 """A component's role in a power system; empty for none of these, such as a controller alone."""
 
-UNITS: dict[str, dict[str, float]] = {
-    # unit -> exponents of SI base units, with the factor to them (FMI 2.0, section 2.2.2)
-    "1": {},
-    "pu": {},
-    "pu/s": {"s": -1},
-    "rad": {"rad": 1},
-    "rad/s": {"rad": 1, "s": -1},
-    "s": {"s": 1},
-    "s/s": {},
-    "1/s": {"s": -1},
-    "Hz": {"s": -1},
-    "MVA": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
-    "MW": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
-    "Mvar": {"kg": 1, "m": 2, "s": -3, "factor": 1e6},
-    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
-    "kV": {"kg": 1, "m": 2, "s": -3, "A": -1, "factor": 1e3},
-    "A": {"A": 1},
-    "kA": {"A": 1, "factor": 1e3},
-}
+UNITS: dict[str, dict[str, float]] = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+"""Unit → exponents of SI base units, with the factor to them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +31,13 @@ class Usual:
 
     def fits(self, value: float) -> bool:
         return self.low <= value <= self.high or (self.or_zero and value == 0)
+
+
+def usual_beside(module: str, file: str = "usual.toml") -> dict[str, Usual]:
+    """Usual ranges by parameter, of a file beside a module."""
+    tables = tomllib.loads(Path(module).with_name(file).read_text(encoding="utf-8"))["usual"]
+    return {name: Usual(low, high, table["why"], table.get("or_zero", False))
+            for table in tables for name, (low, high) in table["ranges"].items()}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,8 +73,7 @@ def linearize_component(
     Where its states cannot be set, the linear model inside its FMU is taken, if that is of this operating point.
 
     ``derivatives``: also difference the FMU's own derivatives, if it declares them; it costs a third more.
-    ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0.
-    ``once``: as `perturb`."""
+    ``idle``: connected inputs that nothing moves: they are not perturbed, and their columns of B and D are 0."""
     component = exchange.component
     StateAccess(component)  # refuses a component that can neither be perturbed nor has a model inside
     if (inside := embedded_model(component)) is not None:

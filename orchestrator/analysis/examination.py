@@ -19,8 +19,6 @@ from orchestrator.coupling.master import Master
 
 @dataclass(frozen=True)
 class Examination:
-    """The verdict on a linearised system, with its warnings."""
-
     stability: Stability
     warnings: tuple[str, ...]
 

@@ -31,12 +31,10 @@ class IdentifiedMode:
 
     @property
     def frequency_hz(self) -> float:
-        """Frequency of the oscillation [Hz]."""
         return self.eigenvalue.imag / (2 * np.pi)
 
     @property
     def damping_percent(self) -> float:
-        """Damping ratio [%]."""
         return damping_percent(self.eigenvalue)
 
 

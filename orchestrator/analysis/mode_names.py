@@ -88,7 +88,8 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
             continue
         k = column.get(row)
         if k is None or fit[row, k] < LEFT_OVER * fit[row, best]:
-            reasons[name] = _taken(name, modes[best], names[_owner(column, best)])
+            owner = next(row for row, k in column.items() if k == best)
+            reasons[name] = _taken(name, modes[best], names[owner])
             continue
         fits[name] = (modes[k], measures[name])
         free = [j for j in range(len(modes)) if j != k and j not in column.values() and _swings_as(modes[j], modes[k])]
@@ -129,10 +130,6 @@ def _assigned(fit: np.ndarray) -> dict[int, int]:
 def _is_one_to_one(columns: Sequence[int | None]) -> bool:
     taken = [k for k in columns if k is not None]
     return len(set(taken)) == len(taken)
-
-
-def _owner(column: Mapping[int, int], mode: int) -> int:
-    return next(row for row, k in column.items() if k == mode)
 
 
 def _taken(name: str, mode: Mode, owner: str) -> str:

@@ -115,11 +115,6 @@ class Spectrum:
     # the mode of the largest real part at any frequency, zeros left out; None if all eigenvalues are zeros
     rightmost: Mode | None
 
-    @property
-    def growth_rate(self) -> float:
-        """Largest real part [1/s]."""
-        return float(self.eigenvalues.real.max(initial=-np.inf))
-
 
 def eigenvalues(model: LinearModel) -> NDArray[np.complex128]:
     """All eigenvalues [rad/s] without eigenvectors; ln(μ)/H for a step map."""
@@ -209,7 +204,6 @@ def make_mode(
 ) -> Mode:
     """A mode from its eigenvalue λ [rad/s] and the eigenvectors of A and Aᴴ, each of shape (n,).
 
-    ``value``: λ [rad/s].
     ``left``: eigenvector of Aᴴ, shape (n,), of any length and angle.
     ``right``: eigenvector of A, shape (n,), of any length and angle."""
     factors = np.abs(left.conj() * right)

@@ -39,7 +39,7 @@ def steps_of_times(times: Iterable[Fraction], step_size: float) -> int:
         return 1
     common = step
     for time in known:
-        common = _common(common, time)
+        common = Fraction(lcm(common.numerator, time.numerator), gcd(common.denominator, time.denominator))
     return int(common / step)
 
 
@@ -55,7 +55,3 @@ def steps_of_period(master: Master, step_size: float, without: Iterable[str] = (
             "or that they divide"
         )
     return steps
-
-
-def _common(a: Fraction, b: Fraction) -> Fraction:
-    return Fraction(lcm(a.numerator, b.numerator), gcd(a.denominator, b.denominator))

@@ -160,7 +160,6 @@ class Stability:
         return f"the {self.cause}{beside}"
 
     def as_json(self) -> dict[str, Any]:
-        """Verdict and figures for a machine."""
         mode = self.mode
         return {
             "stable": self.stable, "largest_growth_rate": self.largest_growth_rate,
@@ -187,7 +186,6 @@ def place(value: complex, step_size: float | None = None) -> str:
 
 
 def participants(mode: Mode) -> str:
-    """The states that take part most, with their factors."""
     return ", ".join(f"{name} {factor:.2f}" for name, factor in mode.participation[:_STATES_NAMED])
 
 

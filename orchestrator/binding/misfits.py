@@ -1,10 +1,12 @@
 """Whether a device and its binding fit together, by what it gives at an operating point: one verdict, in one place's
 words, for every command."""
 
+import tomllib
 from cmath import phase
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import pi, sqrt
+from pathlib import Path
 
 import numpy as np
 
@@ -28,18 +30,7 @@ SLIGHT = 1e-3  # the same below which nothing is said
 _HELD = 5
 """How often a device is held again whose omega still moves, as a meter's does that begins elsewhere, or at 1."""
 
-REMEDIES = {
-    "wrong rated frequency": "set f_n of the binding's [rating] to the frequency that it is made for; a network of "
-    "another one needs another device",
-    "above its current limit": "ask how it limits its current in a dip, or declare the limit that it has",
-    "wrong sign": "turn 'direction', 'form', 'signs' or 'frame_angle' of the binding, or have the FMU corrected",
-    "wrong base": "check unit, base and 'value' (rms or peak, phase or line) of current, voltage and start values",
-    "wrong frame": "set 'frame_angle' of the binding, or 'dq' for 'qd'",
-    "wrong axes": "check form, axes and 'signs' of the binding, one by one",
-    "power not as asked": "check which variables take the start values, their bases, and the voltage's base",
-}
-
-
+REMEDIES: dict[str, str] = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
 _OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit")
 
 

@@ -79,7 +79,6 @@ def _has(draft: Draft, name: str, variable: str) -> bool:
 
 
 def _meant(draft: Draft, name: str, variable: str) -> list[str]:
-    """What a pattern of variables fits."""
     known = name in draft.system.components and "*" in variable
     return fnmatch.filter(_settable(draft, name), variable) if known else []
 

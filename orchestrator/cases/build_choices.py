@@ -81,7 +81,6 @@ class Layer:
 
 
 def layer_of(given: Mapping[str, Value], place: Place, *, has_units: bool) -> Layer:
-    """Part what a source gives into values and choices."""
     values: dict[str, Value] = {}
     natives: list[NativeChoice] = []
     parts: list[PartChoice] = []

@@ -273,7 +273,7 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
     match event:
         case LineSwitching() | BranchChange():
             wanted, kind, known = event.line, "line", lines_among(names)
-        case LoadChange() | LoadSwitching():
+        case LoadChange():
             wanted, kind, known = event.load, "load", _elements(names, "scale")
         case ShuntSwitching():
             wanted, kind, known = event.shunt, "shunt", _elements(names, "connected")

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cases.schema import NetworkTable
 from orchestrator.coupling.system import ComponentPlan
 
 SOURCES = ("raw", "matpower", "pandapower", "cgmes")  # keys of ``[network]`` that name another program's data
@@ -13,8 +12,6 @@ _NAMES = {zip_: name for name, zip_ in LAWS.items()}
 
 @dataclass(frozen=True)
 class Facts:
-    """The network of a scenario, with its power flow."""
-
     sources: tuple[str, ...]  # files, as the case names them
     frequency_hz: float | None  # rated; None where no component has one
     # buses, machines, converters: how many; units out of service do not count
@@ -44,7 +41,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     table, flow, network = prepared.case.table, prepared.power_flow, prepared.network
     if table.network is None or table.power_flow is None or flow is None or network is None:
         return None
-    sources = files_of(table.network)
+    sources = tuple(file for key in SOURCES if (file := getattr(table.network, key)) is not None)
     if not sources:
         return None
     plans = prepared.system.components
@@ -70,10 +67,6 @@ def rated_frequency(prepared: PreparedScenario) -> float | None:
     """Of all components, which have one in common [Hz]; None where none has one."""
     plans = prepared.system.components.values()
     return next((plan.number("f_n") for plan in plans if "f_n" in plan.description.variables), None)
-
-
-def files_of(table: NetworkTable) -> tuple[str, ...]:
-    return tuple(file for key in SOURCES if (file := getattr(table, key)) is not None)
 
 
 def _counted(number: int, what: str) -> str:

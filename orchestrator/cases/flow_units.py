@@ -43,16 +43,14 @@ def undecided_units(draft: Draft, units: Mapping[str, str], slack: str) -> Itera
     for name, bus in units.items():
         plan = draft.system.components[name]
         follows = any(variable.startswith("pll.") for variable in plan.description.parameters)
-        if not follows or bus == slack or {"v_0", "Q_0"} & {*plan.parameters} or _is_told(draft, units, bus):
+        if not follows or bus == slack or {"v_0", "Q_0"} & {*plan.parameters}:
+            continue
+        if any("v_0" in draft.system.components[other].parameters for other, at in units.items() if at == bus):
             continue
         text = (
             f"neither v_0 nor Q_0 is given: its default, v_0 = {plan.number('v_0'):g} {unit_of(plan, 'v_0')}, {_HELD}"
         )
         yield UnusualValue(f"{name}.v_0", place_of(draft, name, "v_0"), text)
-
-
-def _is_told(draft: Draft, units: Mapping[str, str], bus: str) -> bool:
-    return any("v_0" in draft.system.components[name].parameters for name, other in units.items() if other == bus)
 
 
 def _place(draft: Draft, name: str, variable: str) -> str:

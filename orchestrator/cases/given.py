@@ -53,7 +53,6 @@ def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> d
 
 
 def check_case_name(name: str, argument: str) -> None:
-    """Refuse a name that is not of the form ``component.variable``."""
     from orchestrator.cases.build_choices import ALPHA, MODELS  # noqa: PLC0415 - a record needs no case
 
     if not _CASE_VALUE.fullmatch(name) and name not in (ALPHA, MODELS):
@@ -137,7 +136,6 @@ def in_megabytes(given: Any, argument: str, least: float) -> float:
 
 
 def parameter_files(paths: Paths) -> list[ParameterFile]:
-    """The parameter files of one path or several."""
     from orchestrator.cases.parameter_files import read_parameter_file  # noqa: PLC0415 - a record needs no case
 
     listed = [paths] if isinstance(paths, str | Path) or not isinstance(paths, Iterable) else list(paths)

@@ -32,8 +32,6 @@ class _Source:
 
 @dataclass(frozen=True)
 class NetworkData:
-    """Elements of a network, and further data of its source."""
-
     buses: tuple[str, ...]
     lines: tuple[Line, ...]
     loads: tuple[Load, ...]

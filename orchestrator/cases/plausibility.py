@@ -46,7 +46,8 @@ def check_plausibility(draft: Draft) -> None:
 
 def question(draft: Draft, doubts: Iterable[UnusualValue]) -> None:
     """Add questions to the draft's, without those that the case answers; equal ones become one."""
-    draft.found.questions += _merged([d for d in doubts if not _is_meant(draft, d.name)])
+    meant = draft.given.case.meant
+    draft.found.questions += _merged([d for d in doubts if not any(fnmatch.fnmatchcase(d.name, m) for m in meant)])
 
 
 def _check_meant(draft: Draft) -> None:
@@ -213,10 +214,6 @@ def _small_units(draft: Draft) -> Iterator[UnusualValue]:
 
 
 # -- questions ---------------------------------------------------------------------------------------
-
-
-def _is_meant(draft: Draft, name: str) -> bool:
-    return any(fnmatch.fnmatchcase(name, pattern) for pattern in draft.given.case.meant)
 
 
 def _merged(doubts: list[UnusualValue]) -> list[Problem]:

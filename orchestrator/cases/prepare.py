@@ -63,7 +63,6 @@ class PreparedScenario:
     # published modes of the scenario by name, where the conditions of ``[reference]`` hold.
     references: Mapping[str, ReferenceModeTable] = field(default_factory=dict)
     places: Mapping[str, str] = field(default_factory=dict)  # file and line of every component
-    of_units: frozenset[str] = frozenset()  # components that come from the units table
     told: frozenset[str] = frozenset()  # components that are told the communication step
     network: Network | None = None  # behind the grid component of the power flow; None if there is none
     source_slack: str | None = None  # reference bus of the network's source
@@ -181,7 +180,6 @@ class Preparer:
             about_rows=(*about_rows, *left_out),
             references=references,
             places={name: draft.place_of_component(name) for name in draft.system.components},
-            of_units=frozenset(draft.origins),
             told=told,
             network=draft.network,
             source_slack=draft.data.slack if draft.data else None,

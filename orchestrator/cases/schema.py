@@ -98,8 +98,6 @@ class PowerFlowTable(Table):
 
 
 class LineTable(Table):
-    """A line or transformer of the network."""
-
     from_bus: Bus = Field(alias="from")
     to_bus: Bus = Field(alias="to")
     X: PerUnit
@@ -204,8 +202,6 @@ class UnitsTable(Table):
 
 
 class ConnectionTable(Table):
-    """A connection from an output to an input."""
-
     source: str = Field(alias="from")
     target: str = Field(alias="to")
 
@@ -217,15 +213,11 @@ class WireTable(Table):
 
 
 class BiasTable(WireTable):
-    """A value is added to the signal."""
-
     type: Literal["bias"]
     value: Value
 
 
 class NoiseTable(WireTable):
-    """Noise is added to the signal."""
-
     type: Literal["noise"]
     deviation: Value
     seed: Annotated[int, BeforeValidator(_no_truth_value)] = Field(ge=0)
@@ -246,8 +238,6 @@ class DropOutTable(WireTable):
 
 
 class DelayTable(WireTable):
-    """The value arrives later."""
-
     type: Literal["delay"]
     delay: Seconds = Field(ge=0)
 
@@ -313,8 +303,6 @@ class NanOutputTable(EventBase):
 
 
 class TimeOutTable(EventBase):
-    """A component answers no more."""
-
     type: Literal["time_out"]
     component: str
 
@@ -339,8 +327,6 @@ class LoadTripTable(GridEventBase):
 
 
 class LoadReconnectionTable(GridEventBase):
-    """A load is connected again."""
-
     type: Literal["load_reconnection"]
     load: str
     scale: Number = Field(default=1.0, gt=0)
@@ -352,8 +338,6 @@ class ShuntTripTable(GridEventBase):
 
 
 class ShuntReconnectionTable(GridEventBase):
-    """A shunt is connected, or connected again."""
-
     type: Literal["shunt_reconnection"]
     shunt: str
 
@@ -367,8 +351,6 @@ class LineTripTable(GridEventBase):
 
 
 class LineReclosingTable(GridEventBase):
-    """A line closes again."""
-
     type: Literal["line_reclosing"]
     line: str
 
@@ -409,15 +391,11 @@ class UnitTripTable(GridEventBase):
 
 
 class UnitReconnectionTable(GridEventBase):
-    """A unit is connected again."""
-
     type: Literal["unit_reconnection"]
     unit: str
 
 
 class BranchChangeTable(GridEventBase):
-    """A line gets another impedance."""
-
     type: Literal["branch_change"]
     line: str
     X: PerUnit
@@ -526,8 +504,6 @@ class AnalysisTable(Table):
 
 
 class ReferenceModeTable(Table):
-    """A published mode to compare with."""
-
     real: Number | None = None
     imag: Number | None = None
     frequency_hz: Number
@@ -553,8 +529,6 @@ class PanelTable(Table):
 
 
 class PlotTable(Table):
-    """A plot of recorded signals."""
-
     name: FileName
     title: str
     panels: list[PanelTable]

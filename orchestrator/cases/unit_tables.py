@@ -115,7 +115,7 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         own = {kind: _parameters(entry, kind) for kind in UNIT_KINDS}
         limits = {c: value for c in _LIMITS if (value := _figure(entry, c, given)) is not None}
         numbers = {**figures, **limits}
-        parts = _parts_in(entry)
+        parts = {part: text.strip() for part in PARTS if (text := entry.get(part) or "").strip()}
         label = f"{entry['bus']}_{name}" if name else entry["bus"]
         unit = UnitRow(label, bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
         rows.append(checked(unit, place_of(entry)))
@@ -217,11 +217,6 @@ def _parameters(entry: Row, kind: str) -> dict[str, Any]:
             name, plain = column.removeprefix(f"{kind}."), text.strip()
             values[name] = {"true": True, "false": False}.get(plain.lower(), plain)
     return values
-
-
-def _parts_in(entry: Row) -> dict[str, str]:
-    """Parts that this row chooses in columns such as ``exciter``."""
-    return {part: text.strip() for part in PARTS if (text := entry.get(part) or "").strip()}
 
 
 def _parts_of(table: UnitsTable) -> dict[str, str]:

@@ -19,7 +19,6 @@ _CHOICES = re.compile(r"\b0: .*\b1: ")  # in the description of a variable that 
 
 
 def convert(info: VariableInfo, value: Value) -> float | bool:
-    """Return the value in the variable's own unit."""
     if info.type == "Boolean":
         if isinstance(value, bool):
             return value

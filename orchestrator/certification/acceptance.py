@@ -38,7 +38,8 @@ def run_checks(fmu: Path, binding: Path | None, folder: Path) -> Acceptance:
             pass  # of another FMU or version, or cut off: it is made anew
     from orchestrator.acceptance.runner import check_fmu  # noqa: PLC0415 - `gfor verify` runs no checks
 
-    found = _of_report(check_fmu(fmu, binding))
+    report = check_fmu(fmu, binding)
+    found = Acceptance(report.trusted, tuple(report.faults), report.as_dict())
     found.keep(folder)
     return found
 
@@ -73,10 +74,6 @@ def _left_out(names: Iterable[str]) -> list[str]:
     from orchestrator.acceptance.checks.all import CHECKS  # noqa: PLC0415 - as above
 
     return [name for name in CHECKS if name not in there]
-
-
-def _of_report(report: Any) -> Acceptance:
-    return Acceptance(report.trusted, tuple(report.faults), report.as_dict())
 
 
 def _tool() -> str:

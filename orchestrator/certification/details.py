@@ -9,17 +9,7 @@ from orchestrator.cases.locate import line_of
 from orchestrator.errors import CaseError, Problem
 from orchestrator.toml_files import Table, read_toml
 
-TEMPLATE = """\
-# Details of a damping test, for `gfor certify FILE.fmu --details THIS.toml`.
-# What is left out or empty becomes a line to be filled in by hand.
-
-number = ""         # of the certificate, as your office counts
-applicant = ""      # who asks for it: name and address
-operator = ""       # the network operator that it is filed with
-tester = ""         # who made the test: name and body
-place = ""          # where it is signed
-# date = 2026-01-31 # when it is signed
-"""
+TEMPLATE = Path(__file__).with_name("details_template.toml").read_text(encoding="utf-8")
 
 _LABELS = {
     "number": "Certificate number", "applicant": "Applicant", "operator": "Network operator", "tester": "Tester",

@@ -15,7 +15,7 @@ from orchestrator.certification.environment import environment
 from orchestrator.certification.form import NORM
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.parameters import parameter_rows
-from orchestrator.certification.point import COMPUTED, CONVERTER, PointResult
+from orchestrator.certification.point import COMPUTED, CONVERTER
 from orchestrator.certification.request import REACTANCES
 from orchestrator.certification.study import Certification
 from orchestrator.certification.swings import RecordedSwing, SwingTest
@@ -62,11 +62,15 @@ def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
         "X_L": v.X_L, "accepted": v.accepted, "judged": v.judged, "faults": list(v.faults), "unknown": v.unknown,
         "modes": [mode_json(m) for m in v.modes], "modes_beside": [mode_json(m) for m in v.neighbours],
         "modes_without": [] if without is None else [_figures(x) for x in without.eigenvalues.tolist()],
-        "lowered": [_lowered_json(m) for m in v.lowered],
+        "lowered": [{"frequency_hz": m.frequency_hz, "from_percent": m.before_percent, "to_percent": m.damping_percent}
+                    for m in v.lowered],
         "growth": {name: number(p.growth) for name, p in points.items()},
         "stability": {name: p.stability for name, p in points.items()},
         "residual": {name: number(p.residual) for name, p in points.items()}, "power": having.power,
-        "findings": {name: p.findings for name, p in points.items()}, "converter_model": _model_json(having),
+        "findings": {name: p.findings for name, p in points.items()}, "converter_model": {
+            "source": having.linearised.get(CONVERTER), "order": having.identified,
+            "fit_error": having.fit_errors.get(CONVERTER),
+        },
         "warnings": {name: list(p.warnings) for name, p in points.items()},
         "time": None if v.time is None else time_json(v.time),
         "time_without": None if v.base_time is None else time_json(v.base_time),
@@ -89,11 +93,6 @@ def number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _model_json(point: PointResult) -> dict[str, Any]:
-    error = point.fit_errors.get(CONVERTER)
-    return {"source": point.linearised.get(CONVERTER), "order": point.identified, "fit_error": error}
-
-
 def mode_json(m: ModeVerdict) -> dict[str, Any]:
     without = None if m.before is None else _figures(m.before)
     return _figures(m.eigenvalue) | {
@@ -102,12 +101,7 @@ def mode_json(m: ModeVerdict) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _lowered_json(m: ModeVerdict) -> dict[str, Any]:
-    return {"frequency_hz": m.frequency_hz, "from_percent": m.before_percent, "to_percent": m.damping_percent}
-
-
 def _figures(value: complex) -> dict[str, float]:
-    """An eigenvalue [rad/s]."""
     return eigenvalue_json(value, 100 * damping_ratio(value))
 
 

@@ -13,7 +13,7 @@ from orchestrator.certification.codes.frequency_domain import FIGURES_JSON, FIGU
 from orchestrator.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
 from orchestrator.certification.environment import environment
 from orchestrator.certification.files import HTML, JSON
-from orchestrator.certification.margins import CriterionMargin, margin_text
+from orchestrator.certification.margins import margin_text
 from orchestrator.certification.matrix import CertificateMatrix, MatrixCell
 from orchestrator.certification.verdict import FAILS, PASSES
 from orchestrator.fmi.values import as_text
@@ -81,7 +81,8 @@ def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: date
              for code in matrix.codes]  # fmt: skip
     tried = [[escape(text) for text in _given(device)] for device in devices]
     bad = [
-        [escape(cell.device), escape(cell.code.upper()), *_failed_html(m)]
+        [escape(cell.device), escape(cell.code.upper()), escape(m.place), escape(m.criterion), escape(m.text),
+         margin_text(m.margin)]
         for cell in matrix.cells.values() for m in cell.failed
     ]  # fmt: skip
     lost = [[escape(c.device), escape(c.code.upper()), escape(str(c.failure)).replace("\n", "<br>")]
@@ -120,7 +121,3 @@ def _cell_html(cell: MatrixCell) -> str:
     if cell.has_needs:
         lines.append(f'<a href="{quote(f"{cell.folder}/{NEEDS_HTML}")}">what it would take</a>')
     return "<br>".join(lines)
-
-
-def _failed_html(m: CriterionMargin) -> list[str]:
-    return [escape(m.place), escape(m.criterion), escape(m.text), margin_text(m.margin)]

@@ -47,14 +47,11 @@ def converter(c: Certification, hashes: Hashes) -> str:
         "Damping controllers": f"{texts.PODS[c.pod]}: {c.controllers.source}",
         "Watched in time": signal_name(c.signal),
         "In the modes": texts.converter_model(c.points[WITH, v.X_L] for v in c.verdicts),
-        "Linear models": exceptions_in_words(c.linearised, c.fit_errors) or _perturbed(c),
+        "Linear models": exceptions_in_words(c.linearised, c.fit_errors)
+        or ("all by perturbing the running FMUs" if c.linearised else "not recorded"),
     }  # fmt: skip
     rows = [[escape(name), escape(str(value)) or '<span class="soft">not said</span>'] for name, value in given.items()]
     return table("The converter", ["", ""], rows, left=2)
-
-
-def _perturbed(c: Certification) -> str:
-    return "all by perturbing the running FMUs" if c.linearised else "not recorded"
 
 
 def _rating(c: Certification) -> str:

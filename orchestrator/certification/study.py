@@ -55,10 +55,6 @@ class Certification(Certificate[PointVerdict]):
         """Reactances of the norm that were not judged [pu]."""
         return missing_reactances(v.X_L for v in self.verdicts if v.judged)
 
-    @property
-    def departures(self) -> tuple[str, ...]:
-        return self.request.departures
-
     def result(self) -> str:
         subject = f"The converter {self.description.model_name!r} {self.controllers.in_words()}"
         return {PASSES: self._passes, FAILS: self._fails, INCOMPLETE: self._incomplete}[self.verdict](subject)

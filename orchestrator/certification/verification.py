@@ -1,6 +1,8 @@
 """Whether a certificate still holds: its hashes, and all that it says, rebuilt from what its folder keeps."""
 
 import json
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -11,7 +13,6 @@ import xarray as xr
 from orchestrator.certification.case_file import BINDING, CASE, FMU
 from orchestrator.certification.codes.all_codes import CODES, code_for
 from orchestrator.certification.codes.bench_case import case_name
-from orchestrator.certification.differences import faults_of
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, figures_of, read_record, seal_of
 from orchestrator.certification.form import NORM, check_form
 from orchestrator.certification.rebuilt import case_faults, rebuilt
@@ -114,3 +115,67 @@ def _compare_file(folder: Path, name: str, wanted: str | None, found: Verificati
         found.faults.append(f"{name}: it is not the file that was certified: its SHA-256 differs")
     else:
         found.agreed.append(f"{name}: SHA-256")
+
+
+WRITTEN_LAST = ("made", "files", "seal")
+
+TAKEN = frozenset(
+    ("tool", "environment", "details", "parameters", "file", "binding", "again", "reason",
+     "norm", "title", "clause", "source", "date", "readings")
+)  # fmt: skip
+"""Entries that cannot be had anew, or that another version has in other words; beside those that are written last."""
+
+_SAME, _SAME_IN_SIGNAL = 1e-9, 1e-5
+"""Largest relative difference of a figure that comes out anew; of a mode that is found in a signal."""
+
+_NOTHING = "no such entry"
+_SHOWN = 200  # characters of a value that are shown
+
+
+def faults_of(stated: Mapping[str, Any], again: Mapping[str, Any]) -> Iterator[str]:
+    """Sentences on what is stated and does not come out; rows are compared by their names."""
+    rows = "points" if "points" in again else "rows"
+    whole = [{k: v for k, v in c.items() if k not in (rows, *WRITTEN_LAST)} for c in (stated, again)]
+    for place, text in differences(whole[0], whole[1]):
+        yield f"{place!r} {text}"
+    named = [{_name(row): row for row in content[rows]} for content in (stated, again)]
+    listed = [_name(row) for row in stated[rows]]
+    compared = (
+        ("rows of the record that do not come out anew", [name for name in listed if name not in named[1]]),
+        ("rows that come out anew that the record has not", [name for name in named[1] if name not in named[0]]),
+        ("rows that the record has twice", [name for k, name in enumerate(listed) if name in listed[:k]]),
+    )
+    yield from (f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in compared if names)
+    for name in (name for name in named[0] if name in named[1]):
+        for place, text in differences(named[0][name], named[1][name]):
+            yield f"{name}: its response and figures come to other findings: {place!r} {text}"
+
+
+def _name(row: Mapping[str, Any]) -> str:
+    return f"row {row['row']}" if "row" in row else f"X_L = {row['X_L']:g} pu"
+
+
+def differences(stated: Any, again: Any, tolerance: float = _SAME) -> Iterator[tuple[str, str]]:
+    if isinstance(stated, dict) and isinstance(again, dict):
+        keys = [k for k in (*again, *stated) if not (k in TAKEN and k in again)]
+        pairs = {k: (stated.get(k, _NOTHING), again.get(k, _NOTHING)) for k in keys}
+    elif isinstance(stated, list) and isinstance(again, list) and len(stated) == len(again):
+        pairs = {str(k): pair for k, pair in enumerate(zip(stated, again, strict=True))}
+    else:
+        if not _same(stated, again, tolerance):
+            yield "", f"is {_text(stated)}, and {_text(again)} comes out"
+        return
+    for key, pair in pairs.items():
+        for place, text in differences(*pair, _SAME_IN_SIGNAL if key == "modal" else tolerance):
+            yield f"{key}.{place}" if place else key, text
+
+
+def _same(stated: Any, again: Any, tolerance: float) -> bool:
+    if {type(stated), type(again)} <= {int, float}:
+        return math.isclose(stated, again, rel_tol=tolerance, abs_tol=1e-12)
+    return bool(stated == again) and type(stated) is type(again)
+
+
+def _text(value: object) -> str:
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"

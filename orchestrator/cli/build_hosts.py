@@ -1,6 +1,8 @@
 """Which FMU suits which host: the table behind ``gfor fmu build --for``. A page shows it: use-in-another-tool.md."""
 
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from fmus.toolchain.model import FmiVersion
@@ -29,28 +31,10 @@ class Tool:
         return "native" if self.native else "Python-backed"
 
 
-_DESKTOPS = ("linux64", "win64", "darwin64")
-_NO_MAC = ("linux64", "win64")
-
-HOSTS: dict[str, Tool] = {
-    "cofmupy": Tool(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
-    "dymola": Tool(True, "2.0", "dq", _NO_MAC, "its FMI 2.0 has been there since Dymola 2015 FD01, on both systems",
-                   "https://www.3ds.com/products-services/catia/products/dymola/fmi/"),
-    "ecos": Tool(True, "2.0", "dq", _NO_MAC, "its command line is a program in C++, which has no Python", "here"),
-    "fmpy": Tool(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
-    "fmucontainer": Tool(True, "2.0", "dq", _NO_MAC, "the container's master is in C, and may go to any host", "here"),
-    "libcosim": Tool(True, "2.0", "dq", _NO_MAC, "it is a library in C++, which has no Python", "here"),
-    "mosaik": Tool(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
-    "openmodelica": Tool(True, "2.0", "dq", _DESKTOPS, "OMSimulator takes FMI 2.0 for co-simulation, without Python",
-                         "https://openmodelica.org/doc/OMSimulator/master/html/"),
-    "pathsim": Tool(False, "2.0", "dq", _NO_MAC, "it is a program in Python", "here"),
-    "plecs": Tool(True, "2.0", "abc", _DESKTOPS, "it takes FMI 2.0 and 3.0, and its circuits have phases",
-                  "https://docs.plexim.com/plecs/5.0/functional-mockup-interface"),
-    "powerfactory": Tool(True, "2.0", "phasor", ("win64",), "a program for Windows; for its EMT name the model with "
-                         "the ending _abc", "https://doi.org/10.1109/ISGTEurope.2019.8905616"),
-    "simulink": Tool(True, "2.0", "abc", _DESKTOPS, "Python-backed FMUs were seen to end MATLAB, and its circuits have "
-                     "phases", "https://github.com/NTNU-IHB/PythonFMU/issues/222"),
-}  # fmt: skip
+HOSTS = {
+    name: Tool(**table | {"platforms": tuple(table["platforms"])})
+    for name, table in tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")).items()
+}
 """By the name that ``--for`` takes."""
 
 

@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         stack.enter_context(saying_how_it_goes_on(lambda: run_request.how_it_goes_on(options)))
         rules = like.rules_of(options)
         scenarios = chosen(options)
-        terminal.print_recording_questions([scenario.prepared for scenario in scenarios])
+        terminal.ask(question for scenario in scenarios for question in scenario.prepared.about_rows)
         engine = federates.choice(options, len(scenarios))
         options.checkpoint = run_request.interval(options)
         name = scenarios[0].prepared.case.name

@@ -79,15 +79,10 @@ def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> 
     facts = None if as_json else facts_of(scenarios[0])
     if facts is not None:
         make_console().print(facts.sentence(), soft_wrap=True, highlight=False, markup=False)
-    _ask(q for prepared in scenarios for q in prepared.questions)
+    ask(q for prepared in scenarios for q in prepared.questions)
 
 
-def print_recording_questions(scenarios: Iterable[PreparedScenario]) -> None:
-    """Ask on standard error, before a run, about intervals of recordings that are not kept."""
-    _ask(q for prepared in scenarios for q in prepared.about_rows)
-
-
-def _ask(questions: Iterable[Problem]) -> None:
+def ask(questions: Iterable[Problem]) -> None:
     say("question", dict.fromkeys(map(str, questions)))
 
 

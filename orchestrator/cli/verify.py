@@ -59,7 +59,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any], int]:
-    """What is said of one certificate as JSON, and its exit code."""
     console = make_console(stderr=options.json)
     with progress_bar(console) as bar:
         task = bar.add_task("Points", total=None)

@@ -22,9 +22,7 @@ ForcingShape = Literal["sine", "square"]
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happens at a communication point, before the step that starts there.
-
-    ``time``: [s]"""
+    """Something that happens at a communication point [s], before the step that starts there."""
 
     time: float
     component: str
@@ -52,14 +50,8 @@ class LoadChange(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class LoadSwitching(Event):
+class LoadSwitching(LoadChange):
     """A load is switched off (``scale`` 0), or on again."""
-
-    load: str
-    scale: float = 0.0
-
-    def settings(self) -> Mapping[str, float | bool]:
-        return {f"{self.load}.scale": self.scale}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +67,6 @@ class LineSwitching(Event):
 
 @dataclass(frozen=True, slots=True)
 class ShuntSwitching(Event):
-    """A shunt is disconnected, or connected again."""
-
     shunt: str
     connected: bool
 
@@ -166,9 +156,7 @@ class Fault(Event):
 
 @dataclass(frozen=True, slots=True)
 class WireFault(Fault):
-    """A connection gets an imperfection, in place of another of its kind.
-
-    ``time``, ``component``: As `Event`; the component is the one that the connection leads to."""
+    """A connection gets an imperfection, in place of another of its kind; ``component`` is the one that it leads to."""
 
     connection: Connection
     imperfection: Imperfection

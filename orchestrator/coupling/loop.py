@@ -17,6 +17,8 @@ from orchestrator.fmi.interrupts import calls
 
 
 class PythonLoop:
+    threads = 1
+
     def __init__(
         self, groups: Sequence[Sequence[Turn]], y: NDArray[np.float64], tracks: Tracks, schedule: Schedule,
         hand_over: Callable[[], None] | None = None,
@@ -74,10 +76,6 @@ class PythonLoop:
 
     def seconds(self) -> list[float]:
         return [seconds for group in self._spent for seconds in group]
-
-    @property
-    def threads(self) -> int:
-        return 1
 
     def close(self) -> None:
         """See `Loop.close`."""

@@ -33,6 +33,8 @@ Values = NDArray[np.float64]
 
 
 class _LineLoop:
+    threads = 1
+
     def __init__(self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule) -> None:
         self._groups, self._y, self._tracks, self._schedule = groups, y, tracks, schedule
         self._turns = [exchange for group in groups for exchange in group]
@@ -112,10 +114,6 @@ class _LineLoop:
 
     def seconds(self) -> list[float]:
         return list(self._spent.values())
-
-    @property
-    def threads(self) -> int:
-        return 1
 
     def close(self) -> None:
         """See `orchestrator.coupling.turns.Loop.close`."""

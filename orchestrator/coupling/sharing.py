@@ -40,7 +40,7 @@ def best_number(
     """The number of threads, from 1 to ``most``, by which a step should take the least time."""
 
     def seconds(threads: int) -> float:
-        found = (_of_group(group, bound, costs, threads) for group in groups)
+        found = (shares(group, bound, costs, threads if worth_sharing(group, bound) else 1) for group in groups)
         return sum(one.seconds + (HANDOVER * (threads - 1) if len(one.of) > 1 else 0.0) for one in found)
 
     return min(range(1, most + 1), key=seconds)
@@ -50,7 +50,3 @@ def worth_sharing(group: Sequence[int], bound: NDArray[np.bool_]) -> bool:
     """Whether a second thread would find anything to do."""
     free = sum(not bound[call] for call in group)
     return free > 1 or (free == 1 and len(group) > 1)
-
-
-def _of_group(group: Sequence[int], bound: NDArray[np.bool_], costs: NDArray[np.float64], threads: int) -> Shares:
-    return shares(group, bound, costs, threads if worth_sharing(group, bound) else 1)

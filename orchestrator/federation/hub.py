@@ -124,7 +124,7 @@ class Hub:
             if time.monotonic() > deadline:
                 raise self._not_joined(missing)
             time.sleep(_LOOK)
-        self._wait_for("all federates to enter the initialisation", self._request["to_join"])
+        self._waiting = (time.monotonic() + self._request["to_join"], "all federates to enter the initialisation")
         helics.helicsFederateEnterInitializingMode(self._federate)
         joined = {part["name"]: self._published(part) for part in self._parts}
         self._joined = joined
@@ -243,9 +243,6 @@ class Hub:
         self._now = nanoseconds
 
     # -- the end ---------------------------------------------------------------------------------
-
-    def _wait_for(self, what: str, seconds: float) -> None:
-        self._waiting = (time.monotonic() + seconds, what)
 
     def _watch(self) -> None:
         """Look whether HELICS lets this process wait for too long: a call of HELICS cannot be interrupted."""

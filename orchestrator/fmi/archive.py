@@ -180,7 +180,8 @@ def _check_entries(path: Path, archive: zipfile.ZipFile) -> None:
         fault = _fault_of(entry)
         key = unicodedata.normalize("NFC", entry.filename.rstrip("/")).casefold()
         if fault is None and key in seen and not _harmless_twin(archive, seen[key], entry):
-            fault = f"the same file as {seen[key].filename!r}{_on(seen[key], entry)}"
+            differs = ", with other bytes" if seen[key].filename == entry.filename else " on some systems"
+            fault = f"the same file as {seen[key].filename!r}{differs}"
         if fault is not None:
             raise HostileFmuError(
                 f"{path}: the archive has an entry {_shown(entry.orig_filename)}, which is {fault}; do not trust this "
@@ -208,10 +209,6 @@ def _harmless_twin(archive: zipfile.ZipFile, first: zipfile.ZipInfo, second: zip
             if chunk != other.read(_CHUNK):
                 return False
     return True
-
-
-def _on(first: zipfile.ZipInfo, second: zipfile.ZipInfo) -> str:
-    return ", with other bytes" if first.filename == second.filename else " on some systems"
 
 
 def _check_sizes(path: Path, unpacked: int, packed: int) -> None:

@@ -1,7 +1,6 @@
 """One system of a study of interactions: its task, and its modes with the participation of every component."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -77,12 +76,10 @@ def compute_system(task: SystemTask) -> SystemRecord:
     return computed(task, lambda task, case: _record(_modes(case, task)))
 
 
-def tables_of(exchanged: Mapping[str, Mapping[str, Any]]) -> dict[str, ComponentTable]:
-    return {name: ComponentTable.model_validate(values) for name, values in exchanged.items()}
-
-
 def _modes(case: Case, task: SystemTask) -> ModesResult:
-    changed = exchanged_case(case, tables_of(task.exchanged))
+    changed = exchanged_case(
+        case, {name: ComponentTable.model_validate(table) for name, table in task.exchanged.items()}
+    )
     prepared = task.study.prepare(changed, {})
     require_same_flow({bus: complex(*parts) for bus, parts in task.voltages.items()}, prepared)
     if not task.black_box:

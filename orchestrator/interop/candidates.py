@@ -55,7 +55,8 @@ def candidates(step_size: float, steps: int, extrapolation: float = 0.0) -> tupl
                 rows = np.full((steps + 1, len(SIGNALS)), np.nan)
                 source = values[max(0, early) : steps + 1 + early]
                 rows[max(0, -early) : max(0, -early) + len(source)] = source
-                found.append((_candidate(schedule, early, after_exchange=bool(after_exchange)), rows))
+                what = schedule.name, schedule.first_inputs, schedule.extrapolation, early, bool(after_exchange)
+                found.append((Candidate(*what, schedule.wire_by_wire), rows))
     return tuple(found)
 
 
@@ -65,12 +66,6 @@ def _schedules(extrapolation: float) -> Iterator[Schedule]:
         if order == "side by side" and not extrapolation and first in ("consistent", "once"):
             # what is handed over wire by wire is read when its turn comes, also the first time
             yield Schedule(order, ORDERS[order], first, wire_by_wire=True)
-
-
-def _candidate(schedule: Schedule, early_label: int, *, after_exchange: bool) -> Candidate:
-    return Candidate(
-        schedule.name, schedule.first_inputs, schedule.extrapolation, early_label, after_exchange, schedule.wire_by_wire
-    )
 
 
 def _trajectories(schedule: Schedule, step_size: float, steps: int) -> list[NDArray[np.float64]]:

@@ -29,8 +29,6 @@ def emulate(
 ) -> Emulation:  # fmt: skip
     """Run a system along another master's rules.
 
-    ``step_size`` and ``stop_time``: [s]
-    ``record``: names ``component.variable``.
     ``every``: steps between two rows; the first row is that with label 0.
     ``events``: each event happens before the step that starts at the event's time, as with our own schedules. Most
     other masters do not support events.

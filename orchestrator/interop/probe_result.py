@@ -57,11 +57,8 @@ def _table(path: Path) -> tuple[list[str], list[list[str]]]:
         raise InputError(f"{path}: it has no heading with rows below it; give the tool's output as CSV")
     separator = max(",;\t", key=filled[0].count)
     rows = [[entry.strip() for entry in row] for row in csv.reader(filled, delimiter=separator)]
-    return rows[0], [_with_points(row) if separator != "," else row for row in rows[1:]]
-
-
-def _with_points(row: list[str]) -> list[str]:
-    return [entry.replace(",", ".") if "." not in entry else entry for entry in row]
+    commas = separator != ","  # as the sign before decimals, where there is no point
+    return rows[0], [[e.replace(",", ".") if commas and "." not in e else e for e in row] for row in rows[1:]]
 
 
 def _columns(path: Path, heads: list[str], named: dict[str, str]) -> dict[str, int]:

@@ -60,7 +60,6 @@ PROPERTIES = tuple(field.name for field in fields(Candidate))
 def identify(result: ProbeResult, step_size: float = STEP_SIZE, stop_time: float = STOP_TIME) -> Identified:
     """Compare a result with every schedule.
 
-    ``step_size`` and ``stop_time``: step size and stop time with which the tool was run [s].
     Raises an `InputError` if too few rows are at communication points, or the result shows that the steps had another
     size."""
     intervals = round(stop_time / step_size)

@@ -23,8 +23,6 @@ class ResultsWarning(UserWarning):
 
 @dataclass(frozen=True)
 class WrittenFile:
-    """A file as a run wrote it: the run's id, SHA-256, size in bytes."""
-
     run: str
     sha256: str
     bytes: int

@@ -275,7 +275,6 @@ def identified(
     """A linearised scenario with the names of its modes, by shape and where two fit by following.
 
     ``at_gains``: the linear model with other gains of damping controllers, where the scenario still runs.
-    ``directional``: as `modes_of`, for scenarios that have to be computed.
     ``black_boxes``: identifies components of such a scenario that hide their states."""
     first, last = _named_range(frequency_range)
 

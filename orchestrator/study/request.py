@@ -20,8 +20,6 @@ _SHARING, _SCHEDULE, _STOP = one_of(SharingRule), one_of(SCHEDULES), FieldKind("
 
 @dataclass(frozen=True, kw_only=True)
 class Preparing(OfCase):
-    """How scenarios are prepared."""
-
     schedule: ScheduleName | None = asked(
         _SCHEDULE, None, "``gauss-seidel``, ``jacobi``, ``midpoint`` or ``newton``; the case's by default", option=None
     )

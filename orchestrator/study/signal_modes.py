@@ -103,7 +103,6 @@ class SignalModes:
 
 
 def identified_mode_json(mode: IdentifiedMode) -> dict[str, Any]:
-    """A mode of a signal as JSON's types."""
     figures = eigenvalue_json(mode.eigenvalue, mode.damping_percent)
     return figures | {"amplitude": mode.amplitude, "doubts": list(mode.doubts)}
 

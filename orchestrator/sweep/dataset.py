@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 import itertools
 import json
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,13 +21,10 @@ from orchestrator.sweep.point import PointRecord
 from orchestrator.sweep.sweep import ScenarioSweep, SweepResult
 from orchestrator.sweep.trajectories import GridPlace, Trajectory
 
-_FIGURES = {
-    "real": ("1/s", "Real part of the eigenvalue"),
-    "imag": ("rad/s", "Imaginary part of the eigenvalue"),
-    "frequency": ("Hz", "Frequency"),
-    "damping": ("%", "Damping ratio"),
-    "similarity": ("1", "Similarity to the same trajectory at the point before"),
-}
+_FIGURES = ("real", "imag", "frequency", "damping", "similarity")
+_ATTRIBUTES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+"""Unit and long name by the variable's name."""
+
 _IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}  # xarray's own attributes have the short names
 _SEPARATOR = "; "  # between the warnings of one point
 _BEGINNINGS = "start followed refined entered broken"
@@ -120,33 +118,19 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
             if verdict.get("frequency_hz") is not None:
                 hertz[(s, *place)] = verdict["frequency_hz"]
     flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
-    data: dict[str, Any] = {
-        _IN_DATASET.get(name, name): (dims, array, {"units": _FIGURES[name][0], "long_name": _FIGURES[name][1]})
-        for name, array in figures.items()
-    }
-    of = "Participation in the mode of"
-    data |= {
-        "named": (dims, named, {"units": "1", "long_name": "Whether the case's name for a mode falls on it here"}),
-        "beginning": (dims, beginning, {"units": "1", "long_name": "How the trajectory comes to be here", **flags}),
-        "participation": ([*dims, "state"], of_states, {"units": "1", "long_name": f"{of} a state"}),
-        "component_participation": (
-            [*dims, "component"], of_components, {"units": "1", "long_name": f"{of} a component, all its states"},
-        ),
-        "residual": (dims[:-1], residual, {"units": "pu", "long_name": "Change of the steady state in one step"}),
-        "stable": (
-            dims[:-1],
-            stable,
-            {"units": "1", "long_name": "Whether nothing grows at any frequency", "_FillValue": np.int8(-1)},
-        ),
-        "largest_growth_rate": (
-            dims[:-1], growth, {"units": "1/s", "long_name": "Largest real part of the whole spectrum"},
-        ),
-        "largest_growth_frequency": (
-            dims[:-1], hertz, {"units": "Hz", "long_name": "Frequency of the mode with the largest real part"},
-        ),
-        "error": (dims[:-1], errors.astype(str), {"long_name": "Why there are no modes"}),
-        "warnings": (dims[:-1], warnings.astype(str), {"long_name": "What is to be known of the point"}),
+    at_points = {
+        "residual": residual, "stable": stable, "largest_growth_rate": growth, "largest_growth_frequency": hertz,
+        "error": errors.astype(str), "warnings": warnings.astype(str),
     }  # fmt: skip
+    arrays: dict[str, tuple[list[str], Any]] = {
+        **{_IN_DATASET.get(name, name): (dims, array) for name, array in figures.items()},
+        "named": (dims, named), "beginning": (dims, beginning), "participation": ([*dims, "state"], of_states),
+        "component_participation": ([*dims, "component"], of_components),
+        **{name: (dims[:-1], array) for name, array in at_points.items()},
+    }  # fmt: skip
+    data: dict[str, Any] = {name: (*found, dict(_ATTRIBUTES[name])) for name, found in arrays.items()}
+    data["beginning"][2].update(flags)
+    data["stable"][2]["_FillValue"] = np.int8(-1)
     coordinates: dict[str, Any] = {
         "scenario": ("scenario", [s.prepared.name for s in result.scenarios], {"long_name": "Scenario"}),
         "trajectory": ("trajectory", np.arange(1, longest + 1, dtype=np.int32), {"long_name": "Trajectory"}),
@@ -183,7 +167,8 @@ def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
                 setting = {units[key]: value for key, value in samples.setting(place).items()}
                 figures = {
                     f"{name} [{unit}]" if unit != "1" else name: f"{sample[name]:.10g}"
-                    for name, (unit, _) in _FIGURES.items()
+                    for name in _FIGURES
+                    if (unit := _ATTRIBUTES[_IN_DATASET.get(name, name)]["units"])
                 }
                 shares = {f"participation {s}": _share(sample["states"], s) for s in samples.states}
                 shares |= {f"participation {c}": _share(sample["components"], c) for c in samples.components}

@@ -47,8 +47,7 @@ def find_trajectories(
     is linked to the previous row as well.
 
     ``points``: points by place; failed points are skipped.
-    ``names``: names of the modes that the case looks for, most important first.
-    ``frequency_range``: [Hz]"""
+    ``names``: of the modes that the case looks for, most important first."""
     modes = {place: record.modes for place, record in points.items() if record.modes is not None}
     route = list(_route(modes))
     followed = number_trajectories(modes, route)

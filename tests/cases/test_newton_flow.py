@@ -8,10 +8,9 @@ import pytest
 from orchestrator.cases import network_import
 from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
 from orchestrator.cases.flow_equations import FlowEquations
-from orchestrator.cases.flow_failure import explain
 from orchestrator.cases.flow_newton import _newton, solve
 from orchestrator.cases.network_sources import _pandapower_tables
-from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
+from orchestrator.cases.power_flow import FlowUnit, explain, solve_power_flow
 from orchestrator.errors import InputError
 
 pandapower = pytest.importorskip("pandapower")

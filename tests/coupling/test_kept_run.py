@@ -4,8 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from orchestrator.coupling.kept_run import state_of, take_up
 from orchestrator.coupling.master import Master
+from orchestrator.coupling.run import state_of, take_up
 from orchestrator.coupling.schedule import gauss_seidel
 from tests.coupling.test_master import H, oscillator
 

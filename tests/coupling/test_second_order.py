@@ -9,9 +9,9 @@ import scipy.linalg
 from orchestrator.api.case import load
 from orchestrator.coupling import compiled_loop as loops
 from orchestrator.coupling.events import ParameterChange
-from orchestrator.coupling.kept_run import state_of, take_up
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
+from orchestrator.coupling.run import state_of, take_up
 from orchestrator.coupling.schedule import Schedule, gauss_seidel, jacobi, midpoint, newton
 from orchestrator.coupling.system import System
 from orchestrator.errors import CouplingError, InputError

@@ -456,9 +456,7 @@ def test_the_numbers_of_refused_calls_are_the_kernels(header, column):
     text = (Path("/usr/include") / header).read_text(encoding="utf-8")
     lines = re.findall(r"#define __NR(?:3264)?_(\w+) (\d+)", text)
     kernel = {name: int(number) for name, number in lines}
-    tables = (seccomp._ALWAYS, seccomp._ATTRIBUTES, seccomp._SIGNALS, seccomp._MEMORY, seccomp._IPC,
-              seccomp._OF_A_PROCESS, seccomp._OF_SOME_PROCESS)  # fmt: skip
-    ours = {name: numbers[column] for table in tables for name, numbers in table.items()}
+    ours = {name: numbers[column] for group in seccomp._CALLS.values() for name, numbers in group.items()}
     names = ("_KILL", "_TGKILL", "_SOCKETPAIR", "_CLONE", "_CLONE3", "_PRCTL")
     ours |= {name[1:].lower(): getattr(seccomp, name)[column] for name in names}
     ours["seccomp"] = list(seccomp._SECCOMP.values())[column]

@@ -28,7 +28,6 @@ def branch(
     name: str, ends: tuple[str, str], nominal: tuple[float, float], z: complex,
     to_earth: tuple[complex, complex] = (0j, 0j), rho: float = 1.0, alpha: float = 0.0,
 ) -> Branch:  # fmt: skip
-    """A branch in pu."""
     first, second = nominal
     base = second**2 / BASE_MVA
     return Branch(

@@ -37,7 +37,6 @@ def load_cgmes(path: Path) -> Any:
 
 
 def _profiles(path: Path) -> dict[str, bytes]:
-    """Name → content of the profiles' files."""
     files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
     found: dict[str, bytes] = {}
     try:

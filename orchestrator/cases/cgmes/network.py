@@ -42,7 +42,6 @@ class CgmesNetwork:
 
 
 def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
-    """Read the network of a CGMES model."""
     unknown = [kind for kind in leaving_out if kind not in LEFT_OUT]
     if unknown:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}")

@@ -13,9 +13,8 @@ from orchestrator.certification.codes.bench_point import BenchResult, BenchTask,
 from orchestrator.certification.codes.row import CodeRow, GridCode
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.certification.refusal import refusing
-from orchestrator.certification.request import GIVEN, CertificationRequest
+from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
-from orchestrator.fmi.values import as_text
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, Work, nobody
 from orchestrator.points.task import StudyCase
@@ -29,11 +28,9 @@ class CodeCertificate(Certificate[RowVerdict]):
 
     @property
     def departures(self) -> tuple[str, ...]:
-        values = self.request.values
-        set_too = tuple(f"converter.{name} = {as_text(values[name])}" for name in GIVEN if name in values)
-        if self.f_n != self.code.f_n:
-            set_too += (f"the rated frequency, {self.f_n:g} Hz in place of {self.code.f_n:g} Hz",)
-        return set_too
+        if self.f_n == self.code.f_n:
+            return super().departures
+        return (*super().departures, f"the rated frequency, {self.f_n:g} Hz in place of {self.code.f_n:g} Hz")
 
     @property
     def missing(self) -> tuple[str, ...]:

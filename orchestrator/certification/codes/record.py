@@ -1,5 +1,6 @@
 """What the files of a code's certificate hold: its figures, its responses and its page."""
 
+from dataclasses import asdict
 from datetime import datetime
 from html import escape
 from typing import Any
@@ -43,13 +44,9 @@ def code_json(c: CodeCertificate) -> dict[str, Any]:
 def _row(v: RowVerdict, c: CodeCertificate) -> dict[str, Any]:
     return {
         "row": v.row.name, "title": v.row.title, "clause": v.row.clause, "judged": v.judged, "accepted": v.accepted,
-        "unknown": v.unknown, "criteria": [finding_json(f) for f in v.findings],
+        "unknown": v.unknown, "criteria": [asdict(f) for f in v.findings],
         "findings": c.results[v.row.name].findings,
     }  # fmt: skip
-
-
-def finding_json(finding: RowFinding) -> dict[str, Any]:
-    return {name: getattr(finding, name) for name in RowFinding.__dataclass_fields__}
 
 
 def code_page(c: CodeCertificate, made: datetime, mark: str) -> str:

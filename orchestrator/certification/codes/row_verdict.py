@@ -72,11 +72,8 @@ def judge_row(
         if current and (not current.accepted or stated is None or any(c["criterion"] == CURRENT for c in stated)):
             found.append(current)
         if reason := measured.broken:
-            found = [_without_meaning(finding, reason) if finding.accepted else finding for finding in found]
+            unmet = {"accepted": None, "margin": None}  # what a broken response meets has no meaning
+            found = [replace(f, **unmet, text=f"{f.text}; {NOT_JUDGED}, {reason}") if f.accepted else f for f in found]
     if row.shown_only:
         return RowVerdict(row, tuple(replace(finding, accepted=None) for finding in found))
     return RowVerdict(row, tuple(found))
-
-
-def _without_meaning(finding: RowFinding, reason: str) -> RowFinding:
-    return replace(finding, accepted=None, margin=None, text=f"{finding.text}; {NOT_JUDGED}, {reason}")

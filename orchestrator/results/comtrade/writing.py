@@ -31,9 +31,7 @@ def write_comtrade(
     largest distance from the middle of the span.
 
     ``dataset``: evenly recorded signals over the time [s].
-    ``path``: of the ``.cfg``; the ``.dat`` gets the same stem.
-    ``form``: one of `FORMS`.
-    ``frequency``: rated frequency [Hz]."""
+    ``path``: of the ``.cfg``; the ``.dat`` gets the same stem."""
     if form not in FORMS:
         raise InputError(f"the form {form!r} is unknown; choose one of {', '.join(FORMS)}")
     times = np.asarray(dataset["time"].values, dtype=float)
