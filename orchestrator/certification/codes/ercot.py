@@ -7,13 +7,9 @@ from orchestrator.certification.codes.row import CodeRow, GridCode
 LEAST_INERTIA = 2.5  # least inertia constant [s]: ERCOT, model quality tests, revision 24
 
 
-ERCOT = GridCode(
-    key="ercot",
-    title="ERCOT: advanced grid support of energy storage resources (AGS-ESR)",
-    source="ERCOT, model quality tests revision 24, and the tuning guide for IBRs, as summarised by others",
-    date="revision 24",
-    f_n=60.0,
-    rows=(
+ERCOT = GridCode.of(
+    "ercot",
+    (
         CodeRow("inertia_down", "The frequency falls at 1 Hz/s for 0.5 s", "inertia",
                 lambda f: ramps(3.0, 0.5, f, 1.0, (-0.5,)),
                 (c.holds_together(), c.inertia(0, -1.0, 0.5, LEAST_INERTIA), c.settles())),
@@ -22,11 +18,5 @@ ERCOT = GridCode(
                 (c.holds_together(), c.inertia(0, 1.0, 0.5, LEAST_INERTIA), c.settles())),
         CodeRow("phase_jumps", "−10°, +10° at SCR 3, 50 %", "phase jump", lambda f: jumps(3.0, 0.5, (-10.0, 10.0)),
                 (c.holds_together(), c.opposes_jump(0, 1, 0.2), c.opposes_jump(1, -1, 0.2), c.settles(), c.returns())),
-    ),
-    left_out=("further rows of the model quality tests: their numbers were not at hand",),
-    readings=(
-        "the inertia is measured at SCR 3, X/R 6 and half power: the source gives no strength of the grid for it",
-        "the energy of the inertia is all that the plant gives beyond its power before the ramp, its droop's included",
-        "the 0.2 pu of a 10° jump are asked of the power averaged over a period",
     ),
 )  # fmt: skip

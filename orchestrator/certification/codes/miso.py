@@ -17,8 +17,6 @@ CYCLES = 6  # duration of the fault, in periods
 CLEARED = tuple(range(1, 2 * len(RATIOS), 2))
 """Numbers of the events with which the faults of the steps are cleared: the power is asked for after each of them."""
 
-BALANCED = "the faults are balanced: the model has no negative sequence. Depth and duration are the code's"
-
 LIMITS = (c.stays_within(0.8, 1.1, 0.1), c.holds_together(), c.settles(), c.meets_load(), c.frequency_settles(),
           c.frequency_against_power())  # fmt: skip
 
@@ -42,13 +40,9 @@ def ramp_criteria(up: int, down: int) -> tuple[Judge, ...]:
     return (c.holds_together(), c.settles(), c.follows_droop(up, -1), c.follows_droop(down, 1))
 
 
-MISO = GridCode(
-    key="miso",
-    title="MISO BPM-015, appendix H: grid-forming storage, conformity assessment",
-    source="MISO, Business Practices Manual 015 revision 32, appendix H, pages 154 to 161 (superseded by a later one)",
-    date="revision 32",
-    f_n=60.0,
-    rows=(
+MISO = GridCode.of(
+    "miso",
+    (
         CodeRow("llsm_charging", "Loss of the last machine: both plants charge at 50 %, load 50 %", "H, LLSM case 1",
                 lambda f: last_machine(-0.5, -0.5, 0.5), LIMITS),
         CodeRow("llsm_limit", "Loss of the last machine: plant 0 %, duplicate 100 %, load 100 %", "H, LLSM case 2",
@@ -62,17 +56,5 @@ MISO = GridCode(
                 (c.holds_together(), c.opposes_jump(0, 1, 0.2), c.opposes_jump(1, -1, 0.2),
                  c.responds_within(0, 1, 0.015), c.responds_within(1, -1, 0.015), c.settles(), c.returns())),
         weak_row("H, SCR ramp down with fault"),
-    ),
-    left_out=(
-        "two-phase-to-ground faults of the SCR steps: they need the negative sequence, which the model does not have",
-        "distortion of phase quantities: the bench is in one rotating frame",
-        "final voltage and frequency by droop and deadband in numbers: the settings are not part of an FMU's port. A "
-        "Q-V droop of the wrong sign meets every row that the right one meets",
-    ),
-    readings=(
-        BALANCED,
-        "the ramps ask for a droop alone: a grid-following converter with P-f droop meets them, not the phase jumps",
-        "the last machine is a voltage source, as the appendix allows; its impedance before it trips is that of SCR 10",
-        "the 0.2 pu of a 10° jump are asked of the power averaged over a period, the 15 ms of its median over 5 ms",
     ),
 )  # fmt: skip

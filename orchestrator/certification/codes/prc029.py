@@ -28,13 +28,9 @@ def _step(level: float, lasts: float) -> CodeRow:
     )  # fmt: skip
 
 
-PRC029 = GridCode(
-    key="prc029",
-    title="NERC PRC-029-1: frequency and voltage ride-through of inverter-based resources",
-    source="NERC PRC-029-1 (FERC Order 909), as summarised by others; the standard's own text was not at hand",
-    date="in force since 1 October 2026",
-    f_n=60.0,
-    rows=(
+PRC029 = GridCode.of(
+    "prc029",
+    (
         *(_step(level, lasts) for level, lasts in DIPS),
         _step(*SWELL),
         CodeRow("dips_in_10_s", "0.2 pu for 0.16 s twice in 10 s, half power", "R1, cumulative times",
@@ -45,22 +41,5 @@ PRC029 = GridCode(
                 (c.holds_together(), c.settles(), c.returns(events=(-1,)))),
         CodeRow("phase_jumps", "−25°, +25°, half power", "R1, jumps up to 25°",
                 lambda f: jumps(STRENGTH, 0.5, (-25.0, 25.0)), (c.holds_together(), c.settles(), c.returns())),
-    ),
-    left_out=(
-        "1.05 to 1.10 pu for 1800 s and 57.0 to 58.8 or 61.2 to 61.8 Hz for 299 s in 600 s: an hour of bench time, in "
-        "which protection and heat decide, which a model of this port does not have",
-        "the times of wind resources (0.16, 1.2, 2.5, 3.0 s): they are within those that are tried here",
-        "unbalanced faults: they need the negative sequence, which the model does not have",
-        "R2's current in the dip: the standard leaves P or Q priority to the planner",
-    ),
-    readings=(
-        "each voltage is that of the source behind SCR 10 and X/R 6, not of the transformer's high side: its own "
-        "current moves the voltage that it sees",
-        "the voltage of a band is 0.05 pu within it, that of the lowest band 0.2 pu",
-        "the power is back where it is within 5 % of the rating 1 s after the last step, for good",
-        "half power, as in other codes' rows; at full power a converter that keeps its power reference in a dip of "
-        "seconds is beyond its current limit, and slips",
-        "a jump of 25° is the largest that is not excepted",
-        "riding through is all that is asked: a grid-following converter can meet every row",
     ),
 )  # fmt: skip

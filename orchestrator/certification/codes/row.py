@@ -1,7 +1,10 @@
 """What a code is: rows with a stimulus and criteria, sources, and what is left out by name."""
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
 
 from orchestrator.arrays import Numbers
 from orchestrator.certification.codes.measured import MeasuredRow
@@ -74,9 +77,12 @@ class CodeRow:
     shown_only: bool = False
 
 
+_WORDS = tomllib.loads(Path(__file__).with_name("codes.toml").read_text(encoding="utf-8"))
+
+
 @dataclass(frozen=True)
 class GridCode:
-    """A code as a table.
+    """A code as a table; its words stand in ``codes.toml``.
 
     ``title``, ``source``, ``date``: what it is, where its numbers were read, and of when it is; ``f_n``: rated
     frequency of the system [Hz]; ``left_out``: what the code asks and this table does not test, with the reason;
@@ -92,3 +98,10 @@ class GridCode:
     left_out: tuple[str, ...] = ()
     readings: tuple[str, ...] = ()
     declared: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, key: str, rows: tuple[CodeRow, ...], declared: Mapping[str, float] = MappingProxyType({})
+    ) -> "GridCode":
+        texts = {name: tuple(text) if isinstance(text, list) else text for name, text in _WORDS[key].items()}
+        return cls(key, rows=rows, declared=dict(declared), **texts)

@@ -1,7 +1,7 @@
 """RTE: the four envelopes of its sheet "grid-forming", for the reactance, damping and inertia that are declared."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
 
@@ -136,31 +136,8 @@ def rte_code(declared: Mapping[str, float]) -> GridCode:
     ]  # fmt: skip
     rows.sort(key=lambda row: row.name[:5])
     stated = ", ".join(f"{d.name} = {declared[d.name]:g}" for d in DECLARED)
-    return GridCode(
-        key="rte",
-        title=f"RTE: grid-forming, envelopes IGFM1 to IGFM4 for {stated}",
-        source="RTE, DyCoV (dynawo/dyn-grid-compliance-verification), PCS_RTE-IGFM1 to IGFM4 and their published "
-        "curves; the sheet of RTE's documentation itself was not at hand",
-        date="version 0.8",
-        f_n=50.0,
-        rows=tuple(rows),
-        left_out=("a nearly empty and a nearly full battery: a state of charge is not part of an FMU's port",),
-        readings=(
-            "the envelope of DyCoV is a verdict here: who stays within it meets it; DyCoV itself gives none",
-            "the active power and the reactive current are means over a period; the 20 ms by which DyCoV moves its "
-            "curves for measured waveforms are for that",
-            "for the first 20 ms, in which a mean over a period cannot respond, what is asked is to stay within 0.02 "
-            "pu of the value before; the published curves ask for up to 0.001 pu there",
-            "what is asked is limited to 0.98 pu and what is allowed to 1.2 pu, as in the published curves of IGFM4",
-            "in IGFM4 the frequency is brought to 49.5 Hz first, rises from there and falls back to it; DyCoV lets "
-            "the fall of 0.5 Hz/s begin at 50.5 Hz",
-            "in IGFM3 all of what is allowed is allowed from the event on, and what is asked begins after 30 ms, as in "
-            "DyCoV's later revisions: the published curves allow nothing for 20 ms",
-            "the envelope knows no droop: a plant whose power follows the frequency for good leaves IGFM4",
-            "where ζ ≤ 1 the jump's ideal curve is DyCoV's, which is no solution of its own equation",
-        ),
-        declared=dict(declared),
-    )
+    code = GridCode.of("rte", tuple(rows), declared)
+    return replace(code, title=code.title.format(declared=stated))
 
 
 def _named(test: str, scr: float, power: float, more: str = "") -> str:
