@@ -99,7 +99,7 @@ def certify(
     >>> gfor.certify("vendor.fmu", "misa")
     Traceback (most recent call last):
         ...
-    orchestrator.errors.InputError: code = 'misa'; choose from nts631, miso, aemo, ercot, fingrid, prc029, rte
+    orchestrator.errors.InputError: code = 'misa'; choose from nts631, miso, ...
     """
     from orchestrator.certification.acceptance import run_checks  # noqa: PLC0415 - `verify` computes less
     from orchestrator.certification.files import JSON, read_record, save  # noqa: PLC0415 - as above

@@ -102,6 +102,14 @@ class Modes:
 
         return dict(modes_json([self.result]))
 
+    def power_flow(self) -> dict[str, pd.DataFrame]:
+        """``buses`` [pu, °], ``branches`` and ``machines`` [MW, Mvar, %]; nothing for a case without a power flow."""
+        from orchestrator.cases.flow_figures import power_flow_json  # noqa: PLC0415 - imports the reading of cases
+
+        flow = power_flow_json(self.result.prepared) or {}
+        kinds = [kind for kind, rows in flow.items() if isinstance(rows, list)]
+        return {kind: pd.DataFrame(flow[kind]).set_index("name") for kind in kinds}
+
     @property
     def eigenvalues(self) -> Complex:
         """All eigenvalues [rad/s] of the model that the verdict is on, complex, the largest real part first."""

@@ -49,7 +49,8 @@ def _verdicts(found: CodeCertificate) -> PlainTable:
         known = [f for f in v.findings if f.accepted is not None]
         least = narrowest(known)
         word = NOT_JUDGED if v in unknown else NO_VERDICT if not v.judged else "fails" if v in bad else "accepted"
-        remark = v.unknown or "; ".join(f.criterion for f in v.failed) or (least.criterion if least else "")
+        failed = "; ".join(f"{f.criterion}: {f.text}" for f in v.failed)
+        remark = v.unknown or failed or (f"nearest: {least.criterion}" if least else "")
         margin = "–" if least is None else margin_of(least)
         met = f"{sum(f.accepted is True for f in known)} of {len(v.findings)}"
         table.add_row(v.row.name, word, met, margin, short(remark, _LONGEST))

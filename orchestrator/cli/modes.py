@@ -91,12 +91,15 @@ def _compute(
     print_answers(console, [of_modes(r) for r in results], results)
     terminal.print_warnings(results)
     terminal.say("question", weights)
-    for result in results:
+    whole = len(results) == 1 or options.details
+    for result in results if whole else ():
         console.print(tables.all_modes(result), "")
-    terminal.print_named_modes(console, results)
+    terminal.print_named_modes(console, results, shapes=whole or any(r.named for r in results))
     terminal.print_sources(console, results)
     if options.details:
         print_details(console, results)
+    if not whole:
+        console.print("All modes of each scenario, and who swings in them: --details, or one --scenario")
     if folder:
         console.print(escape(f"Modes in {folder}: {', '.join(written)}"), soft_wrap=True)
     return exit_code(options, [r.stability for r in results])

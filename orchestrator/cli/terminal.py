@@ -48,7 +48,7 @@ def say(kind: str, texts: Iterable[str]) -> None:
         make_errors().print(f"[bold yellow]{kind}:[/bold yellow] {escape(text)}")
 
 
-def print_named_modes(console: Console, results: Sequence[ModesResult]) -> None:
+def print_named_modes(console: Console, results: Sequence[ModesResult], *, shapes: bool = True) -> None:
     """The modes that a case names, beside somebody else's figures for them, and who swings in them."""
     from orchestrator.study import tables  # noqa: PLC0415 - imports all that a run needs
 
@@ -58,7 +58,7 @@ def print_named_modes(console: Console, results: Sequence[ModesResult]) -> None:
         console.print(tables.named_modes(results, title))
         if reference and any(r.references for r in results):
             console.print(escape(f"{title}: {reference.source}"), style="dim", soft_wrap=True)
-    if any(r.swing and (r.named or r.modes) for r in results):
+    if shapes and any(r.swing and (r.named or r.modes) for r in results):
         console.print("", tables.mode_shapes(results), "")
 
 

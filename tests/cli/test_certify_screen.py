@@ -48,8 +48,8 @@ def test_the_verdict_stands_first_and_each_row_has_a_line(screen):
     cells = [[cell.strip() for cell in line.strip("│").split("│")] for line in first if line.startswith("│")]
     assert [c[:2] for c in cells] == [["all", "fails"], ["jump", "fails"], ["dip", "accepted"], ["weak", "not judged"]]
     assert cells[0][4] == "2 judged, 1 failed, 1 not judged"
-    assert cells[1][2:] == ["1 of 2", "−1.12 pu", "settles"]
-    assert cells[2][2:] == ["1 of 1", "+80 %", "voltage"]
+    assert cells[1][2:] == ["1 of 2", "−1.12 pu", "settles: 1.128 pu away"]
+    assert cells[2][2:] == ["1 of 1", "+80 %", "nearest: voltage"]
     assert cells[3][4] == "the worker died"
 
 

@@ -22,6 +22,7 @@ ANYWHERE = (
     "how-to/grid-forming-among-grid-following",
     "how-to/faults-and-outages",
     "how-to/own-network",
+    "how-to/audit-a-study",
     *(pytest.param(guide, marks=pytest.mark.nightly) for guide in HEAVY),
 )
 SECONDS = 1800.0

@@ -73,6 +73,12 @@ class FourVsc:
         Of the load; the equivalent takes the rest.
     fed_forward, actuated
         Lags of the voltage that is fed forward, and of the converter's voltage [s]; 0 in the benchmark's equations.
+    delay
+        Of the converter's voltage [s], by Padé's fraction of first order.
+    charging, cables
+        Factors of the charging of all lines and cables, and of the cables alone.
+    capacitors
+        Whether the reactors at E and F are entered as capacitors.
     """
 
     S_sc: float = 20000.0
@@ -87,14 +93,19 @@ class FourVsc:
     load_share: float = 1.0
     fed_forward: float = 0.0
     actuated: float = 0.0
+    delay: float = 0.0
+    charging: float = 1.0
+    cables: float = 1.0
+    capacitors: bool = False
     branches: tuple = field(init=False)
 
     def __post_init__(self):
         rows = [("A", "B", 0.51, 10.24, 48e-6)] * self.circuits_AB
         rows += [("A", "C", 1.04, 20.80, 98e-6)] * self.circuits_AC
         rows += [("B", "C", 1.12, 22.40, 105e-6)] * self.circuits_BC
-        found = [(a, b, R / Z_400, X / Z_400, Y * Z_400, 1.0) for a, b, R, X, Y in rows]
-        found += [(a, b, 0.42 / Z_225, 0.83 / Z_225, 9e-3 * Z_225, 1.0) for a, b in (("A2", "E"), ("B2", "F"))]
+        found = [(a, b, R / Z_400, X / Z_400, self.charging * Y * Z_400, 1.0) for a, b, R, X, Y in rows]
+        B = self.charging * self.cables * 9e-3 * Z_225
+        found += [(a, b, 0.42 / Z_225, 0.83 / Z_225, B, 1.0) for a, b in (("A2", "E"), ("B2", "F"))]
         found += [("A2", "A", 0.005 / 24, 0.15 / 24, 0.0, 1.0), ("B2", "B", 0.005 / 24, 0.15 / 24, 0.0, self.tap_B)]
         at = BUSES.index
         object.__setattr__(self, "branches", tuple((at(a), at(b), *rest) for a, b, *rest in found))
@@ -118,7 +129,7 @@ class FourVsc:
             Y[i, j] -= y / n
             Y[j, i] -= y / n
         for bus, b in REACTORS.items():
-            Y[BUSES.index(bus), BUSES.index(bus)] -= 1j * b
+            Y[BUSES.index(bus), BUSES.index(bus)] -= 1j * (-b if self.capacitors else b)
         if with_load:
             Y[C, C] += self.admittance
         return Y
@@ -171,7 +182,7 @@ class FourVsc:
 
     def _coils(self):
         """Inductors to earth: bus, resistance and reactance [pu]."""
-        found = [(BUSES.index(bus), 0.0, 1 / b) for bus, b in REACTORS.items()]
+        found = [] if self.capacitors else [(BUSES.index(bus), 0.0, 1 / b) for bus, b in REACTORS.items()]
         if self.load == "parallel":
             found.append((C, 0.0, -1 / self.admittance.imag))
         if self.load == "series":
@@ -186,6 +197,8 @@ class FourVsc:
         for i, j, _, _, b, _ in self.branches:
             B[i] += b
             B[j] += b
+        for bus, b in REACTORS.items() if self.capacitors else ():
+            B[BUSES.index(bus)] += b
         Y = self.admittances(with_load=True)
         Y[C, C] += 1 / self.Z_eq
         impedances = np.linalg.inv(Y)
@@ -239,7 +252,8 @@ class FourVsc:
         e_d, e_q = u.K_pp * error + x_P - d, u.K_pv * deviation + x_Q - q
         fed = seen if self.fed_forward else e.real
         m_d, m_q = fed - w * u.L * q + u.K_pc * e_d + M_d, w * u.L * d + u.K_pc * e_q + M_q
-        v_d, v_q = (out_d, out_q) if self.actuated else (m_d, m_q)
+        v_d, v_q = (out_d, out_q) if self.actuated else (2 * out_d - m_d, 2 * out_q - m_q) if self.delay else (m_d, m_q)
+        lag = self.actuated or self.delay / 2 or 1e-3
         controlled = abs(e + (u.R + 1j * u.L) * i) if u.by_voltage else s.imag
         return [
             W / u.L * (v_d - e.real - u.R * d + w * u.L * q),
@@ -253,8 +267,8 @@ class FourVsc:
             (controlled - X_f) / u.T,
             u.K_iv * deviation,
             (e.real - seen) / (self.fed_forward or 1e-3),
-            (m_d - out_d) / (self.actuated or 1e-3),
-            (m_q - out_q) / (self.actuated or 1e-3),
+            (m_d - out_d) / lag,
+            (m_q - out_q) / lag,
         ]
 
     def eigenvalues(self):
@@ -294,6 +308,13 @@ def report(**changes):
     """The data of 2025: no ratios, and wind park 1 holds its voltage with the gains of the others."""
     first = replace(WP1, by_voltage=True, K_pv=0.1667, K_iv=50.0, ratio=1.0)
     return FourVsc(converters=(first, WP2, HVDC1, replace(HVDC2, ratio=1.0)), tap_B=1.0, **changes)
+
+
+def emtp(K_pv=0.1667, K_iv=50.0, **changes):
+    """The data of 2025 with wind park 1 at the voltage of BiGER's listing."""
+    system = report(**changes)
+    first = replace(system.converters[0], V=1.047555, Q=None, K_pv=K_pv, K_iv=K_iv)
+    return replace(system, converters=(first, *system.converters[1:]))
 
 
 def limit(system, low, high):

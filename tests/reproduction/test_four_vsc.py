@@ -5,16 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import orchestrator as gfor
 from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.study.modes import compute_modes
 from orchestrator.study.run import run_scenario
-from tests.reference.four_vsc import HVDC1, HVDC2, WP1, WP2, FourVsc, report, with_all
+from tests.reference.four_vsc import BUSES, HVDC1, HVDC2, WP1, WP2, FourVsc, emtp, report, with_all
 from tests.support.tables import figures
 
 pytestmark = pytest.mark.reproduction
 
 PAGE = (BUILT_IN / "four_vsc" / "README.md").read_text(encoding="utf-8")
 OURS, CHANGES, FORMING = "Theirs and ours", "What makes the difference", "With forming converters"
+EMTP = "The EMTP file of 2025"
 MARGIN, HERTZ = 4e-3, 0.06
 """A limit stands in the tables to three digits, and is tried on both sides; a frequency to a tenth of a hertz."""
 
@@ -72,6 +74,16 @@ CANDIDATES = {
     "two: wind park 1 holds its voltage; lag of 0.5 ms in the voltage fed forward": replace(W1, fed_forward=5e-4),
     "three: these; a fifth of the load": replace(W1, fed_forward=5e-4, load_share=0.2),
     "two: the data of 2025; a circuit between A and C opens instead": report(circuits_AC=1),
+    "cables: charging twice": replace(OPEN, cables=2.0),
+    "cables: half the charging": replace(OPEN, cables=0.5),
+    "capacitors for reactors": replace(OPEN, capacitors=True),
+    "delay of 0.1 ms in the converter's voltage": replace(OPEN, delay=1e-4),
+    "two: this delay; lag of 0.25 ms in the voltage fed forward": replace(OPEN, delay=1e-4, fed_forward=2.5e-4),
+    "two: wind park 1 holds its voltage; capacitors for reactors": replace(W1, capacitors=True),
+    "two: wind park 1 holds its voltage; cables: charging 1.35 times": replace(W1, cables=1.35),
+    "three: the data of 2025; delay of 0.1 ms; lag of 0.25 ms in the voltage fed forward": report(
+        circuits_AB=1, delay=1e-4, fed_forward=2.5e-4
+    ),
 }
 
 
@@ -115,6 +127,45 @@ def test_each_change_has_the_limit_of_the_page(label, network):
         assert replace(system, S_sc=40000.0).critical().real > 0
     else:
         assert_limit(system, gva, hertz)
+
+
+SLIPS = {"charging": 0.5, "capacitors": True}
+ENTERED = {
+    "as published": (emtp(), ("four_vsc", "report")),
+    "half the charging, `half_charging`": (emtp(charging=0.5), ("four_vsc", "half_charging")),
+    "capacitors for reactors, `charging`": (emtp(capacitors=True), ("four_vsc_emtp", "charging")),
+    "both, as entered: `entered`": (emtp(**SLIPS), ("four_vsc_emtp", "entered")),
+    "both, lag of 0.08 ms in the voltage fed forward": (emtp(**SLIPS, fed_forward=8e-5), None),
+    "both, wind park 1 with K_p 0.0333, K_i 10: `gains`": (emtp(0.0333, 10.0, **SLIPS), ("four_vsc_emtp", "gains")),
+}
+
+
+@pytest.mark.parametrize("label", ENTERED)
+def test_the_slips_of_the_emtp_file_have_the_limits_of_the_page(label):
+    system, _ = ENTERED[label]
+    gva, hertz, open_gva, open_hertz = (cell[0] for cell in figures(PAGE, EMTP, label)[2:])
+    assert_limit(system, gva, hertz)
+    assert_limit(replace(system, circuits_AB=1), open_gva, open_hertz)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("label", [label for label, (_, case) in ENTERED.items() if case])
+def test_so_have_the_fmus(label):
+    gva, hertz = (cell[0] for cell in figures(PAGE, EMTP, label)[:2])
+    assert_fmus(*ENTERED[label][1], gva, hertz)
+
+
+def test_with_both_slips_the_power_flow_is_biger_s_listing():
+    """Angles in degrees, reactive powers in Mvar, from the listing itself; the FMUs' flow is the same."""
+    angles = {"A": 2.383844949, "B": 2.065609536, "E": 10.77028684, "F": 11.21314439}
+    reactive = {"A": -28.10257028, "B": 419.2922914, "E": -361.5673091, "F": -777.8517597}
+    v, s = emtp(**SLIPS).power_flow()
+    buses = gfor.load("four_vsc_emtp").scenario("entered").modes().power_flow()["buses"]
+    for bus, angle in angles.items():
+        k = BUSES.index(bus)
+        assert np.degrees(np.angle(v[k])) == pytest.approx(angle, abs=5e-5)
+        assert 100 * s[k].imag == pytest.approx(reactive[bus], abs=0.05)
+        assert buses.angle_deg[f"bus_{bus}"] == pytest.approx(angle, abs=5e-5)
 
 
 def test_the_power_flow_is_that_of_the_published_files():

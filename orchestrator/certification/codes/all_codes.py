@@ -8,10 +8,12 @@ from orchestrator.certification.codes.declared import Declaration, checked
 from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.fingrid import FINGRID
 from orchestrator.certification.codes.miso import MISO
+from orchestrator.certification.codes.nogrr245 import NOGRR245
 from orchestrator.certification.codes.prc029 import PRC029
 from orchestrator.certification.codes.row import GridCode
+from orchestrator.certification.codes.tr331 import TR331
 
-CODES = {code.key: code for code in (MISO, AEMO, ERCOT, FINGRID, PRC029)}  # by what ``--code`` takes
+CODES = {code.key: code for code in (MISO, AEMO, ERCOT, NOGRR245, FINGRID, PRC029, TR331)}  # by what ``--code`` takes
 
 BY_DECLARATION: dict[str, tuple[Sequence[Declaration], Callable[[Mapping[str, float]], GridCode]]] = {
     "rte": (rte.DECLARED, rte.rte_code)

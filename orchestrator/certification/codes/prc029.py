@@ -3,8 +3,9 @@
 from functools import partial
 
 from orchestrator.certification.codes import criteria as c
-from orchestrator.certification.codes.programme import jumps, ramps, voltage
-from orchestrator.certification.codes.row import CodeRow, GridCode, Judge
+from orchestrator.certification.codes.programme import jumps, ramps
+from orchestrator.certification.codes.ride_through import STRENGTH, profile, step
+from orchestrator.certification.codes.row import CodeRow, GridCode
 
 DIPS = ((0.2, 0.32), (0.45, 1.2), (0.65, 3.0), (0.85, 6.0))
 """Voltage [pu], each within its band (below 0.25, 0.50, 0.70, 0.90), and for how long it has to be ridden through [s];
@@ -12,30 +13,13 @@ resources other than wind."""
 
 SWELL = (1.15, 1.0)  # voltage within the band above 1.10 [pu], and its time [s]
 RECOVERY = 1.0  # time after which the power is back once the voltage is within 0.90 and 1.05 pu [s]
-STRENGTH = 10.0  # short-circuit ratio of the rows: the standard names no grid
-
-
-def _ridden_through(last: int) -> tuple[Judge, ...]:
-    return (c.holds_together(), c.settles(events=(last,)), c.returns("power after the disturbance", RECOVERY,
-            of_code=True, events=(last,)))  # fmt: skip
-
-
-def _step(level: float, lasts: float) -> CodeRow:
-    kind = "dip" if level < 1 else "swell"
-    return CodeRow(
-        f"{kind}_{round(100 * level)}", f"The source goes to {level:g} pu for {lasts:g} s, half power", "R1, table 1",
-        lambda f: voltage(STRENGTH, 0.5, ((0.0, level), (lasts, 1.0)), 1.0 + lasts + 5.0), _ridden_through(-1),
-    )  # fmt: skip
-
 
 PRC029 = GridCode.of(
     "prc029",
     (
-        *(_step(level, lasts) for level, lasts in DIPS),
-        _step(*SWELL),
-        CodeRow("dips_in_10_s", "0.2 pu for 0.16 s twice in 10 s, half power", "R1, cumulative times",
-                lambda f: voltage(STRENGTH, 0.5, ((0.0, 0.2), (0.16, 1.0), (3.0, 0.2), (3.16, 1.0)), 9.0),
-                _ridden_through(-1)),
+        *(step(level, lasts, "R1, table 1", RECOVERY) for level, lasts in (*DIPS, SWELL)),
+        profile("dips_in_10_s", "0.2 pu for 0.16 s twice in 10 s, half power", "R1, cumulative times",
+                ((0.0, 0.2), (0.16, 1.0), (3.0, 0.2), (3.16, 1.0)), RECOVERY),
         CodeRow("rocof", "60 → 58.9 → 60 → 61.1 → 60 Hz at 5 Hz/s, half power", "R3, rate of change of frequency",
                 partial(ramps, STRENGTH, 0.5, rate=5.0, steps=(-1.1, 1.1, 1.1, -1.1)),
                 (c.holds_together(), c.settles(), c.returns(events=(-1,)))),

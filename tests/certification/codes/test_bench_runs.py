@@ -146,6 +146,13 @@ def test_rows_of_ride_through_tell_settings_apart(converter, tmp_path, values, r
     assert [(v.row.name, v.accepted) for v in found] == list(zip(rows, accepted, strict=True))
 
 
+def test_the_limit_of_the_current_decides_whether_a_dip_to_nothing_is_ridden_through(converter, tmp_path):
+    for kind, accepted in ((0.0, False), (3.0, True)):
+        request = CertificationRequest(converter, None, {"current_limit.kind": kind})
+        (row,) = certify_code(request, CODES["nogrr245"], Serial(), tmp_path / f"{kind}", ("dip_0",)).verdicts
+        assert row.accepted == accepted
+
+
 @pytest.mark.parametrize(("code", "row"), [("aemo", "jump_10"), ("fingrid", "jumps")])
 def test_a_grid_following_converter_does_not_oppose_jumps(tmp_path, code, row):
     """It rides through them, settles and returns; nothing else tells it from a grid-forming one."""

@@ -8,8 +8,10 @@ from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.certification.codes.miso import MISO
+from orchestrator.certification.codes.nogrr245 import longest
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps, weakening
 from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.certification.codes.tr331 import AREAS
 from orchestrator.certification.verdict import verdict_of
 
 TIMES = np.arange(0, 11, 1e-3)
@@ -219,6 +221,15 @@ def test_the_ramps_reach_the_frequencies_of_the_code():
 def test_the_load_of_the_last_machine_has_its_power_factor():
     made = last_machine(0.0, 1.0, 1.0)
     assert np.cos(np.arctan(made.load_mvar / 100)) == pytest.approx(0.95)
+
+
+def test_the_profiles_of_ride_through_are_their_lines():
+    """NOGRR245's line passes 0.9 pu at 1.75 s; TR 3.3.1's staircase lies below its line and touches it at each step."""
+    assert longest(0.9) == pytest.approx(1.75)
+    for row in (row for row in CODES["tr331"].rows if row.name.startswith("dip")):
+        end = AREAS[row.name.removeprefix("dip_")]
+        changes = row.programme(50.0).changes[1:-1]
+        assert [c.value for c in changes] == pytest.approx([end * (c.time - 1.0 - 0.15) / 1.35 for c in changes])
 
 
 @pytest.mark.parametrize("code", CODES.values(), ids=lambda code: code.key)

@@ -310,8 +310,8 @@ def test_every_row_of_rte_is_named_for_a_file_and_told_in_words():
 
 @pytest.mark.parametrize(
     ("declare", "codes", "answer"),
-    [([], ["nts631", "miso", "aemo", "ercot", "fingrid", "prc029", "gb"], 3),
-     (["D=2.0"], ["nts631", "miso", "aemo", "ercot", "fingrid", "prc029", "rte", "gb"], 0)],
+    [([], ["nts631", "miso", "aemo", "ercot", "nogrr245", "fingrid", "prc029", "tr331", "gb"], 3),
+     (["D=2.0"], ["nts631", "miso", "aemo", "ercot", "nogrr245", "fingrid", "prc029", "tr331", "rte", "gb"], 0)],
 )  # fmt: skip
 def test_all_codes_leave_out_what_nothing_is_declared_for(declare, codes, answer, monkeypatch, gfor, tmp_path):
     """It is said, and the test is incomplete; only the code that asks for declarations gets them."""

@@ -1,0 +1,1 @@
+"""The four-VSC benchmark with the network of BiGER's EMTP file."""
