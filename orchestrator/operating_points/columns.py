@@ -148,6 +148,18 @@ def _power(column: str, name: str, quantity: str, elements: Elements, prepared: 
     return lambda text: Setting(fed=(members, _number(column, text)))
 
 
+def own_power(column: str, elements: Elements, prepared: PreparedScenario) -> float | None:
+    """What a column of powers gives in the case itself [MW, Mvar]; None for another column."""
+    name, _, quantity = column.partition(".")
+    if quantity == ACTIVE and name not in elements.loads:
+        plans = {unit: prepared.system.components[unit] for unit, bus in elements.units.items() if name in (unit, bus)}
+        return sum(_dispatched(prepared, unit, plan) * float(plan.number("S_n")) for unit, plan in plans.items())
+    if quantity not in (ACTIVE, REACTIVE):
+        return None
+    grid = prepared.system.components[elements.grid]
+    return grid.number(f"{name}.{'P' if quantity == ACTIVE else 'Q'}") * grid.number(f"{name}.scale")
+
+
 def _generation(factor: float, elements: Elements, prepared: PreparedScenario) -> Setting:
     plans = {unit: prepared.system.components[unit] for unit in elements.units}
     return Setting({f"{unit}.P_0": factor * _dispatched(prepared, unit, plan) for unit, plan in plans.items()})

@@ -1,7 +1,7 @@
 """The operating points and outages of a study, each point with each outage."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import cast
 
@@ -15,7 +15,7 @@ from orchestrator.errors import InputError
 from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import Outage, read_outages
-from orchestrator.operating_points.points_file import OperatingCase, read_points
+from orchestrator.operating_points.points_file import OperatingCase, questions_about, read_points
 from orchestrator.points.request import OfCase
 
 _MOST = 1_000_000
@@ -48,6 +48,7 @@ def read_operating_points(
     elements = Elements.of(prepared)
     own = OperatingCase("case", 1.0, {}, (), str(case.path))
     rows = [own] if points is None else read_points(Path(points), prepared, elements)
+    asked = () if points is None else tuple(questions_about(Path(points), prepared, elements))
     lost = read_outages(cast("str | None", outages), elements)
     if len(rows) * len(lost) > _MOST:
         raise InputError(
@@ -61,4 +62,5 @@ def read_operating_points(
         for o, outage in enumerate(lost)
         if o == 0 or set(outage.elements) - set(point.out)
     )  # fmt: skip
+    prepared = replace(prepared, questions=prepared.questions + asked)
     return OperatingPoints(case, prepared, layers, tuple(rows), tuple(lost), items)

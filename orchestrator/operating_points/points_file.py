@@ -1,17 +1,18 @@
 """Operating points from a CSV file: one row each."""
 
 import fnmatch
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.cases.csv_rows import PLACE, Row, place_of, rows_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.errors import InputError
-from orchestrator.operating_points.columns import IN_SERVICE, Elements, Reading, Setting, reading_of
+from orchestrator.errors import InputError, Problem
+from orchestrator.operating_points.columns import ACTIVE, IN_SERVICE, Elements, Reading, Setting, own_power, reading_of
 
 _LABELS = ("time", "name")
+_ANOTHER_UNIT = 25.0  # times smaller than the case's own is a whole column of powers that is asked about
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,18 @@ def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> l
         seen[point.name] = point.place
         found.append(point)
     return found
+
+
+def questions_about(path: Path, prepared: PreparedScenario, elements: Elements) -> Iterator[Problem]:
+    """Questions about the columns of a file that `read_points` has read: powers that look like those in pu."""
+    rows = rows_of(path, ())
+    for column in rows[0]:
+        own = own_power(column, elements, prepared)
+        most = max((abs(float(text)) for row in rows if own and (text := (row[column] or "").strip())), default=0.0)
+        if own and 0 < _ANOTHER_UNIT * most < abs(own):
+            unit = "MW" if column.endswith(ACTIVE) else "Mvar"
+            text = f"at most {most:g} {unit}, where the case itself has {own:.4g} {unit}; are these values in pu?"
+            yield Problem(f"{path}, line 1: column {column!r}", text)
 
 
 def _reading(path: Path, column: str, elements: Elements, prepared: PreparedScenario) -> Reading:

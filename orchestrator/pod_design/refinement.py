@@ -51,8 +51,8 @@ class GainSweep:
     filters: leads.LeadLag
     points: tuple[Placed, ...]
     chosen: Placed  # the smallest gain that meets the requirement, else the gain of the best damping
-    # the gains with which the system is unstable [pu]; empty for systems of more than `_MOST_STATES` states, which are
-    # not examined
+    # the gains, that of ``chosen`` too, with which the system is unstable [pu]; empty for systems of more than
+    # `_MOST_STATES` states, which are not examined
     unstable: tuple[float, ...] = ()
     # least damping ratio of all modes from 0.1 to 2 Hz at each of the points; empty for such systems
     least: tuple[float, ...] = ()
@@ -150,8 +150,8 @@ def sweep(
         chosen = _crossing(loop, points[above - 1], points[above], required)
     else:
         chosen = _peak(loop, points)
-    unstable, least = _of_all_modes(loop, points)
-    return GainSweep(why, filters, tuple(points), chosen, unstable, least)
+    unstable, least = _of_all_modes(loop, [*points, chosen])
+    return GainSweep(why, filters, tuple(points), chosen, unstable, least[: len(points)])
 
 
 def _of_all_modes(loop: PodLoop, points: Sequence[Placed]) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -108,9 +108,10 @@ def _swept(s: GainSweep) -> tuple[str, ...]:
     gains = [p.setting.gain for p in s.points]
     marks = [_MARK * (gain in s.unstable) for gain in gains]
     dampings = [f"{100 * least:.1f}{mark}" for least, mark in zip(s.least, marks, strict=False)]
+    chosen = f"{s.chosen.setting.gain:.1f}{_MARK * (s.chosen.setting.gain in s.unstable)}"
     return (
         s.why, f"{s.filters.T_S1:.4f}", f"{s.filters.T_S2:.4f}", f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
-        " ".join(dampings) or "–", f"K = {s.chosen.setting.gain:.1f}: {percent(s.chosen.damping_ratio)}",
+        " ".join(dampings) or "–", f"K = {chosen}: {percent(s.chosen.damping_ratio)}",
         "–" if s.chosen_least is None else percent(s.chosen_least),
     )  # fmt: skip
 

@@ -55,7 +55,7 @@ class DaskCluster:
             return
         distributed = _distributed()
         with _event_loop() as loop, self._client(distributed, loop) as client:
-            watch = ClusterWatch(client, self.address, _PATIENCE)
+            watch = ClusterWatch(client, self.address, function.__module__, _PATIENCE)
             where = watch.able if watch.unable else None
             futures = [client.submit(function, task, pure=False, workers=where) for task in tasks]
             ready: SimpleQueue[int] = SimpleQueue()

@@ -9,28 +9,29 @@ from orchestrator.errors import CosimError, ErrorKind, InputError
 _LOG = logging.getLogger("gfor")
 INTERVAL = 5.0  # seconds between two looks at the workers
 
-_FINDS = "__import__('importlib.util').util.find_spec('orchestrator') is not None"
-"""Evaluated on a worker, which needs nothing of ours for it."""
-
 
 class ClusterWatch:
     """The workers of one run.
 
     ``client``: of `distributed`.
+    ``module``: of the tasks' function; a worker that cannot import it dies of the first task, and nobody says why.
     ``patience``: seconds without any worker after which the run ends."""
 
-    def __init__(self, client: Any, address: str, patience: float) -> None:
+    def __init__(self, client: Any, address: str, module: str, patience: float) -> None:
         self._client, self._address, self._patience = client, address, patience
-        found = client.run(eval, _FINDS, on_error="return")
+        # evaluated on a worker, which needs nothing of ours for it
+        found = client.run(eval, f"bool(__import__({module!r}))", on_error="return")
         self.able = sorted(worker for worker, has in found.items() if has is True)
+        self.unable = {worker: f" ({error})" for worker, error in sorted(found.items()) if error is not True}
         if found and not self.able:
             raise InputError(
-                f"--scheduler {address}: none of its {len(found)} workers can import gfor-cosim; install it, in this "
-                "version, where they run"
+                f"--scheduler {address}: none of its {len(found)} workers can import gfor-cosim"
+                f"{next(iter(self.unable.values()))}; install it, in this version, where they run"
             )
-        self.unable = sorted(set(found) - set(self.able))
-        for worker in self.unable:
-            _LOG.warning("--scheduler %s: worker %s cannot import gfor-cosim and is given nothing", address, worker)
+        for worker, error in self.unable.items():
+            _LOG.warning(
+                "--scheduler %s: worker %s cannot import gfor-cosim%s and is given nothing", address, worker, error
+            )
         self._known, self._errors = set(self.able), dict[str, str]()
         self._seen = self._looked = time.monotonic()
 
@@ -43,8 +44,8 @@ class ClusterWatch:
         workers = self._workers() - set(self.unable)
         for worker in sorted(self._known - workers):
             _LOG.warning(
-                "--scheduler %s: worker %s is lost%s; others compute its points", self._address, worker,
-                self._last_error(worker),
+                "--scheduler %s: worker %s is lost%s; %s", self._address, worker, self._last_error(worker),
+                "others compute its points" if workers else "no other is there",
             )  # fmt: skip
         self._known = workers
         if workers:

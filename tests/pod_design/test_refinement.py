@@ -82,8 +82,9 @@ def test_where_nothing_near_meets_it_the_settings_of_a_search_are_tried():
 def test_gains_that_leave_the_system_unstable_are_listed():
     plant = Plant(modes=(-0.4 + 4j, -0.3 + 8j), slopes=(-0.01 + 0j, 0.01 + 0j))
     found = refined(plant, required=0.9)
-    assert found.sweeps[0].unstable == tuple(p.setting.gain for p in found.sweeps[0].points if p.setting.gain > 30)
-    assert found.sweeps[0].unstable
+    swept = found.sweeps[0]
+    assert swept.unstable
+    assert swept.unstable == tuple(p.setting.gain for p in (*swept.points, swept.chosen) if p.setting.gain > 30)
 
 
 @pytest.mark.parametrize("evenly", [True, False])

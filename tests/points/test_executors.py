@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -94,6 +95,7 @@ def test_a_cluster_whose_workers_are_all_gone_ends_the_run_with_what_is_there(mo
     assert first == (first[0], 2 * first[0])
     assert caught.value.kind is ErrorKind.WORKER_LOST
     assert "is lost" in caplog.text
+    assert "no other is there" in caplog.text
 
 
 @pytest.mark.slow
@@ -105,12 +107,14 @@ def test_a_cluster_whose_workers_lack_the_project_is_refused_at_once(tmp_path):
         "        if name.split('.')[0] == 'orchestrator':\n            raise ModuleNotFoundError(name)\n"
         "sys.meta_path.insert(0, Hidden())\n"
     )
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])}
     with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster:
         command = [sys.executable, "-m", "distributed.cli.dask_worker", cluster.scheduler_address, "--no-dashboard"]
         worker = subprocess.Popen(command, env=environment, cwd=tmp_path, stderr=subprocess.DEVNULL)
         try:
-            with pytest.raises(InputError, match="none of its 1 workers can import gfor-cosim; install it"):
+            with pytest.raises(
+                InputError, match=r"none of its 1 workers can import gfor-cosim \(orchestrator\); install"
+            ):
                 list(DaskCluster(cluster.scheduler_address).run(double, NUMBERS))
         finally:
             worker.terminate()

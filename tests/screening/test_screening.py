@@ -20,7 +20,7 @@ from orchestrator.operating_points.bench import PointBench, without_references
 from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.outages import read_outages
-from orchestrator.operating_points.points_file import read_points
+from orchestrator.operating_points.points_file import questions_about, read_points
 from orchestrator.operating_points.preparation import ItemPreparation
 from orchestrator.points.dask_cluster import DaskCluster
 from orchestrator.points.points import Work
@@ -169,6 +169,16 @@ def test_powers_are_shared_and_loads_draw_what_is_said(two_area, tmp_path):
     assert "sg1.P_0" not in one.values
     assert both.values["grid.load_2.scale"] * both.values["grid.load_2.P"] == 1000
     assert both.values["grid.load_3.scale"] == 0.5
+
+
+def test_powers_that_look_like_pu_are_asked_about(two_area, tmp_path):
+    _, prepared, elements = two_area
+    path = tmp_path / "points.csv"
+    for units, asked in ((1.0, []), (0.01, ["sg1.P_mw", "load_2.P_mw"])):
+        path.write_text(f"name,sg1.P_mw,load_2.P_mw,load\na,{900 * units},{1100 * units},0.9\nb,0,,1\n")
+        found = [str(one) for one in questions_about(path, prepared, elements)]
+        assert len(found) == len(asked)
+        assert all(name in text and "in pu?" in text for name, text in zip(asked, found, strict=True))
 
 
 def test_a_spreadsheets_mark_is_no_part_of_a_name(two_area, tmp_path):
