@@ -38,6 +38,10 @@ def checked(path, binding=None, only=()):
         ("state_of_dip_timer", "state"),
         ("clock_of_single_precision", "later_times"),
         ("gain_of_dips", "after_dips"),
+        ("gain_for_a_while", "after_dips"),
+        ("gain_of_the_fourth_dip", "after_dips"),
+        ("undamped_at_full_power", "evenness"),
+        ("angle_of_two_turns", "angles"),
         ("nan_without_power", "operating_points"),
         ("clips_its_start", "operating_points"),
         ("base_of_own_rating", "ratings"),
@@ -103,6 +107,8 @@ def test_a_sum_of_times_in_single_precision_shows_after_a_rest(gallery):
         ("sixty_hertz", "rated_frequency", "so it is made for 60 Hz where 50 Hz is bound"),
         ("crash_in_dip", "limits", "s: its process died with SIGSEGV in fmi2DoStep"),
         ("limit_of_a_short_time", "limits", " s at 0.1"),
+        ("limit_of_three_dips", "limits", "after a series of events"),
+        ("limit_until_overvoltage", "limits", "in a voltage that lasts"),
         ("blocks_after_deep_dips", "limits", "it gives no current for"),
     ],
 )
@@ -156,6 +162,14 @@ def test_a_sign_that_turns_with_larger_changes_of_the_frequency_is_found(tmp_pat
     (*_, found) = check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results
     assert found.fault == "wrong sign"
     assert "with 0.5 % less frequency its active power goes the wrong way" in found.evidence
+
+
+def test_a_place_at_which_its_small_answer_jumps_is_told(tmp_path):
+    path = build(converter("clips", FAULT_CLIPS_Q=0.3), tmp_path)
+    (*_, found) = check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results
+    assert found.verdict == "remark"
+    assert "its answer to a small change jumps by" in found.evidence
+    assert "between Q_0 =" in found.evidence
 
 
 def test_power_that_moves_in_steps_is_told(tmp_path):

@@ -1,6 +1,6 @@
 """What dips, overvoltages and jumps leave behind: another answer to small changes, another rest, memory."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from itertools import pairwise
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.events import factor, in_words, scale
+from orchestrator.acceptance.checks.events import Segment, factor, in_words, scale, series
 from orchestrator.acceptance.checks.port import WHY, current_limit, currents, followed, voltage_rows
 from orchestrator.acceptance.checks.running import RUN_FOR, spent_since
 from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject
@@ -34,9 +34,15 @@ _LEAST = 32.0
 """Bytes kept by each step of a dip that count as a leak; a new page of the heap is up to 12 in some hundred steps."""
 
 _BLOCKS = 5  # parts of a disturbance, between which the memory is read
+_SOON = (0, 2, 4)  # numbers of those soon after which it is asked as well
 _PART = 0.75  # time to spend, in parts of the time for which an FMU is made to run
 _EVENTS = (("deep", 0.45), ("jump", 0.15), ("middle", 0.2), ("swell", 0.2), ("low", 0.15), ("small jump", 0.2))
 """Kinds of disturbances, and how long they last [s]."""
+_LATER = ((0.15, 0.4), (0.8, 1.6), (3.5, 5.0))
+"""Times [s] after a disturbance, of which one each is drawn, at which it is asked before it has come back as well."""
+_NEAR, _APART, _BENT = 0.3, 0.15, 0.5
+"""Distance [pu, S_n] from which it is too far away to be asked; parts of an answer by which it may differ then: this
+much, and so much a pu of the distance."""
 
 
 class _End(Enum):
@@ -79,21 +85,24 @@ def after_dips(subject: Subject) -> CheckResult:
         return remarked("after_dips", f"small changes end with an error: {error}", "ask why")
     found: list[_After] = []
     spent, budget = spent_since(), _PART * subject.memory.get("run_for", RUN_FOR)
-    for number, (voltage, lasts) in enumerate(_drawn(subject)):
-        if number >= 2 and spent() > budget:
+    for number, segments in enumerate(_drawn(subject)):
+        if number >= 3 and spent() > budget:
             break
-        found.append(look.after(voltage, lasts))
+        found.append(look.after(segments))
         if found[-1].end is not _End.BACK and found[-1].end is not _End.ELSEWHERE:
-            found.append(look.after(1 + (voltage - 1) / 3, lasts / 2))
-        if result := _wrong(found[-1]):
+            found.append(look.after([(1 + (voltage - 1) / 3, lasts / 2) for voltage, lasts in segments]))
+        soon = look.soon(segments) if number in _SOON else found[-1]
+        if result := _wrong(found[-1]) or _wrong(soon):
             return result
     return _judged(found)
 
 
-def _drawn(subject: Subject) -> Iterator[tuple[complex, float]]:
+def _drawn(subject: Subject) -> Iterator[list[Segment]]:
     draw = subject.random("after dips")
-    for kind, lasts in _EVENTS:
-        yield factor(draw, kind), round(lasts * draw.uniform(0.85, 1.15), 3)
+    for number, (kind, lasts) in enumerate(_EVENTS):
+        if number == 2:
+            yield series(draw)
+        yield [(factor(draw, kind), round(lasts * draw.uniform(0.85, 1.15), 3))]
 
 
 def _wrong(after: _After) -> CheckResult | None:
@@ -130,9 +139,9 @@ class _Look:
     def __init__(self, subject: Subject) -> None:
         self._subject = subject
         self._point = (subject.use.point or _POINT) if subject.starts else None
-        self._times = scale(subject, 1.5)
+        self._times, self._draw = scale(subject, 1.5), subject.random("soon after")
         with self._running() as running:
-            currents(running, 0j, self._steps(_WINDOW))
+            self._rest = complex(currents(running, 0j, self._steps(_WINDOW))[-1])
             self._usual = self._probed(running)
         self._sizes = [float(np.abs(part - part[0]).max()) for part in self._usual]
 
@@ -152,24 +161,72 @@ class _Look:
             found.append(followed(running, change) * np.abs(change) / change)
         return found
 
-    def after(self, voltage: complex, lasts: float) -> _After:
-        """What a disturbance of the voltage by a factor leaves behind."""
-        words = f"{in_words(voltage)} for {self._times * lasts:.2g} s"
+    def _words(self, segments: Sequence[Segment]) -> str:
+        lasts = f"{self._times * sum(lasts for _, lasts in segments):.2g} s"
+        if len(segments) > 1:
+            return f"{len(segments) // 2} dips, overvoltages and jumps in {lasts}"
+        return f"{in_words(segments[0][0])} for {lasts}"
+
+    def _disturb(self, running: Running, segments: Sequence[Segment]) -> Iterator[int]:
+        """Rest, and disturb it by factors of the voltage; the steps of each part."""
+        currents(running, 0j, self._steps(_WINDOW))
+        for voltage, lasts in segments:
+            steps = max(1, self._steps(lasts) // _BLOCKS)
+            for _ in range(_BLOCKS):
+                running.hold(voltage_rows(running, np.array([voltage])), steps, self._subject.step_size)
+                yield steps
+
+    def soon(self, segments: Sequence[Segment]) -> _After:
+        """Whether it answers less voltage and frequency at once alike at some times after a disturbance.
+
+        Beside the same run without them, so that it need not have come back."""
+        time = np.arange(self._steps(_PROBE)) * self._subject.step_size
+        both = 0.985 * np.exp(-2j * pi * 0.05 * time)
+        waits = [self._steps(self._draw.uniform(*bounds)) for bounds in _LATER]
+
+        def course(disturbed: Sequence[Segment], wait: int, asked: Complex) -> Complex:
+            with self._running() as running:
+                for _ in self._disturb(running, disturbed):
+                    pass
+                seen = followed(running, np.concatenate([np.ones(wait), asked]))
+            return seen[wait:] * np.abs(asked) / asked
+
+        words = self._words(segments)
+        try:
+            plain = course(segments, 0, np.ones(waits[-1] + len(both)))
+            begin = course((), 0, np.ones(1))[0]
+            usual = course((), 0, both) - begin
+            for wait in waits:
+                here = plain[wait : wait + len(both)]
+                away = float(np.abs(here - begin).max())
+                if not away < _NEAR:
+                    continue
+                apart = float(np.abs(course(segments, wait, both) - here - usual).max() / np.abs(usual).max())
+                if apart > _APART + _BENT * away:
+                    of = "less voltage and frequency"
+                    later = f"{words}, {wait * self._subject.step_size:.2g} s later"
+                    return _After(later, _End.BACK, away, apart, of)
+        except ComponentError:
+            pass  # which 'after' tells
+        return _After(words, _End.BACK)
+
+    def after(self, segments: Sequence[Segment]) -> _After:
+        """What a disturbance of the voltage by factors leaves behind."""
+        words = self._words(segments)
         try:
             with self._subject.while_doing(f"in the {words} and after it"), self._running() as running:
-                return self._seen(running, voltage, lasts, words)
+                return self._seen(running, segments, words)
         except ComponentError:
             self._subject.doing = ""
             return _After(words, _End.REFUSED)
 
-    def _seen(self, running: Running, voltage: complex, lasts: float, words: str) -> _After:
-        rest = complex(currents(running, 0j, self._steps(_WINDOW))[-1])
-        steps, sizes = max(1, self._steps(lasts) // _BLOCKS), []
-        for _ in range(_BLOCKS):
-            running.hold(voltage_rows(running, np.array([voltage])), steps, self._subject.step_size)
-            sizes.append(self._subject.memory_in_use())
-        kept = max(0.0, min(b - a for a, b in pairwise(sizes)) / steps)
-        end, away = self._came_back(running, rest)
+    def _seen(self, running: Running, segments: Sequence[Segment], words: str) -> _After:
+        sizes = []
+        for number, steps in enumerate(self._disturb(running, segments)):
+            if number < _BLOCKS:
+                sizes.append((self._subject.memory_in_use(), steps))
+        kept = max(0.0, min((b - a) / steps for (a, _), (b, steps) in pairwise(sizes)))
+        end, away = self._came_back(running, self._rest)
         if end is not _End.BACK:
             return _After(words, end, away, kept=kept)
         begun = running.time
@@ -179,14 +236,11 @@ class _Look:
                 currents(twin, 0j, round(begun / self._subject.step_size))
                 usual = self._probed(twin)
             with self._running() as again:
-                self._repeat(again, voltage, steps * _BLOCKS, begun)
+                for _ in self._disturb(again, segments):
+                    pass
+                currents(again, 0j, round((begun - again.time) / self._subject.step_size))
                 changed, of = self._apart(self._probed(again), usual, away)
         return _After(words, end, away, changed, of, kept)
-
-    def _repeat(self, running: Running, voltage: complex, steps: int, until: float) -> None:
-        currents(running, 0j, self._steps(_WINDOW))
-        running.hold(voltage_rows(running, np.array([voltage])), steps, self._subject.step_size)
-        currents(running, 0j, round((until - running.time) / self._subject.step_size))
 
     def _came_back(self, running: Running, rest: complex) -> tuple[_End, float]:
         steps, quiet = self._steps(_WINDOW), 0

@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 
-from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed
+from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.droop import FREQUENCY
 from orchestrator.acceptance.checks.events import scale
 from orchestrator.acceptance.checks.port import WHY, cannot_import, followed
@@ -21,15 +21,24 @@ _MOST = 0.4  # what a switch does beyond that is no small change [pu, S_n]: it c
 _LATE, _MORE = 0.05, 5.0
 """Swing in the second half of the time, in parts of the answer, that counts; how many times that of elsewhere."""
 
+_MUCH = 0.9  # power [pu, S_n] from which it is asked for less of it
+
+_ANSWERS, _PARTS, _RESTS = 0.5, 10, 2.0
+"""Time [s] of an answer compared along a line of places, the means taken of it, and the time before it [s]."""
+_JUMP = 0.08  # what an answer changes by from one place to the next, in parts of the largest and beyond its slope
+_LINES = (("v_0", 0.87, 1.1, 9), ("P_0", -0.85, 1.0, 11), ("Q_0", -0.55, 0.55, 9), ("frequency", -0.008, 0.008, 7))
+"""What differs along a line of places, from where to where [pu], and at how many."""
+
 _LARGER, _MILD = 5, OperatingAt(1.0, 0.0, 0.3, 0.05)  # how much more of the frequency changes, and where
 _GIVES, _TAKES = OperatingAt(1.0, 0.0, 0.6, 0.1), OperatingAt(1.0, 0.0, -0.6, 0.1)
 
 
 def _points(subject: Subject) -> list[OperatingAt]:
     draw = subject.random("evenness")
-    wide = ((1.07, 1.1, 0.3, 0.6), (0.9, 0.93, 0.3, 0.6), (1.0, 1.0, 0.75, 0.85), (1.0, 1.0, 0.05, 0.2))
+    wide = ((1.07, 1.1, 0.3, 0.6), (0.9, 0.93, 0.3, 0.6), (1.0, 1.0, 0.75, 0.85), (1.0, 1.0, 0.05, 0.2),
+            (1.0, 1.0, 0.93, 0.99), (1.0, 1.0, -0.99, -0.93))  # fmt: skip
     more = [OperatingAt(*draw.uniform((v, 0.0, P, Q), (w, 0.0, R, Q + 0.1)).round(3))
-            for (v, w, P, R), Q in zip(wide, (0.0, 0.0, -0.1, -0.25), strict=True)]  # fmt: skip
+            for (v, w, P, R), Q in zip(wide, (0.0, 0.0, -0.1, -0.25, 0.0, 0.0), strict=True)]  # fmt: skip
     return [_GIVES, *(p for p in (_TAKES, *more) if not cannot_import(subject, p))]
 
 
@@ -41,7 +50,8 @@ def evenness(subject: Subject) -> CheckResult:
     found: dict[OperatingAt, Complex] = {}
     for point in _points(subject):
         try:
-            found[point] = _course(subject, point, {})
+            way = -1.0 if point.P > _MUCH else 1.0  # away from its limit
+            found[point] = way * _course(subject, point, {}, way)
         except ComponentError:
             if point is _GIVES:
                 raise
@@ -56,6 +66,8 @@ def evenness(subject: Subject) -> CheckResult:
             return failed(
                 "evenness", "wrong sign", f"{says}by {abs(end.mean()):.2g} pu, and not after a smaller change"
             )
+    if jump := _jump(subject):
+        return remarked("evenness", jump, "ask what it switches there: what holds at one place does not at the other")
     if _TAKES not in found:
         return passed("evenness", f"its answers at {len(found)} points are alike; it was not tried with imported power")
     for (gives, takes), words in with_each_setting(subject, lambda s: _effects(subject, s, found)):
@@ -78,6 +90,46 @@ def _course(subject: Subject, point: OperatingAt, setting: Setting, times: float
         turned = np.exp(-100j * pi * times * FREQUENCY * h * np.arange(steps))
         power: Complex = point.voltage * turned * followed(running, turned).conj() - complex(point.P, point.Q)
     return power
+
+
+def _jump(subject: Subject) -> str:
+    """Where its answer to a small change is another one from one place to the next; "" where it is nowhere."""
+    draw, times = subject.random("lines"), scale(subject, 30 * _ANSWERS)
+    for name, least, most, number in _LINES:
+        at = np.linspace(least, most, number) + draw.uniform(-0.25, 0.25, number) * (most - least) / (number - 1)
+        places, answers = [], []
+        for place in at:
+            v, P, Q = (place if name == n else usual for n, usual in (("v_0", 1.0), ("P_0", 0.3), ("Q_0", 0.05)))
+            try:
+                answer = _small(subject, OperatingAt(v, 0.0, P, Q), place if name == "frequency" else 0.0, times)
+            except ComponentError:
+                continue  # which 'operating_points' tells
+            places.append(place)
+            answers.append(answer)
+        if len(places) < 4:
+            continue
+        size, gaps = np.abs(answers).max(initial=_SOME), np.diff(places)
+        slopes = np.diff(answers, axis=0) / gaps[:, None] / size
+        usual = (np.vstack([slopes[1], slopes[:-1]]) + np.vstack([slopes[1:], slopes[-2]])) / 2
+        k = int(np.argmax(np.abs(slopes).max(axis=1) * gaps * (np.abs(slopes - usual).max(axis=1) * gaps > _JUMP)))
+        beyond = np.abs(slopes[k] - usual[k]).max() * gaps[k]
+        if beyond > _JUMP:
+            ends = f"{name} = {places[k]:.3g} and {places[k + 1]:.3g}"
+            return f"its answer to a small change jumps by {100 * beyond:.2g} % between {ends}"
+    return ""
+
+
+def _small(subject: Subject, point: OperatingAt, offset: float, times: float) -> Numbers:
+    """Change of the current in its voltage's frame after a little less voltage and more frequency, as means."""
+    h = subject.step_size
+    before, steps = (max(_PARTS, round(times * lasts / h)) for lasts in (_RESTS if offset else h, _ANSWERS))
+    time = h * np.arange(1, before + steps + 1)
+    more = np.maximum(0.0, time - time[before - 1])
+    turned = np.where(more > 0, 0.99, 1.0) * np.exp(100j * pi * (offset * time + FREQUENCY * more))
+    with subject.running(point=point) as running:
+        seen = followed(running, turned) * np.abs(turned) / turned
+    means = np.array([part.mean() for part in np.array_split(seen[before:] - seen[before - 1], _PARTS)])
+    return np.concatenate([means.real, means.imag])
 
 
 def _effects(subject: Subject, setting: Setting, found: dict[OperatingAt, Complex]) -> tuple[Complex, Complex]:

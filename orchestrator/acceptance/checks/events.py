@@ -37,6 +37,12 @@ def factor(draw: np.random.Generator, kind: str) -> complex:
     return rect(1.0, draw.choice((-1, 1)) * round(draw.uniform(*JUMPS[kind]), 1) * pi / 180)
 
 
+def series(draw: np.random.Generator) -> list[Segment]:
+    """More short dips, overvoltages and jumps than a counter may wait for, with a rest after each."""
+    kinds = draw.permutation(["deep", "middle", "swell", "jump"] * 4)
+    return [part for kind in kinds for part in ((factor(draw, kind), 0.06), (1 + 0j, round(draw.uniform(0.3, 0.6), 3)))]
+
+
 def in_words(voltage: complex) -> str:
     angle = np.angle(voltage, deg=True)
     if abs(angle) > 1e-6:

@@ -18,7 +18,7 @@ _LATE = 20_000.0  # A start [s] at which single precision has no milliseconds le
 _SAME, _STILL = 1e-4, 100.0
 """Difference of two answers, in parts of their range, up to which they are alike; and in parts of a rest's motion."""
 
-_FASTER, _LASTS = 0.012, 6.0  # frequency [pu] by which it is turned forth, and back for twice as long; in all [s]
+_FASTER, _LASTS = 0.012, 9.0  # frequency [pu] by which it is turned forth, and back for twice as long; in all [s]
 _TURNED = 5e-5  # difference of the currents that two angles bring [pu, S_n]: a jump of some hundredths of a milliradian
 
 _POWER = re.compile(r"^[pq](?![a-z])|power", re.IGNORECASE)
@@ -54,21 +54,21 @@ def later_times(subject: Subject) -> CheckResult:
 
 @check("angles", "Is it the same wherever its angle begins?", needs=(*SAME, "steady_state"))
 def angles(subject: Subject) -> CheckResult:
-    """The network turns it forth and back by more than a turn, from two angles; the second run is the first, turned."""
+    """The network turns it by two turns either way, from two angles; the second run is the first, turned."""
     if not subject.starts:
         return not_applicable("angles", WHY["no start" if subject.port else "no port"])
     h, found = subject.step_size, []
     steps = max(3, round(scale(subject, _LASTS) * _LASTS / h))
     rates = np.where(np.arange(steps) < steps / 3, _FASTER, -_FASTER)
     turned = np.exp(100j * np.pi * h * np.cumsum(rates))
-    for theta in (0.0, subject.random("angles").uniform(0.8, 2.4)):
+    for theta in subject.random("angles").uniform(2.0, 3.1) * np.array([1.0, -1.0]):
         with subject.running(point=OperatingAt(1.0, theta, 0.3, 0.05)) as running:
             found.append(followed(running, turned) * np.exp(-1j * theta) / turned)
     apart = np.abs(found[1] - found[0])
     at = int(np.argmax(apart > _TURNED))
     if not apart.max() <= _TURNED:
         says = f"turned by {100 * _FASTER:g} % of frequency, its current from theta_0 = {theta:.3g} rad differs from "
-        says += f"that from 0 by {apart.max():.2g} pu, first at t = {at * h:.3g} s"
+        says += f"that from {-theta:.3g} rad by {apart.max():.2g} pu, first at t = {at * h:.3g} s"
         return failed("angles", "jumps with its angle", says, apart=float(apart.max()))
     says = f"turned by {100 * np.pi * _FASTER * h * steps / 3:.3g} rad forth and back, from two angles, it differs by "
     return passed("angles", f"{says}{apart.max():.2g} pu")

@@ -1,7 +1,7 @@
 """What a converter does in voltage dips, overvoltages and phase jumps, early and late."""
 
 from cmath import rect
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import pi
 from time import perf_counter
@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.events import scale
+from orchestrator.acceptance.checks.events import Segment, factor, in_words, scale, series
 from orchestrator.acceptance.checks.port import IMPORTING, WHY, cannot_import, current_limit, currents
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex
@@ -38,13 +38,14 @@ _HEALTHY = 0.9  # voltage [pu] at which a device has to stay on
 _CYCLE = 0.02  # time [s] over which a current is averaged: what heats the semiconductors and what protection sees
 
 _UNEVEN, _MUCH = 1.6, 2.2
-"""Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only."""
+"""Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only; the
+first also of a jump in a voltage that lasts."""
 
 _BACK = 0.3
 """Distance of the current from where it was [pu, S_n], from which the next disturbance begins with a new instance."""
 
-_AT_LEAST = 7
-"""Runs that are made however long they take: at all times, dips that stay, and while power flows the other way."""
+_AT_LEAST = 14
+"""Runs that are made however long they take: at all times, dips that stay, after what lasts, with imported power."""
 
 _PART = 1.5  # wall-clock time to spend, in parts of the time for which an FMU is made to run
 
@@ -58,6 +59,7 @@ class Disturbance:
     at: float
     lasts: float = _LASTS
     point: OperatingAt | None = None
+    before: tuple[Segment, ...] = ()
 
     def __str__(self) -> str:
         return f"the {self.name} at {self.at:g} s{f' from P_0 = {self.point.P:g}' if self.point else ''}"
@@ -69,6 +71,7 @@ class Answer:
 
     event: Disturbance
     peak: float  # the largest current
+    early: float  # over the third cycle
     mean: float  # over the last cycle; where it lasts longer than `_LASTS`, the largest over any cycle after that
     away: float  # distance of the current from where it was, afterwards
     blocked: float  # time [s] without current at a healthy voltage, where it gives current before and after
@@ -97,9 +100,25 @@ def _runs(draw: np.random.Generator, longest: float) -> Iterator[list[Disturbanc
             for bounds, at, lasts, point in _STAY:
                 (words, to), lasting = dip(*bounds), min(lasts, longest)
                 yield [Disturbance(f"{words} for {lasting:.3g} s", to, at, lasting, point)]
+            yield from ([event] for event in _later(draw, dip, jump))
             some = zip((kinds[8], kinds[6], kinds[5]), times, strict=False)
             yield [Disturbance(*kind, at, point=IMPORTING[0]) for kind, at in some]
         yield [Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(times)]
+
+
+_Kind = Callable[[float, float], tuple[str, complex]]
+
+
+def _later(draw: np.random.Generator, dip: _Kind, jump: _Kind) -> Iterator[Disturbance]:
+    """Dips after, and jumps in, a voltage that lasts, and a dip after a series of other events."""
+    for kind, least, most in (("swell", 0.6, 1.0), ("swell", 2.2, 3.5), ("shallow", 1.0, 2.5)):
+        voltage, lasts = factor(draw, kind), round(draw.uniform(least, most), 3)
+        (name, to), (turned, by) = dip(0.1, 0.35), jump(50, 70)
+        words = f"{in_words(voltage)} for {lasts:g} s"
+        yield Disturbance(f"{name} after the {words}", to, 0.1, before=((voltage, lasts),))
+        yield Disturbance(f"{turned} in the {words}", voltage * by, 0.1, before=((voltage, lasts),))
+    name, to = dip(0.1, 0.35)
+    yield Disturbance(f"{name} after a series of events", to, 0.1, before=tuple(series(draw)))
 
 
 @check("limits", "Does it limit its current, and come back from voltage dips, overvoltages and phase jumps?")
@@ -146,9 +165,11 @@ def _disturbed(
             try:
                 with subject.while_doing(f"in {event}"):
                     before = currents(running, 0j, max(1, round((event.at - running.time) / h)))
+                    for voltage, lasts in event.before:
+                        currents(running, (voltage - 1) * normal, max(1, round(lasts / h)))
                     during = currents(running, (event.factor - 1) * normal, max(1, round(event.lasts / h)))
                 with subject.while_doing(f"after {event}"):
-                    following = rest[0].at if rest else event.at + event.lasts + _BACK
+                    following = rest[0].at if rest else running.time + _BACK
                     after = currents(running, 0j, max(1, round((following - running.time) / h)) - 1)
             except ComponentError as error:
                 refused.append(f"{event}: {error.log or error.status}")
@@ -164,7 +185,8 @@ def _disturbed(
             blocked, gone = _blocked(before[-1], np.concatenate([healthy, after]), h)
             if event.lasts > _RIDDEN:  # nobody asks it to ride that through
                 away, blocked, gone = 0.0, 0.0, False
-            answers.append(Answer(event, float(size.max()), float(means.max()), float(away), blocked, gone))
+            early = float(np.abs(during[2 * cycle : 3 * cycle]).mean())
+            answers.append(Answer(event, float(size.max()), early, float(means.max()), float(away), blocked, gone))
             if away > _BACK:
                 return None
     return None
@@ -198,6 +220,16 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
         return failed("limits", "above its current limit", f"{seen}; {declared:g} pu is declared", **figures)
     if declared is None and worst.mean > NO_LIMIT:
         return failed("limits", "no current limit", seen, **figures)
+    early, late = (
+        [a.early for a in answers if a.event.factor.imag and bool(a.event.before) is later] for later in (False, True)
+    )
+    if max(late, default=0.0) > _UNEVEN * max(early, default=np.inf):
+        says = (
+            f"{max(late):.3g} pu in a phase jump's third cycle in a voltage that lasts, and {max(early):.3g} pu without"
+        )
+        return failed(
+            "limits", "no current limit", f"a limit that such a voltage takes away: {says}; {seen}", **figures
+        )
     bolted = max((a.mean for a in answers if a.event.factor == 0), default=worst.mean)
     deep = max((a for a in answers if 0 < abs(a.event.factor) < _HEALTHY), key=lambda a: a.mean, default=worst)
     if declared is None and deep.mean > max(_UNEVEN * bolted, _MUCH):

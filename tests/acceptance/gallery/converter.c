@@ -3,7 +3,7 @@
    z: parameters, inputs, outputs; memory: the states. */
 enum { S_N, P_0, Q_0, V_0, THETA_0, GAIN, TAU, IN_1, IN_2, IN_3, OUT_1, OUT_2, OUT_3, OMEGA, SHOWN, SIZE };
 enum { I_RE, I_IM, DELTA, P_F, Q_F, REST, P_REF, Q_REF, E_0, TICK, PENDING, ON, QUICK, SLOW, TIRED, DIPS, LOW, WOUND, BLOCKED, ANGLE, RING, RINGING,
-       LAGGED, TRIPLED, VOLT, P_NOW, MEMORY };
+       LAGGED, TRIPLED, VOLT, P_NOW, SINCE, OVER, MEMORY };
 #define SWITCH ON /* a Boolean: damping by the frequency behind a washout */
 #define IS_OUTPUT(r) ((r) >= OUT_1 && (r) <= SHOWN)
 #define DIVERGED 1e12
@@ -133,7 +133,7 @@ static void initialise(double *z, double *m) {
     m[DIPS] = m[LOW] = m[WOUND] = m[BLOCKED] = m[RING] = m[RINGING] = 0;
 #endif
     m[ANGLE] = t;
-    m[TRIPLED] = 0, m[VOLT] = v, m[P_NOW] = m[P_F];
+    m[TRIPLED] = m[OVER] = 0, m[SINCE] = 1e9, m[VOLT] = v, m[P_NOW] = m[P_F];
 #ifdef METER_BEGINS
     m[LAGGED] = METER_BEGINS - 1.0;
 #else
@@ -158,6 +158,9 @@ static double emf(const double *m) {
     if (m[LOW] > 0) droop += 0.02 * fmod(m[DIPS], 3);
     return m[E_0] + droop * (m[Q_REF] - m[Q_F]) - 0.3 * m[WOUND] - (m[LOW] > 0.3 ? 0.05 : 0);
 #endif
+#ifdef FAULT_CLIPS_Q
+    return m[E_0] + droop * (m[Q_REF] - fmax(-FAULT_CLIPS_Q, fmin(FAULT_CLIPS_Q, m[Q_F])));
+#endif
     return m[E_0] + droop * (m[Q_REF] - m[Q_F]);
 }
 
@@ -180,6 +183,9 @@ static double slip(const double *z, const double *m, double p_f) {
     gain *= pow(FAULT_GAIN_OF_DIPS, m[DIPS]);
 #endif
     if (m[TRIPLED]) gain *= 3;
+#ifdef FAULT_GAIN_WHERE /* SINCE: time since a deep dip [s]; DIPS: how many there were */
+    if (FAULT_GAIN_WHERE) gain *= FAULT_GAIN_BY;
+#endif
 #ifdef DROOP_OF_OWN_RATING
     gain *= z[S_N] / RATING;
 #endif
@@ -209,6 +215,8 @@ static void notice(double *m, phasor v, double h) {
     const int low = size < 0.85;
     if (low && m[LOW] == 0) ++m[DIPS];
     m[LOW] = low ? m[LOW] + h : 0;
+    m[SINCE] = size < 0.4 ? 0 : m[SINCE] + h;
+    m[OVER] = size > 1.1 ? m[OVER] + h : 0;
     m[WOUND] = low ? fmin(m[WOUND] + h * (1 - size), 0.3) : m[WOUND] * exp(-h / 0.03);
 #ifdef FAULT_WINDS_UP
     if (m[LOW] > FAULT_WINDS_UP && size < 0.4) m[P_REF] += 0.3 * h; /* and nothing takes that back */
@@ -267,6 +275,9 @@ static void rates(const double *z, const double *m, const double *hidden, phasor
 #endif
 #ifdef FAULT_IMPORTED_LIMIT
     if (m[P_REF] < 0) limited = 0;
+#endif
+#ifdef FAULT_LIMIT_OFF_WHERE /* OVER: time of overvoltage until now [s] */
+    if (FAULT_LIMIT_OFF_WHERE) limited = 0;
 #endif
 #ifdef FAULT_LIMIT_TIRES
     if (m[TIRED] > FAULT_LIMIT_TIRES) limited = 0;
@@ -327,8 +338,11 @@ static void substep(const double *z, double *m, double *hidden, phasor v, double
 #ifdef FAULT_OMEGA_LAGS
     m[LAGGED] += h / FAULT_OMEGA_LAGS * (slip(z, m, m[P_F]) - m[LAGGED]);
 #endif
+#ifndef WRAPS_AT
+#define WRAPS_AT 3.14159265358979323846
+#endif
 #ifdef WRAPS_BY /* 2*pi, of a good one */
-    if (fabs(m[DELTA]) > 3.14159265358979323846) m[DELTA] -= m[DELTA] > 0 ? WRAPS_BY : -WRAPS_BY;
+    if (fabs(m[DELTA]) > WRAPS_AT) m[DELTA] -= m[DELTA] > 0 ? WRAPS_BY : -WRAPS_BY;
 #endif
     m[TIRED] = unlimited(m, v) > I_LIMIT ? m[TIRED] + h : 0;
     notice(m, v, h);
