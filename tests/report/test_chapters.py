@@ -58,7 +58,7 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
     first = text[: text.index("<section")]
     for said in (
         "not as required: with K = 200 the mode has 18.00 % of damping, 10.60 % before, 20.00 % wanted",
-        "not known whether stable everywhere: 2 operating points with 3 outages; least damped 0.930 Hz, 3.80 %",
+        "not known whether stable everywhere: 2 operating points, 3 outages; least damped 0.930 Hz, 3.80 %",
         "mon, sg3: no power flow: sg5 would need 129 %",
         "growth outside of the range was counted at some points only",
         "vendor.fmu: wrong rated frequency", "anything after it", "It passes at all.", "judged: 9 of 9",
