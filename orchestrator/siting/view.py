@@ -118,7 +118,7 @@ def answer(result: SiteResult) -> str:
     after = f" after the outage {at}" if at != result.intact.name else ""
     if most < (0 if result.request.is_foreign else _NONE):
         return f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}"
-    among = f" among the {len(result.ranking)} buses asked for" if result.request.buses else ""
+    among = " of those asked for" if result.request.buses else ""
     others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
     return (
         f"{best[0]} is the best place for {device_title(result)}{among}: {shown(result, most)} "

@@ -17,9 +17,10 @@ from orchestrator.errors import InputError
 from orchestrator.report.html import studies
 from orchestrator.report.html.charts import Mark, bar_chart, complex_plane, legend
 from orchestrator.report.html.elements import colour, damping, table
+from orchestrator.report.tables import short
 from orchestrator.results.manifest import read_manifest
 
-_FEW, _FASTEST = 4, -5.0  # of a list; real part [1/s] of modes on a map
+_FEW, _LONGEST, _FASTEST = 4, 300, -5.0  # of a list; of a text; real part [1/s] of modes on a map
 _DESIGNED = {"without": "target", "predicted": "predicted", "with": "achieved"}
 _STABLE: Mapping[bool | None, str] = {True: "stable", False: "UNSTABLE", None: "not known whether stable"}
 
@@ -235,11 +236,12 @@ def _identified(file: Path, modes: Any) -> Chapter:
 
 
 def _interactions(file: Path, c: Content) -> Chapter:
-    shared = len(c["interaction_modes"])
     worst = next((p for p in c["pairs"] if p["vendors"] == c["worst_pair"]), None)
-    answer = f"{shared} modes that vendors share" + (f"; {worst['sentence']}" if worst else "")
-    verdicts = [p["stable"] for p in c["pairs"]]
-    good = False if False in verdicts else None if None in verdicts or c["unknown_pairs"] else True
+    whole = c["as_in_the_case"]["stable"]
+    verdicts = [whole, *(one["stable"] for one in (*c["pairs"], *c.get("assignments", [])))]
+    good = False if False in verdicts else None if None in verdicts else True
+    answer = f"{_STABLE[whole]} as in the case; {len(c['interaction_modes'])} modes that vendors share"
+    answer += f"; {worst['sentence']}" if worst else ""
     sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
     lost = [f"pair {' and '.join(pair)}" for pair in c["unknown_pairs"]]
     return Chapter(file, "Do several vendors' converters agree?", answer, good, sure, [*lost, *c["warnings"]],
@@ -254,6 +256,7 @@ def _sensitivities(file: Path, c: Content) -> Chapter:
              f"{r['frequency_hz_per_percent']:+.3g}", escape(r["doubts"])] for r in found]  # fmt: skip
     said = ", ".join(f"{r['parameter']} ({r[key]:+.2g})" for r in first) or "no parameter"
     answer = f"{mode['frequency_hz']:.3f} Hz, {mode['damping_percent']:.2f} %: most by {said} points for 1 % more"
+    answer = f"UNSTABLE; {answer}" if c["stable"] is False else answer
     size = "Points by 1 %, without sign"
     bars = bar_chart("Points of damping", [r["parameter"] for r in first],
                      [("1 % more", colour(1), [abs(r[key]) for r in first])], size) if first else ""  # fmt: skip
@@ -282,18 +285,16 @@ def _sources(file: Path, records: Any) -> Chapter:
 
 
 def _strengths(file: Path, c: Content) -> Chapter:
-    found = [(s["name"], b) for s in c["scenarios"] for b in sorted(s["buses"], key=lambda b: b["s_sc_mva"])]
-    rows = [[escape(name), escape(b["bus"]), f"{b['s_sc_mva']:.0f}", "–" if b["scr"] is None else f"{b['scr']:.2f}"]
-            for name, b in found]  # fmt: skip
-    said: dict[str, list[str]] = {}
+    said, rows = dict[str, list[str]](), []
     for scenario in c["scenarios"]:
-        least = min(scenario["buses"], key=lambda b: b["s_sc_mva"])
-        scrs = [f", SCR {b['scr']:.2f} at {b['bus']}" for b in scenario["buses"] if b["scr"] is not None]
-        text = f"weakest is {least['bus']} with {least['s_sc_mva']:.0f} MVA{''.join(scrs[:_FEW])}"
-        said.setdefault(text, []).append(scenario["name"])
+        weakest, *_ = buses = sorted(scenario["buses"], key=lambda b: b["s_sc_mva"])
+        ratios = {b["bus"]: "–" if b["scr"] is None else f"{b['scr']:.2f}" for b in buses}
+        text = "".join(f", SCR {scr} at {bus}" for bus, scr in ratios.items() if scr != "–")
+        text = f"weakest is {weakest['bus']} with {weakest['s_sc_mva']:.0f} MVA{text}"
+        said.setdefault(short(text, _LONGEST), []).append(scenario["name"])
+        rows += [[escape(scenario["name"]), escape(b["bus"]), f"{b['s_sc_mva']:.0f}", ratios[b["bus"]]] for b in buses]
     answer = "; ".join(f"{', '.join(names)}: {text}" for text, names in said.items())
-    return Chapter(file, "How strong is the network?", answer, None,
-                   c["convention"], (),
+    return Chapter(file, "How strong is the network?", answer, None, c["convention"], (),
                    table("Short-circuit power", ["Scenario", "Bus", "S_sc [MVA]", "SCR"], rows, left=2))  # fmt: skip
 
 
@@ -314,14 +315,9 @@ def _nyquist(file: Path, c: Content) -> Chapter:
     modes = "no modes asked" if c["modes_stable"] is None else "modes agree" if c["modes_stable"] == good else (
         "the modes do NOT agree")  # fmt: skip
     return Chapter(
-        file,
-        f"Is {c['device']} stable at {c['network']}?",
-        c["sentence"],
-        good,
-        f"encirclements; {modes}",
-        c["reasons"],
-        content,
-    )
+        file, f"Is {c['device']} stable at {c['network']}?", c["sentence"], good, f"encirclements; {modes}",
+        c["reasons"], content,
+    )  # fmt: skip
 
 
 _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (

@@ -24,8 +24,6 @@ USED = (
 
 Sections = list[tuple[str, str]]
 _PICTURE = r'(?:<ul class="legend">[^\n]*?</ul>)?<svg class="chart".*?</svg>|<img .*?>'
-_SEALED = ("certificate.json", "matrix.json")
-"""What folders of certificates have in the place of a manifest."""
 
 
 def write_report(
@@ -81,7 +79,7 @@ def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter,
             for chapter in chapters_of(part):
                 text = sections_of(chapter, len(told) + 1)
                 told.append((chapter, [(chapter.title or chapter.question, text)]))
-            if part != place and len(told) == count:
+            if part != place and len(told) == count and (part / MANIFEST).is_file():
                 warnings.warn(f"{part}: nothing in it can be used for a report", ResultsWarning, stacklevel=2)
         if len(told) == before:
             pages = ", ".join(file.name for file in sorted(place.glob("*.html"))) if place.is_dir() else ""
@@ -90,19 +88,20 @@ def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter,
     return told, [*runs.values()]
 
 
-def _parts(place: Path) -> Iterator[Path]:
-    """A place, and the results in folders in it; those of a run's scenarios are of the run."""
+def _parts(place: Path, depth: int = 2) -> Iterator[Path]:
+    """A place, and the folders in it; those of a run's scenarios are of the run, and points of their study."""
     if not place.exists():
         raise InputError(f"{place}: there is no such file or folder")
     yield place
-    if place.is_dir() and not (place / SUMMARY).is_file():
+    if place.is_dir() and depth and not (place / SUMMARY).is_file():
         for inner in sorted(path for path in place.iterdir() if path.is_dir()):
-            if any((inner / name).is_file() for name in (MANIFEST, *_SEALED)):
-                yield inner
+            if not inner.name.startswith(".") and not inner.name.endswith("points"):
+                yield from _parts(inner, depth - 1)
 
 
 def _name(place: Path) -> str:
-    return place.resolve().name
+    """The folder's."""
+    return (place if place.is_dir() else place.parent).resolve().name
 
 
 def _of_run(run: Results, figures: Figures) -> Sections:
