@@ -19,9 +19,19 @@ from orchestrator.cases.given import keep, kept
 from orchestrator.errors import InputError
 from orchestrator.late import pd
 from orchestrator.report.notebook import page
+from orchestrator.results import origin
 
 if TYPE_CHECKING:
     from orchestrator.api import studies
+
+
+def _from_python() -> dict[str, str]:
+    from orchestrator.points.code import code_hash  # noqa: PLC0415 - only where results are written
+
+    return {"command": "from Python", "code": code_hash()}
+
+
+origin.said[:] = origin.said or [_from_python]
 
 
 def built_in_cases() -> tuple[str, ...]:

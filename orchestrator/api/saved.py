@@ -45,6 +45,13 @@ class Saved(Mapping[str, Any]):
         except pd.errors.EmptyDataError:
             return pd.DataFrame()
 
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Date, version, command, and hashes of code and inputs, as far as they were kept; a recording has its own in
+        its ``attrs``."""
+        file = self.folder / MANIFEST
+        return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
+
     def __repr__(self) -> str:
         return f"<Saved {self.folder}: {', '.join(self)}>"
 

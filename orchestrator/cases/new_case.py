@@ -5,9 +5,10 @@ import os
 import re
 import textwrap
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from fmus.toolchain.port_variables import I_IM, I_RE, SYSTEM_BASE_MVA, V_IM, V_RE
 from orchestrator.binding.binding import bound_fmu
@@ -124,12 +125,19 @@ def write_case(wanted: WantedCase) -> NewCase:
         wanted = replace(wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz")
     base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
     place = None if wanted.converter is None else _placed(wanted.converter, base)
-    draft = _Text(wanted, sources, base, place)
+    draft = _Text(wanted, sources, base, place, _switched(device))
     scenarios = _prepared(draft.text, wanted, [])
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
     text = _commented(draft.text, list(questions), sources)
     black_box = device is not None and not device.can_save_state
     return NewCase(text, tuple(draft.assumed(len(questions))), tuple(p.name for p in scenarios), black_box)
+
+
+def _switched(device: FmuDescription | None) -> dict[str, bool]:
+    """The PODs, p or q, that a device has a switch for: ours where None; and whether it starts with them."""
+    starts = {x: "false" if device is None else str(v.start).lower() for x in "pq"
+              if device is None or (v := device.variables.get(f"pod_{x}.enabled"))}  # fmt: skip
+    return {x: start in ("true", "1", "1.0") for x, start in starts.items()}
 
 
 def _described(path: Path, binding: Path | None, *, is_dll: bool) -> FmuDescription:
@@ -279,8 +287,9 @@ class _Text:
 
     def __init__(
         self, wanted: WantedCase, sources: dict[str, Path], base: PreparedScenario | None = None,
-        place: _Place | None = None,
+        place: _Place | None = None, pods: Mapping[str, bool] = MappingProxyType({}),
     ) -> None:  # fmt: skip
+        self._pods = pods
         self._wanted, self._sources, self._base, self._place = wanted, sources, base, place
         self._stray, self._stray_why = _stray_capacitance(base) if base else (0.05, "")
         self._network = base.network if base else None
@@ -375,6 +384,7 @@ class _Text:
         values = (
             f'S_n = "{place.rating_mva:g} MVA", P_0 = {place.p_mw / place.rating_mva:.6g}, v_0 = {self._place.v_pu:g}'
         )
+        values += "".join(f", pod_{x}.enabled = false" for x, starts in self._pods.items() if starts)
         return (
             f'\n[components.gfor]\n{what}\nbus = "{self._place.bus}"\n'
             f"parameters = {{ {values} }}    # P_0 in parts of S_n: {place.p_mw:g} MW\n"
@@ -386,8 +396,7 @@ class _Text:
             return found
         if self._place is not None:
             found.append(self._scenario("converter", "Converter"))
-            if self._wanted.device is None:
-                found += [self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"gfor.pod_{x}.enabled") for x in "pq"]
+            found += [self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"gfor.pod_{x}.enabled") for x in self._pods]
         fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
         lines = sorted(self._network.lines, key=lambda x: (x.has_ratio, self._fault_bus not in (x.from_bus, x.to_bus)))
         opening = f'    # cleared_by = "{lines[0].name}" would open that line with it' if lines else ""

@@ -74,6 +74,8 @@ OLD = {
 
 _MODULES = {new: old for old, new in OLD.items()}  # a command in a group has the module of its old name
 
+_LONGEST_PATH = 200
+
 _READERS = ("signal compare", "signal identify", "signal source", "verify")
 """Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
 
@@ -136,10 +138,16 @@ def _command_in(words: Sequence[str]) -> str | None:
     return next((name for name in (" ".join(named), *named[:1]) if name in COMMANDS), None)
 
 
-def _origin(words: Sequence[str]) -> dict[str, str]:
+def _origin(words: Sequence[str]) -> dict[str, Any]:
     from orchestrator.points.code import code_hash  # noqa: PLC0415 - only where results are written
+    from orchestrator.points.key import files_named, sha256_of  # noqa: PLC0415 - likewise
 
-    return {"command": shlex.join(["gfor", *words]), "code": code_hash()}
+    inputs = {}
+    for path in (Path(word) for word in words if len(word) < _LONGEST_PATH and Path(word).is_file()):
+        inputs[str(path)] = sha256_of(path)
+        if path.suffix == ".toml":
+            inputs |= files_named(path.read_text(encoding="utf-8", errors="replace"), path.parent)
+    return {"command": shlex.join(["gfor", *words]), "code": code_hash(), "inputs": inputs}
 
 
 def _failed(error: CosimError | SetupError | OSError) -> int:

@@ -3,6 +3,7 @@
 import argparse
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from orchestrator.asked import as_number, asked_of
@@ -30,6 +31,10 @@ def repeatable(
 ) -> None:
     """An option that may be given several times; its values are a list."""
     parser.add_argument(name, metavar=metavar, help=text, type=read, action="append", default=[])
+
+
+def add_kept_argument(parser: argparse.ArgumentParser, name: str) -> None:
+    option(parser, "--out", "DIR", f"write {name}.json there, for `gfor report`", read=Path)
 
 
 def add_json_argument(parser: argparse.ArgumentParser) -> None:

@@ -11,8 +11,8 @@ from orchestrator.acceptance.checks.base import CheckResult, Verdict
 from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.api.acceptance import check
 from orchestrator.asked import read_positive
-from orchestrator.cli.arguments import option, repeatable, switch
-from orchestrator.cli.terminal import print_json
+from orchestrator.cli.arguments import add_kept_argument, option, repeatable, switch
+from orchestrator.cli.terminal import keep_json, print_json
 from orchestrator.errors import InputError
 from orchestrator.fmi.protection import missing
 from orchestrator.units import read_value
@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     repeatable(parser, "--only", "CHECK", "only this check (repeatable)")
     option(parser, "--seed", "N", "of the random dips, jumps and points (default: of the file's bytes)", read=int)
     switch(parser, "--json", "print JSON")
+    add_kept_argument(parser, "check")
     option(parser, "--junit", "FILE.xml", "write the results for a CI server", read=Path)
     option(parser, "--time-limit", "S", "for one call [s] (default: 30)", read=read_positive, default=30.0)
     option(parser, "--memory-limit", "MB", "of the FMU's process [MB], or with a unit such as '4 GB' (default: 4096)",
@@ -54,6 +55,7 @@ def run(options: argparse.Namespace) -> int:
     )  # fmt: skip
     if options.junit:
         found.save_junit(options.junit)
+    keep_json(found.as_json(), options.out, "check")
     if options.json:
         print_json(found.as_json())
     else:

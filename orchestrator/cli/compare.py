@@ -7,8 +7,8 @@ from rich.markup import escape
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.api.comparison import compare
-from orchestrator.cli.arguments import option, seconds_or_none, switch
-from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
+from orchestrator.cli.arguments import add_kept_argument, option, seconds_or_none, switch
+from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, saying_warnings
 from orchestrator.report.tables import make_table
 
 
@@ -20,11 +20,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help="'a.b' or 'a.b - c.d' (repeatable; default: those that differ most)")  # fmt: skip
     option(parser, "--start", "T", "oscillations are read from here [s] (2)", read=seconds_or_none)
     switch(parser, "--json", "print JSON")
+    add_kept_argument(parser, "comparison")
 
 
 def run(options: argparse.Namespace) -> int:
     with saying_warnings():
         found = compare(options.first, options.second, options.signal or (), options.start)
+    keep_json(found.as_json(), options.out, "comparison")
     if options.json:
         print_json(found.as_json())
         for text in found.remarks:

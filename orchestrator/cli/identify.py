@@ -6,8 +6,8 @@ from pathlib import Path
 from rich.markup import escape
 
 from orchestrator.api.identification import identify
-from orchestrator.cli.arguments import option, seconds, seconds_or_none, switch
-from orchestrator.cli.terminal import make_console, make_errors, print_json, saying_warnings
+from orchestrator.cli.arguments import add_kept_argument, option, seconds, seconds_or_none, switch
+from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, saying_warnings
 from orchestrator.report.tables import eigenvalue_text, make_table
 
 
@@ -22,11 +22,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--start", "T", "beginning of the free response [s] (2)", read=seconds_or_none, default=2.0)
     option(parser, "--stop", "T", "its end [s] (default: the run's)", read=seconds)
     switch(parser, "--json", "print JSON")
+    add_kept_argument(parser, "ringing")
 
 
 def run(options: argparse.Namespace) -> int:
     with saying_warnings():
         found = identify(options.run, options.signal, options.start, options.stop)
+    keep_json(found.as_json(), options.out, "ringing")
     if options.json:
         print_json(found.as_json())
         for text in found.remarks:

@@ -7,9 +7,9 @@ from rich.markup import escape
 
 from orchestrator.asked import read_positive
 from orchestrator.cases.short_circuit import CONVENTION, weakest_first
-from orchestrator.cli.arguments import add_json_argument, option
+from orchestrator.cli.arguments import add_json_argument, add_kept_argument, option
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.cli.terminal import make_console, print_json
+from orchestrator.cli.terminal import keep_json, make_console, print_json
 from orchestrator.report.tables import make_table
 
 
@@ -20,15 +20,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     option(parser, "--converter-current", "PU", "that a converter feeds into a short circuit, of its rating (default: "
            "none)", read=read_positive, default=0.0)  # fmt: skip
     add_json_argument(parser)
+    add_kept_argument(parser, "scr")
 
 
 def run(options: argparse.Namespace) -> int:
     """Compute from the power flow's network, and print the weakest bus first."""
     convention, console = CONVENTION.format(options.converter_current), make_console()
     found = {s: weakest_first(s.strengths(options.converter_current, options.rating)) for s in chosen(options)}
+    told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]
+    content = {"case": next(iter(found)).prepared.case.name, "convention": convention, "scenarios": told}
+    keep_json(content, options.out, "scr")
     if options.json:
-        told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]
-        print_json({"case": next(iter(found)).prepared.case.name, "convention": convention, "scenarios": told})
+        print_json(content)
         return 0
     alike: dict[str, list[str]] = {}
     for scenario, buses in found.items():

@@ -8,8 +8,8 @@ from rich.markup import escape
 
 from orchestrator.api.case import load
 from orchestrator.api.source import contest_sources, source
-from orchestrator.cli.arguments import seconds, seconds_or_none
-from orchestrator.cli.terminal import make_console, print_json, print_parts, saying_warnings
+from orchestrator.cli.arguments import add_json_argument, add_kept_argument, seconds, seconds_or_none
+from orchestrator.cli.terminal import keep_json, make_console, print_json, print_parts, saying_warnings
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
 from orchestrator.oscillations.view import Sources, opinions_table, sources_table
@@ -29,7 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", metavar="NAME", help="of --case, where it has several")
     parser.add_argument("--start", type=seconds_or_none, metavar="T", help="begin of the part that is used [s]")
     parser.add_argument("--stop", type=seconds, metavar="T", help="its end [s]")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    add_json_argument(parser)
+    add_kept_argument(parser, "source")
     add_details_argument(parser)
 
 
@@ -45,8 +46,9 @@ def run(options: argparse.Namespace) -> int:
         else:
             scenario = load(options.case).scenario(options.scenario) if options.case else None
             found = [source(options.run, options.start, options.stop, scenario)]
+    records = [one.as_json() for one in found]
+    keep_json(records, options.out, "source")
     if options.json:
-        records = [one.as_json() for one in found]
         print_json(records if options.contest else records[0])
         return 0
     _print(found, details=options.details)

@@ -6,6 +6,7 @@ import json
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, RenderableType
@@ -14,6 +15,9 @@ from rich.markup import escape
 from orchestrator.errors import Problem
 from orchestrator.report.linearised import exceptions_in_words
 from orchestrator.results.manifest import ResultsWarning
+from orchestrator.results.staging import new_run_id, staged
+from orchestrator.results.storage import save_json
+from orchestrator.safe_files import made_folder
 
 if TYPE_CHECKING:
     from orchestrator.cases.prepare import PreparedScenario
@@ -35,6 +39,13 @@ def make_errors() -> Console:
 def print_json(content: Any) -> None:
     """The only thing on standard output of a command with ``--json``."""
     print(json.dumps(content, indent=1, ensure_ascii=False))
+
+
+def keep_json(content: Any, folder: Path | None, name: str) -> None:
+    """Write what ``--json`` prints into the folder of ``--out``, with a manifest, for ``gfor report``."""
+    if folder is not None:
+        with staged(made_folder(folder, "--out"), new_run_id()) as staging:
+            save_json(content, staging / f"{name}.json")
 
 
 def print_parts(console: Console, parts: Iterable[RenderableType]) -> None:

@@ -18,6 +18,7 @@ from orchestrator.pod_design.view import parameter_file_path
 from orchestrator.report.notebook import page
 from orchestrator.report.table import Column, ColumnTable
 from orchestrator.report.tables import PlainTable, make_table
+from orchestrator.results.manifest import made_now
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
 
@@ -74,7 +75,7 @@ class CoordinatedDesign:
         said = command or f"gfor.load({self.result.plan.case.name!r}).design_over_points(…) in Python"
         points, ranking = file.with_suffix(".csv"), file.with_name(f"{file.stem}_ranking.csv")
         write_text(file, parameter_file_text(self.parameters, provenance(self.result, said)))
-        save_json(self.as_json(), file.with_suffix(".json"))
+        save_json(self.as_json() | {"made": made_now()}, file.with_suffix(".json"))
         points_table(self.result.verdict).save(points)
         ranking_table(self.result).save(ranking)
         return [file, file.with_suffix(".json"), points, ranking]

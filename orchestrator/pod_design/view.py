@@ -18,6 +18,7 @@ from orchestrator.pod_design.lead_lag import LeadLag, angle_deg
 from orchestrator.pod_design.margins import Margins
 from orchestrator.pod_design.sheet import LABELS, mode_text, percent, verdict
 from orchestrator.report.notebook import page
+from orchestrator.results.manifest import made_now
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
 
@@ -87,7 +88,7 @@ class ControllerDesign:
         file = parameter_file_path(path)
         text = parameter_file_text(self.parameters, provenance(self.result, command))
         write_text(file, text)
-        save_json(self.as_json(file), file.with_suffix(".json"))
+        save_json(self.as_json(file) | {"made": made_now()}, file.with_suffix(".json"))
         return file
 
     def __repr__(self) -> str:

@@ -3,7 +3,9 @@ worker refuses a changed case or changed code."""
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -36,9 +38,8 @@ def scenario_content(prepared: PreparedScenario) -> dict[str, Any]:
 def component_content(description: FmuDescription) -> list[str]:
     """What a key contains for an FMU: a hash of its file, because a vendor may keep the guid of an older file, and the
     effect of its binding."""
-    status = description.path.stat()
     port = repr(description.port) if isinstance(description, BoundDescription) else ""
-    return [_file_hash(description.path, status.st_mtime_ns, status.st_size), port]
+    return [sha256_of(description.path), port]
 
 
 def fingerprint(case: CaseDefinition) -> str:
@@ -73,6 +74,21 @@ def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
             "and on a cluster give all machines the same files"
         )
     return case
+
+
+def files_named(text: str, home: Path) -> dict[str, str]:
+    """SHA-256 of the files that a text names in quotes, as a case does."""
+    found = {}
+    for name in re.findall(r"""["']([^"'\n]{1,200})["']""", text):
+        with suppress(OSError, ValueError):
+            if (path := home / name).is_file():
+                found[name] = sha256_of(path)
+    return found
+
+
+def sha256_of(path: Path) -> str:
+    status = path.stat()
+    return _file_hash(path, status.st_mtime_ns, status.st_size)
 
 
 @lru_cache(maxsize=1024)

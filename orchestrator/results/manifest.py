@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.results import origin
@@ -78,9 +79,14 @@ def write_manifest(
     listed = {**(before.files if before else {}), **files}
     beside = dict.fromkeys(scenarios, run) or (before.scenarios if before else {})
     entries = {name: asdict(listed[name]) for name in sorted(listed)}
-    content = {"format": _FORMAT, "run": run, "made_by": versions_of(["gfor-cosim"]), "files": entries}
-    made = {"date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", **(origin.said[-1]() if origin.said else {})}
-    save_json(content | made | dict(about or {}) | {"scenarios": beside}, folder / MANIFEST)
+    content = {"format": _FORMAT, "run": run, **made_now(), "files": entries}
+    save_json(content | dict(about or {}) | {"scenarios": beside}, folder / MANIFEST)
+
+
+def made_now() -> dict[str, Any]:
+    """Where results come from: version, date, and what the command line says of itself."""
+    date = f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"
+    return {"made_by": versions_of(["gfor-cosim"]), "date": date, **(origin.said[-1]() if origin.said else {})}
 
 
 def read_manifest(folder: Path) -> Manifest | None:

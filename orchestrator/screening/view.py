@@ -19,6 +19,7 @@ from orchestrator.report.html.elements import Figures, colour, paragraphs
 from orchestrator.report.notebook import page
 from orchestrator.report.table import Column, ColumnTable, Marked, damping
 from orchestrator.report.tables import eigenvalue_text
+from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import made_folder, write_text
 from orchestrator.screening.stress import OutageRow, by_outage
@@ -78,11 +79,12 @@ class Screening:
     def save(self, folder: str | Path) -> list[Path]:
         """Write ``items.csv``, ``modes.csv``, ``screening.json``, ``cells.json`` and the page ``screening.html``."""
         place = made_folder(Path(folder))
-        items_table(self.summary).save(place / ITEMS)
-        _every_mode(self.summary).save(place / MODES)
-        save_json(self.as_json(), place / SUMMARY)
-        _cells(self.summary).save(place, place)
-        write_text(place / PAGE, _page(self.summary))
+        with staged(place, new_run_id()) as staging:
+            items_table(self.summary).save(staging / ITEMS)
+            _every_mode(self.summary).save(staging / MODES)
+            save_json(self.as_json(), staging / SUMMARY)
+            _cells(self.summary).save(staging, place)
+            write_text(staging / PAGE, _page(self.summary))
         return [place / name for name in (ITEMS, MODES, SUMMARY, CELLS, PAGE)]
 
     def __repr__(self) -> str:

@@ -1,6 +1,7 @@
 """Where a device helps: its effect at every bus, intact and after outages, and the best places confirmed."""
 
 import cmath
+import fnmatch
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
@@ -9,9 +10,10 @@ from typing import Any, cast
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.asked import FILE, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
+from orchestrator.asked import FILE, NAMES, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
 from orchestrator.asked import positive as above_zero
 from orchestrator.cases.case import Case
+from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable
 from orchestrator.errors import CosimError, InputError
@@ -64,6 +66,7 @@ class SiteRequest(OfCase):
     )  # fmt: skip
     frequencies: tuple[float, float] = of_frequencies()
     outages: Names | None = asked(OUTAGES, None, "rank for these as well: n-1, lines, units, or names (repeatable)")
+    buses: Sequence[str] = asked(NAMES, (), "only these may be the place, such as 9, bus_9 or 'bus_1*' (repeatable)")
     confirm: int = asked(RANKED, 3, "confirm the best N by coupled FMUs (default: 3)", python="how many of the best "
                          "buses are confirmed by coupled FMUs")  # fmt: skip
     rating: float | None = asked(_RATING, None, "of the converter that confirms (default: 100), or of the vendor's FMU "
@@ -156,6 +159,7 @@ def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], No
     scenario = request.scenario or next(iter(case.scenarios))
     open_case = replace(case, injections=True)
     preparation = ItemPreparation(open_case, scenario, request.layers, request.step_size)
+    buses = _candidates(request.buses, preparation.base)
     outages = read_outages(cast("str | None", request.outages), preparation.elements)
     total = len(outages) + request.confirm
     situations, not_judged = [], dict[str, str]()
@@ -178,7 +182,19 @@ def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], No
         low, high = request.frequencies
         raise InputError(f"scenario {scenario!r} has no oscillation from {low:g} to {high:g} Hz; give another --range")
     result = _shifted(case, request, situations, not_judged, scenario)
+    result = replace(result, ranking=tuple(bus for bus in result.ranking if bus in buses))
+    if not result.ranking:
+        raise InputError(f"--buses: {', '.join(request.buses)}: an outage cuts them off; give others")
     return _with_confirmations(result, scenario, lambda done: report(len(outages) + done, total))
+
+
+def _candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
+    known = list(prepared.network.buses) if prepared.network is not None else []
+    found = {name: fnmatch.filter(known, name) or fnmatch.filter(known, f"bus_{name}") for name in wanted}
+    if unknown := [name for name, there in found.items() if not there]:
+        hint = close_names(unknown[0], known, f"the buses are {', '.join(known[:8])}")
+        raise InputError(f"--buses {unknown[0]}: there is no such bus; {hint}")
+    return [bus for there in found.values() for bus in there] or known
 
 
 def _shifted(

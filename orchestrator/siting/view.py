@@ -118,10 +118,12 @@ def answer(result: SiteResult) -> str:
     after = f" after the outage {at}" if at != result.intact.name else ""
     if most < (0 if result.request.is_foreign else _NONE):
         return f"no bus is a place for {device_title(result)}: it does not help the mode {_called(mode)}{after}"
+    among = " of those asked for" if result.request.buses else ""
     others = ", ".join(f"{bus} {100 * result.least(bus)[0] / most:.0f} %" for bus in best[1:])
     return (
-        f"{best[0]} is the best place for {device_title(result)}: {shown(result, most)} {unit(result, '100')}, for the "
-        f"least damped mode{after} ({_called(mode)})" + (f"; of that {others}" if others else "")
+        f"{best[0]} is the best place for {device_title(result)}{among}: {shown(result, most)} "
+        f"{unit(result, '100')}, for the least damped mode{after} ({_called(mode)})"
+        + (f"; of that {others}" if others else "")
     )
 
 
@@ -220,7 +222,7 @@ def _shift(shift: SupportShift) -> dict[str, Any]:
 
 def _best(result: SiteResult, situation: str, mode: str) -> dict[str, float]:
     shifts = result.shifts[DEVICE][situation][mode]
-    return {bus: shifts[bus].damping for bus in sorted(shifts, key=lambda bus: -shifts[bus].damping)[:3]}
+    return {bus: shifts[bus].damping for bus in sorted(result.ranking, key=lambda bus: -shifts[bus].damping)[:3]}
 
 
 def _confirmation(one: Confirmation) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import platform
 import sys
 import tomllib
 from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.points.code import code_hash, library_versions
-from orchestrator.points.key import component_content
+from orchestrator.points.key import component_content, files_named, sha256_of
 
 Keys = tuple[str, ...]
 
@@ -50,6 +51,14 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
         found |= {f"the start value of {name}.{v}": repr(x) for v, x in plan.inputs.items()}
     found |= {f"the connection into {target}": str(plan) for target, plan in prepared.system.wires.items()}
     return found | {name: repr(value) for name, value in prepared.values.items()}
+
+
+def computed(prepared: PreparedScenario) -> dict[str, str]:
+    """When and from what a run was computed: date, hash of the code, and hashes of the case's text and of all files."""
+    case, fmus = prepared.case, {plan.description.path for plan in prepared.system.components.values()}
+    files = files_named(case.text, case.directory) | {p.name: sha256_of(p) for p in sorted(fmus) if p.is_file()}
+    inputs = {case.path.name: hashlib.sha256(case.text.encode()).hexdigest(), **files}
+    return {"date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", "code": code_hash(), "inputs": json.dumps(inputs)}
 
 
 def _shown(path: Path) -> str:

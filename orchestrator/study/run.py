@@ -38,6 +38,7 @@ from orchestrator.fmi.protection import Protection, missing
 from orchestrator.results.recorded import open_whole
 from orchestrator.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder
 from orchestrator.results.storage import trajectory_dataset
+from orchestrator.study.checkpoint_mark import computed
 from orchestrator.study.checkpoints import Checkpoints
 from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import ModesResult, modes_of, running, unknown_modes
@@ -201,7 +202,7 @@ def _recorded(
     watch: Watch, prepared: PreparedScenario, recording: RecordingFolder | None, failure: CosimError | None
 ) -> tuple[xr.Dataset, CosimError | None]:
     """What was recorded, and the failure, which may be that it cannot be written."""
-    further = {} if failure is None else {ENDED_EARLY: str(failure)}
+    further = computed(prepared) | ({} if failure is None else {ENDED_EARLY: str(failure)})
     if recording is None:
         return trajectory_dataset(watch.recorder, prepared).assign_attrs(further), failure
     try:

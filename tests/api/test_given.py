@@ -1,5 +1,7 @@
 """Cases, points and bindings as Python has them, what was saved, and models for control design."""
 
+import hashlib
+import json
 import sys
 import tomllib
 from types import SimpleNamespace
@@ -9,6 +11,7 @@ import pandas as pd
 import pytest
 
 import orchestrator as gfor
+from orchestrator.cases.case import BUILT_IN
 from orchestrator.errors import InputError
 
 
@@ -66,6 +69,7 @@ def modes():
 def test_what_was_saved_is_opened(case, modes, tmp_path):
     modes.save(tmp_path / "dip")
     saved = gfor.open(tmp_path / "dip")
+    assert {"date", "made_by", "code", "command"} <= saved.provenance.keys()
     assert saved["modes.json"]["scenarios"][0]["name"] == "gfor"
     assert saved["modes.csv"]["frequency [Hz]"].size == len(modes)
     with pytest.raises(InputError, match=r"holds no 'modes\.nc'; it holds: .*modes\.csv"):
@@ -77,6 +81,21 @@ def test_what_was_saved_is_opened(case, modes, tmp_path):
     (tmp_path / "dip" / "modes.csv").write_text("changed")
     with pytest.raises(InputError):
         saved["modes.csv"]
+
+
+def test_a_recording_says_what_it_was_computed_from(tmp_path):
+    (tmp_path / "own.txt").write_text("1")
+    text = '# from "own.txt", not from "gone.txt"\n' + (BUILT_IN / "infinite_bus" / "case.toml").read_text()
+    (tmp_path / "own.toml").write_text(text)
+    run = gfor.load(tmp_path / "own.toml").scenario("dip").run(stop=1e-3)
+    run.save(tmp_path / "out")
+    said = gfor.open(tmp_path / "out")["dip/trajectory.nc"].attrs
+    assert said["date"].endswith(" UTC")
+    assert len(said["code"]) == len(said["inputs"].split('"')[3]) == 64
+    inputs = json.loads(said["inputs"])
+    assert inputs["own.txt"] == hashlib.sha256(b"1").hexdigest()
+    assert {"own.toml", "gfor.fmu"} <= inputs.keys()
+    assert "gone.txt" not in inputs
 
 
 def test_all_eigenvalues_and_the_map_in_one_unit(modes):

@@ -2,13 +2,15 @@
 
 import io
 import sys
+from dataclasses import replace
 from functools import partial
 
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.new_case import WantedCase, read_converter, write_case
+from orchestrator.cases.new_case import WantedCase, _switched, read_converter, write_case
 from orchestrator.errors import InputError
+from orchestrator.fmi.description import read_description
 from orchestrator.study.modes import compute_modes
 from tests.screening.five_machines import POWERS, RATINGS, five_machines
 from tests.support import vendor
@@ -216,3 +218,11 @@ def test_every_further_signal_of_a_panel_is_looked_for(files):
     case.path.write_text(new.text.replace('"sg2.omega"', '"sg2.omgea"'), encoding="utf-8")
     with pytest.raises(InputError, match=r"no scenario has an output 'sg2.omgea'; did you mean sg2.omega"):
         load_case(case.path).prepare(["base"])
+
+
+def test_a_vendors_switches_become_scenarios(fmu_path):
+    device = read_description(fmu_path("gfor"))
+    assert _switched(device) == _switched(None) == {"p": False, "q": False}
+    assert _switched(read_description(fmu_path("synchronous_generator"))) == {}
+    on = replace(device.variables["pod_q.enabled"], start="true")
+    assert _switched(replace(device, variables={**device.variables, "pod_q.enabled": on})) == {"p": False, "q": True}

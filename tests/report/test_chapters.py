@@ -35,6 +35,28 @@ COMPARISON = [{"expression": "sg1.omega", "unit": "pu", "deviations": [1, 2], "l
 IDENTIFIED = [{"real": -0.3, "imag": 5.8, "frequency_hz": 0.923, "damping_percent": 5.2, "amplitude": 0.1,
                "doubts": []}]  # fmt: skip
 
+SENSITIVITIES = [{
+    "derivative": "total", "scenario": "pod", "stable": True, "mode": {"frequency_hz": 0.9, "damping_percent": 4.2,
+                                                                       "name": None},
+    "sensitivities": [
+        {"parameter": f"gfor.{name}", "value": 1.0, "unit": "pu", "damping_points_per_percent": points,
+         "frequency_hz_per_percent": 0.0, "doubts": "", "reason": "" if points else "it holds no steady state"}
+        for name, points in (("a", 0.01), ("b", -0.2), ("c", None))
+    ],
+}]  # fmt: skip
+INTERACTIONS = {
+    "interaction_modes": [{}], "worst_pair": ["A", "B"], "unknown_pairs": [], "vendors": ["A", "B"], "stand_in": "x",
+    "pairs": [{"vendors": ["A", "B"], "stable": True, "sentence": "A and B agree"}], "warnings": [],
+    "as_in_the_case": {"stable": False},
+}  # fmt: skip
+SOURCE = [{"record": "ring", "places": ["N", "S"], "remarks": ["a gap"], "oscillations": [
+    {"frequency_hz": 0.8, "kind": "forced", "source": "sg2", "reason": "it feeds", "advice": "look there"},
+    {"frequency_hz": 1.1, "kind": "not known", "source": None, "reason": "too short", "advice": "record longer"},
+]}]  # fmt: skip
+SCR = {"convention": "from 1 pu", "scenarios": [{"name": name, "buses": [
+    {"bus": "bus_1", "s_sc_mva": 900.0, "scr": 3.0}, {"bus": "bus_2", "s_sc_mva": 400.0, "scr": None},
+]} for name in ("base", "pod")]}  # fmt: skip
+
 
 @pytest.fixture
 def folders(tmp_path):
@@ -42,11 +64,13 @@ def folders(tmp_path):
     for name, file, content in (
         ("design", "pod_p.json", SHEET), ("screen", "screening.json", SCREENING), ("check", "check.json", CHECK),
         ("certify", "certificate.json", CERTIFICATE), ("compare", "differences.json", COMPARISON),
-        ("ring", "ring.json", IDENTIFIED),
+        ("ring", "ring.json", IDENTIFIED), ("moved", "sensitivities.json", SENSITIVITIES),
+        ("vendors", "interactions.json", INTERACTIONS), ("source", "source.json", SOURCE), ("scr", "scr.json", SCR),
     ):  # fmt: skip
         (tmp_path / name).mkdir()
         (tmp_path / name / file).write_text(json.dumps(content), encoding="utf-8")
-    return [tmp_path / name for name in ("design", "screen", "check", "certify", "compare", "ring")]
+    names = ("design", "screen", "check", "certify", "compare", "ring", "moved", "vendors", "source", "scr")
+    return [tmp_path / name for name in names]
 
 
 def written(folders, tmp_path, **more):
@@ -58,14 +82,19 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
     first = text[: text.index("<section")]
     for said in (
         "not as required: with K = 200 the mode has 18.00 % of damping, 10.60 % before, 20.00 % wanted",
-        "not known whether stable everywhere: 2 operating points with 3 outages; least damped 0.930 Hz, 3.80 %",
+        "not known whether stable everywhere: 2 operating points, 3 outages; least damped 0.930 Hz, 3.80 %",
         "mon, sg3: no power flow: sg5 would need 129 %",
         "growth outside of the range was counted at some points only",
         "vendor.fmu: wrong rated frequency", "anything after it", "It passes at all.", "judged: 9 of 9",
         "sg1.omega differs most, by 0.5 pu at 1.200 s", "two modes are close", "strongest: 0.923 Hz, 5.20 %",
+        "0.900 Hz, 4.20 %: most by gfor.b (-0.2), gfor.a (+0.01) points for 1 % more", "it holds no steady state",
+        "0.800 Hz: forced, from sg2; 1.100 Hz: not known", "1.100 Hz: too short", "a gap",
+        "base, pod: weakest is bus_2 with 400 MVA, SCR 3.00 at bus_1",
     ):  # fmt: skip
         assert said in first
     assert 'class="bad">not as required' in first
+    assert 'class="bad">UNSTABLE as in the case; 1 modes that vendors share; A and B agree' in first
+    assert first.count("<svg") == 1
     assert 'class="good">It passes' in first
     assert "<b>20 %</b>" not in text  # a verdict is text
 
@@ -103,6 +132,18 @@ def test_what_changed_since_an_older_page(folders, tmp_path):
     assert "yes: with K = 300" in changed
     assert "not there any more" in changed
     assert "It passes" not in changed
+
+
+def test_figures_that_moved_between_two_folders(folders, tmp_path):
+    new = tmp_path / "new" / "inner"
+    shutil.copytree(folders[1], new)
+    worst = {"point": "mon", "outage": "line_1", "frequency_hz": 0.93, "damping_percent": 4.5}
+    (new / "screening.json").write_text(json.dumps(SCREENING | {"modes": [{"worst": worst}]}))
+    text = write_report(new.parent, [], tmp_path / "page.html", folders[1], short=True).read_text(encoding="utf-8")
+    assert "3.80 to 4.50 (+0.7)" in text
+    both = written([folders[1], new], tmp_path, against=folders[1])
+    assert "not there" in both[both.index("Answers that differ") :]  # its twin is as it was
+    assert "Which operating point and which outage is worst? (inner)" in both
 
 
 def test_what_cannot_be_used_is_named(folders, tmp_path):

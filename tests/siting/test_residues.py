@@ -13,7 +13,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.siting import residues, study
 from orchestrator.siting.responses import ideal_support
 from orchestrator.siting.study import SiteRequest, find_sites
-from orchestrator.siting.view import remarks
+from orchestrator.siting.view import answer, remarks
 from orchestrator.study.modes import running
 
 
@@ -40,6 +40,14 @@ def test_phasor_and_emt_models_say_the_same():
     for bus in ("bus_2", "bus_3"):
         changes = [one.shifts["device"]["intact"]["electromechanical"][bus].change for one in (emt, phasor)]
         assert abs(changes[0] - changes[1]) < 0.02 * abs(changes[0])
+
+
+def test_only_the_buses_asked_for_are_places():
+    found = sites("two_area_rms", "pod_p", confirm=0, buses=("3",))
+    assert found.ranking == ("bus_3",)
+    assert answer(found).startswith("bus_3 is the best place for POD-P of those asked for: ")
+    with pytest.raises(gfor_api.CosimError, match=r"buses bus3: there is no such bus; did you mean bus_3"):
+        sites("two_area_rms", "pod_p", confirm=0, buses=("2", "bus3"))
 
 
 def test_a_wrong_sign_at_the_bus_is_caught(gfor, monkeypatch):

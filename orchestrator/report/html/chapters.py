@@ -5,9 +5,9 @@ import json
 import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from dataclasses import dataclass, replace
 from html import escape
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,13 @@ import xarray as xr
 
 from orchestrator.errors import InputError
 from orchestrator.report.html import studies
-from orchestrator.report.html.elements import damping, held_data, table
+from orchestrator.report.html.charts import Mark, bar_chart, complex_plane, legend
+from orchestrator.report.html.elements import colour, damping, table
 from orchestrator.report.tables import short
-from orchestrator.results.manifest import MANIFEST, read_manifest
+from orchestrator.results.manifest import read_manifest
 
-_SHOWN, _OPEN, _LONGEST = 8, 4, 110
-"""Rows of a short table; what was not judged on the first page, and the characters of each."""
-
-
+_FEW, _LONGEST, _FASTEST = 4, 300, -5.0  # of a list; of a text; real part [1/s] of modes on a map
+_DESIGNED = {"without": "target", "predicted": "predicted", "with": "achieved"}
 _STABLE: Mapping[bool | None, str] = {True: "stable", False: "UNSTABLE", None: "not known whether stable"}
 
 
@@ -46,7 +45,10 @@ Content = Mapping[str, Any]
 
 
 def chapters_of(place: Path) -> list[Chapter]:
+    """What one JSON, or those of a folder, say."""
     files = [place] if place.is_file() else sorted(place.glob("*.json"))
+    if place.is_dir() and (place / "sweep.nc").is_file():
+        files = [file for file in files if file.name != "limits.json"]  # `of_sweep` tells of it
     if place.is_dir() and (manifest := read_manifest(place)) is not None:
         manifest.check(file.name for file in files)
     found = []
@@ -61,8 +63,9 @@ def chapters_of(place: Path) -> list[Chapter]:
         keys = set(content) if isinstance(content, dict) else set(content[0]) if content and content[0] else set()
         for wanted, make in _KINDS:
             if wanted <= keys:
+                each = content if isinstance(content, list) and make is _sensitivities else [content]
                 try:
-                    found.append(make(file, content))
+                    found += [make(file, one) for one in each]
                 except (KeyError, TypeError, IndexError, AttributeError, ValueError) as error:
                     raise InputError(
                         f"{file}: it is not as its study writes it ({error!r}); run the study again"
@@ -71,8 +74,8 @@ def chapters_of(place: Path) -> list[Chapter]:
     return found
 
 
-def of_run(folder: Path, scenarios: Sequence[Content], content: str = "") -> Chapter:
-    """Of a run's summary, or the same of `gfor modes`."""
+def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", kind: str = "") -> Chapter:
+    """Of a run's summary, or the same of `gfor modes`; ``kind``: of the models, such as phasor."""
     said, open_, sure = [], [], []
     for s in scenarios:
         answer: Content = s.get("answer") or {}
@@ -94,7 +97,8 @@ def of_run(folder: Path, scenarios: Sequence[Content], content: str = "") -> Cha
             sure.append(f"{title} rings with {ring['frequency_hz']:.3f} Hz, {ring['damping_percent']:.2f} % in time")
     verdicts = [stable for stable, _ in said]
     good = False if False in verdicts else None if None in verdicts else True
-    basis = "modes of the FMUs that were simulated; " if any("step_size_s" in s for s in scenarios) else ""
+    basis = f"{kind} models; " if kind else ""
+    basis += "modes of the FMUs that were simulated; " if any("step_size_s" in s for s in scenarios) else ""
     return Chapter(
         folder, "Is the network stable, and which swing is damped least?", "; ".join(text for _, text in said), good,
         (basis + "; ".join(sure)).strip("; ") or "linear model of the FMUs at the operating point; nothing was run",
@@ -109,15 +113,31 @@ def _modes(file: Path, content: Content) -> Chapter:
         for s in content["scenarios"] for m in s["modes"]
     ]  # fmt: skip
     columns = ["Scenario", "f [Hz]", "Damping [%]", "Name", "Who"]
-    return of_run(file, content["scenarios"], table("Modes", columns, rows))
+    groups = {s["name"]: s["modes"] for s in content["scenarios"]}
+    shown = _map("Modes", groups) + table("Modes", columns, rows)
+    made = of_run(file, content["scenarios"], shown)
+    sure = "; ".join(filter(None, (made.sure, content["facts"], f"steps of {1e3 * content['step_size_s']:g} ms")))
+    return replace(made, sure=sure, not_judged=[*made.not_judged, *content.get("questions", [])])
+
+
+def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
+    """The eigenvalues of each group, without those that are over at once, where there are any."""
+    shades = {label: colour(k) for k, label in enumerate(groups)}
+    marks = [
+        Mark(z["real"], (hz := abs(z["imag"]) / (2 * pi)), shades[label], f"{label}: {hz:.3f} Hz, {z['real']:.3f} 1/s")
+        for label, found in groups.items()
+        for z in found
+        if z["real"] > _FASTEST
+    ]
+    return legend(shades.items()) + complex_plane(name, marks) if marks else ""
 
 
 def _screening(file: Path, c: Content) -> Chapter:
     where = "somewhere" if c["stable"] is False else "everywhere"
-    answer = f"{_STABLE[c['stable']]} {where}: {c['points']} operating points with {c['outages']} outages"
+    answer = f"{_STABLE[c['stable']]} {where}: {c['points']} operating points, {c['outages']} outages"
     if worst := min((m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None):
-        answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, at "
-                   f"{worst['point']}, {worst['outage']}")  # fmt: skip
+        answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
+                   f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}")  # fmt: skip
     lost = [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
     counted = "growth was counted at all frequencies" if c["counted_at_all_frequencies"] else (
         "growth outside of the range was counted at some points only")  # fmt: skip
@@ -142,8 +162,10 @@ def _design(file: Path, c: Content) -> Chapter:
         f"{before:.2f} % before, {wanted:.2f} % wanted"
     )
     sure = f"closed loop of the coupled FMUs: {c['verdict']}"
+    modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
+    content = _map("The mode that was designed for", modes) + studies.design(dict(c))
     return Chapter(file, f"Does {c['controller']} damp the {c['mode']} mode?", answer, bool(c["met"]), sure,
-                   c.get("warnings", []), studies.design(dict(c)), title=studies.design_title(dict(c)))  # fmt: skip
+                   c.get("warnings", []), content, title=studies.design_title(dict(c)))  # fmt: skip
 
 
 def _coordinated(file: Path, c: Content) -> Chapter:
@@ -209,7 +231,71 @@ def _identified(file: Path, modes: Any) -> Chapter:
     figures = f"{swing['frequency_hz']:.3f} Hz, {swing['damping_percent']:.2f} %" if swing else "no oscillation"
     sure = f"{sum(not m['doubts'] for m in modes)} of {len(modes)} modes without a doubt"
     return Chapter(file, "With which modes does a record ring?", f"strongest: {figures}", None, sure, (),
-                   table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0))  # fmt: skip
+                   _map("Modes", {"record": modes})
+                   + table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0))  # fmt: skip
+
+
+def _interactions(file: Path, c: Content) -> Chapter:
+    worst = next((p for p in c["pairs"] if p["vendors"] == c["worst_pair"]), None)
+    whole = c["as_in_the_case"]["stable"]
+    verdicts = [whole, *(one["stable"] for one in (*c["pairs"], *c.get("assignments", [])))]
+    good = False if False in verdicts else None if None in verdicts else True
+    answer = f"{_STABLE[whole]} as in the case; {len(c['interaction_modes'])} modes that vendors share"
+    answer += f"; {worst['sentence']}" if worst else ""
+    sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
+    lost = [f"pair {' and '.join(pair)}" for pair in c["unknown_pairs"]]
+    return Chapter(file, "Do several vendors' converters agree?", answer, good, sure, [*lost, *c["warnings"]],
+                   page="interactions.html")  # fmt: skip
+
+
+def _sensitivities(file: Path, c: Content) -> Chapter:
+    key, mode = "damping_points_per_percent", c["mode"]
+    found = sorted((r for r in c["sensitivities"] if r[key]), key=lambda r: -abs(r[key]))
+    first = found[:_FEW]
+    rows = [[escape(r["parameter"]), f"{r['value']:.5g} {escape(r['unit'])}", f"{r[key]:+.3g}",
+             f"{r['frequency_hz_per_percent']:+.3g}", escape(r["doubts"])] for r in found]  # fmt: skip
+    said = ", ".join(f"{r['parameter']} ({r[key]:+.2g})" for r in first) or "no parameter"
+    answer = f"{mode['frequency_hz']:.3f} Hz, {mode['damping_percent']:.2f} %: most by {said} points for 1 % more"
+    answer = f"UNSTABLE; {answer}" if c["stable"] is False else answer
+    size = "Points by 1 %, without sign"
+    bars = bar_chart("Points of damping", [r["parameter"] for r in first],
+                     [("1 % more", colour(1), [abs(r[key]) for r in first])], size) if first else ""  # fmt: skip
+    columns = ["Parameter", "Value", "Points by 1 %", "Hz by 1 %", "Doubts"]
+    return Chapter(
+        file, f"What moves the {mode['name'] or 'critical'} mode of {c['scenario']}?", answer, None,
+        f"{c['derivative']} derivatives by {len(found)} parameters",
+        [f"{r['parameter']}: {r['reason']}" for r in c["sensitivities"] if r["reason"]],
+        bars + table("By the size of their effect", columns, rows),
+    )  # fmt: skip
+
+
+def _sources(file: Path, records: Any) -> Chapter:
+    records = records if isinstance(records, list) else [records]
+    found = [(f"{x['frequency_hz']:.3f} Hz", x, c["record"]) for c in records for x in c["oscillations"]]
+    said = [f"{at}: {x['kind']}" + (f", from {x['source']}" if x["source"] else "") for at, x, _ in found]
+    unnamed = [f"{at}: {x['reason']}" for at, x, _ in found if not x["source"] and x["kind"] != "mode"]
+    rows = [[record, at, x["kind"], x["source"] or "not named", x["reason"], x["advice"]] for at, x, record in found]
+    return Chapter(
+        file, "Where does the oscillation come from?", "; ".join(said) or "nothing oscillates", None,
+        f"power and voltage of {sum(len(c['places']) for c in records)} places",
+        [*unnamed, *(text for c in records for text in c["remarks"])],
+        table("Oscillations", ["Record", "Oscillation", "Kind", "Source", "Why", "Next"],
+              [[escape(cell) for cell in row] for row in rows], left=6),
+    )  # fmt: skip
+
+
+def _strengths(file: Path, c: Content) -> Chapter:
+    said, rows = dict[str, list[str]](), []
+    for scenario in c["scenarios"]:
+        weakest, *_ = buses = sorted(scenario["buses"], key=lambda b: b["s_sc_mva"])
+        ratios = {b["bus"]: "–" if b["scr"] is None else f"{b['scr']:.2f}" for b in buses}
+        text = "".join(f", SCR {scr} at {bus}" for bus, scr in ratios.items() if scr != "–")
+        text = f"weakest is {weakest['bus']} with {weakest['s_sc_mva']:.0f} MVA{text}"
+        said.setdefault(short(text, _LONGEST), []).append(scenario["name"])
+        rows += [[escape(scenario["name"]), escape(b["bus"]), f"{b['s_sc_mva']:.0f}", ratios[b["bus"]]] for b in buses]
+    answer = "; ".join(f"{', '.join(names)}: {text}" for text, names in said.items())
+    return Chapter(file, "How strong is the network?", answer, None, c["convention"], (),
+                   table("Short-circuit power", ["Scenario", "Bus", "S_sc [MVA]", "SCR"], rows, left=2))  # fmt: skip
 
 
 def _nyquist(file: Path, c: Content) -> Chapter:
@@ -226,12 +312,12 @@ def _nyquist(file: Path, c: Content) -> Chapter:
             data = b64encode(picture.read_bytes()).decode()
             content += f'<p><img alt="{picture.stem}" style="max-width: 100%" src="data:image/png;base64,{data}"></p>'
     good = {"stable": True, "unstable": False}.get(c["verdict"])
-    sure = "determinant and eigenloci count alike; " + (
-        "modes agree" if c["modes_stable"] is not None else "no modes asked"
-    )
+    modes = "no modes asked" if c["modes_stable"] is None else "modes agree" if c["modes_stable"] == good else (
+        "the modes do NOT agree")  # fmt: skip
     return Chapter(
-        file, f"Is {c['device']} stable at {c['network']}?", c["sentence"], good, sure, c["reasons"], content
-    )
+        file, f"Is {c['device']} stable at {c['network']}?", c["sentence"], good, f"encirclements; {modes}",
+        c["reasons"], content,
+    )  # fmt: skip
 
 
 _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
@@ -241,6 +327,8 @@ _KINDS: tuple[tuple[set[str], Callable[[Path, Any], Chapter]], ...] = (
     ({"settings", "verdict", "met", "ranking"}, _coordinated), ({"cells", "codes", "sentence"}, _matrix),
     ({"sentence", "verdict", "files", "seal"}, _certificate), ({"trusted", "checks", "faults"}, _check),
     ({"scenarios", "facts", "step_size_s"}, _modes), ({"expression", "deviations", "rms"}, _comparison),
+    ({"interaction_modes", "pairs", "worst_pair"}, _interactions), ({"derivative", "sensitivities"}, _sensitivities),
+    ({"record", "places", "oscillations"}, _sources), ({"convention", "scenarios"}, _strengths),
     ({"amplitude", "doubts"}, _identified), ({"crossings", "margins", "sentence"}, _nyquist),
 )  # fmt: skip
 """What the JSON of each study has, the first that fits."""
@@ -255,60 +343,6 @@ def sections(chapter: Chapter, number: int) -> str:
     text = re.sub(r'(id="|href="#)(section|figure)-', rf"\1chapter-{number}-\2-", text)
     text = re.sub(r"(clip-)(\d+)", rf"\g<1>{number}-\2", text)
     return re.sub(r"<(/?)h([23])>", lambda m: f"<{m[1]}h{int(m[2]) + 1}>", text)
-
-
-def first_page(chapters: Sequence[Chapter]) -> str:
-    rows = []
-    for one in chapters:
-        shade = {True: "good", False: "bad", None: "soft"}[one.good]
-        open_ = (
-            "<br>".join(escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN]) or "nothing that is known of"
-        )
-        more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
-        answer = f'<span class="{shade}">{escape(one.answer)}</span>'
-        asked = f'{escape(one.question)}<br><span class="soft">{escape(str(one.source))}</span>'
-        rows.append([asked, answer, escape(short(one.sure, 3 * _LONGEST)), open_ + more])
-    return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
-
-
-def made(place: Path) -> list[str]:
-    """Where results lie, when they were made, with which version and code, and the command that makes them again."""
-    folder = place if place.is_dir() else place.parent
-    try:
-        content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        content = {}
-    date = content.get("date") or f"{datetime.fromtimestamp(place.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"
-    versions = ", ".join(f"{name} {version}" for name, version in content.get("made_by", {}).items())
-    cells = (str(place), date, versions or "not recorded", str(content.get("code", "not recorded"))[:12],
-             content.get("command", "not recorded"))  # fmt: skip
-    return [escape(cell) for cell in cells]
-
-
-def changes(old: Path, chapters: Sequence[Chapter]) -> str:
-    try:
-        found = re.search(r'id="answers">(.*?)</script>', old.read_text(encoding="utf-8"), re.DOTALL)
-        before = {(x["question"], x["source"]): x["answer"] for x in json.loads(found[1])} if found else None
-    except (OSError, ValueError) as error:
-        raise InputError(f"--against {old}: it cannot be read: {error}; give a page of `gfor report`") from error
-    if before is None:
-        raise InputError(f"--against {old}: it is no page of `gfor report`; give one that an earlier call wrote")
-    now = {(one.question, one.source.name): one.answer for one in chapters}
-    rows = [
-        [escape(question), escape(source), escape(before.get((question, source), "not there")),
-         escape(now.get((question, source), "not there any more"))]
-        for question, source in dict.fromkeys([*before, *now])
-        if before.get((question, source)) != now.get((question, source))
-    ]  # fmt: skip
-    if not rows:
-        return f"<p>No answer differs from {escape(old.name)}.</p>"
-    return table(f"Answers that differ from {old.name}", ["Question", "Of", "Before", "Now"], rows, left=4)
-
-
-def kept_answers(chapters: Sequence[Chapter]) -> str:
-    """The answers as data in the page, for `changes` of a later one."""
-    data = [{"question": one.question, "source": one.source.name, "answer": one.answer} for one in chapters]
-    return held_data("answers", data)
 
 
 def limits_of(place: Path) -> list[Any]:

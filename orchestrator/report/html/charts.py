@@ -136,16 +136,18 @@ def complex_plane(
     return frame.svg(name)
 
 
-def bar_chart(name: str, groups: Sequence[str], bars: Sequence[tuple[str, str, Sequence[float]]]) -> str:
-    """Groups of bars [%]: each entry of ``bars`` is a label, a colour and one height a group."""
-    top = max([1.0, *(h for *_, heights in bars for h in heights)])
-    frame = Frame((-0.5, len(groups) - 0.5), (0.0, 1.08 * top), "", "Participation [%]", 220, groups)
+def bar_chart(
+    name: str, groups: Sequence[str], bars: Sequence[tuple[str, str, Sequence[float]]], unit: str = "Participation [%]"
+) -> str:
+    """Groups of bars: each entry of ``bars`` is a label, a colour and one height a group."""
+    top = max((h for *_, heights in bars for h in heights), default=0.0) or 1.0
+    frame = Frame((-0.5, len(groups) - 0.5), (0.0, 1.08 * top), "", unit, 220, groups)
     width = 0.8 / max(1, len(bars))
     for k, (label, colour, heights) in enumerate(bars):
         for i, height in enumerate(heights):
             left = i - 0.4 + k * width
             (x0, y0), (x1, y1) = frame.at(left, height), frame.at(left + width, 0)
-            text = f"{groups[i]}, {label}: {height:.1f} %"
+            text = f"{groups[i]}, {label}: {height:.3g}{' %' * unit.endswith('[%]')}"
             frame.parts.append(
                 f'<rect class="tip" x="{x0:.1f}" y="{y0:.1f}" width="{x1 - x0:.1f}" height="{max(0.0, y1 - y0):.1f}" '
                 f'fill="{colour}" data-tip="{escape(text)}"/>'
