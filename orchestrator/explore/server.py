@@ -5,11 +5,13 @@ import queue
 import secrets
 import threading
 import time
+from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from orchestrator.errors import InputError
+from orchestrator.explore.certified import Pictures
 from orchestrator.explore.computing import Answer, Computing
 from orchestrator.explore.files import FILES, PAGE, content_of
 
@@ -26,10 +28,12 @@ class Explorer:
     ``beginning``: what the page begins with, as JSON's types."""
 
     def __init__(
-        self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER
-    ) -> None:
-        self.beginning, self.token = beginning, secrets.token_urlsafe(24)
-        self.computing = {kind: Computing(case, trust_fmus=trust_fmus) for kind in ("modes", "slopes", "run")}
+        self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER,
+        recorded: Mapping[str, str] | None = None, pictures: Pictures | None = None,
+    ) -> None:  # fmt: skip
+        self.beginning, self.token, self._pictures = beginning, secrets.token_urlsafe(24), pictures or []
+        kinds = ("modes", "slopes", "run")
+        self.computing = {kind: Computing(case, trust_fmus=trust_fmus, recorded=recorded) for kind in kinds}
         self._linger = linger
         self._pages: dict[str, queue.SimpleQueue[Answer]] = {}
         self._last_seen = float("inf")  # nobody was there yet
@@ -81,6 +85,11 @@ class Explorer:
             for computing in self.computing.values():
                 computing.cancel(page)
             return {"answer": {}}
+        if question.get("ask") == "pictures":
+            try:
+                return {"answer": {"pictures": self._pictures[question["row"]][question["column"]]}}
+            except (LookupError, TypeError):
+                return {"error": "there is no such row of the certificate", "kind": ""}
         computing = self.computing.get(str(question.get("ask")), self.computing["modes"])
         return computing.ask(page, question, lambda part: self.tell(page, {"of": question.get("ask"), **part}))
 

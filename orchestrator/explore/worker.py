@@ -19,7 +19,7 @@ from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import CosimError
 from orchestrator.explore.copied import copied, events_of, explored, saved
 from orchestrator.explore.diagram import diagram
-from orchestrator.explore.responses import linear, plotted, simulated
+from orchestrator.explore.responses import linear, plotted, recorded, simulated
 from orchestrator.explore.slopes import slopes
 from orchestrator.fmi.interrupts import calls
 from orchestrator.operating_points.item import Item
@@ -35,14 +35,14 @@ _UNEXPECTED = (ArithmeticError, AttributeError, LookupError, MemoryError, Runtim
 class Desk:
     """Answers the questions about one case, which it reads again where its file has changed."""
 
-    def __init__(self, word: str, trust_fmus: bool) -> None:
-        self._word, self._trust = word, trust_fmus
+    def __init__(self, word: str, trust_fmus: bool, recorded: Mapping[str, str] | None = None) -> None:
+        self._word, self._trust, self._recorded = word, trust_fmus, recorded or {}
         self._case: Case | None = None
         self._stamp: list[float] = []
         self._prepared: tuple[str, ItemPreparation, dict[str, int]] | None = None  # with its points' numbers
 
     def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
-        """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, run or save."""
+        """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, recorded, run, save."""
         ask = str(question["ask"])
         case = self._read()
         if ask == "open":
@@ -66,6 +66,9 @@ class Desk:
                 scenario, values, str(question["parameter"]), (low, high), lambda text: say({"progress": text})
             ),
             "response": lambda: linear(scenario(values), signals),
+            "recorded": lambda: recorded(
+                self._recorded.get(name) or self._recorded.get("") or "", scenario(values), signals
+            ),
             "save": lambda: {
                 "file": str(saved(original.file, explored(case.file, name, values, question.get("places")), _FOLDER))
             },
@@ -138,7 +141,7 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     given = json.loads(sys.stdin.readline())
-    desk = Desk(given["case"], given["trust_fmus"])
+    desk = Desk(given["case"], given["trust_fmus"], given["recorded"])
 
     def say(content: dict[str, Any]) -> None:
         out.write(json.dumps(content) + "\n")
