@@ -72,9 +72,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.vary:
         raise InputError("--vary is for a page that is saved; give --save FILE.html as well, or drag the slider")
-    explorer = Explorer(
-        word, beginning, port=options.port, trust_fmus=options.trust_fmus, recorded=recorded, pictures=found.pictures
-    )
+    explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus, recorded=recorded)
     print(f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)", flush=True)
     if not options.no_browser:
         webbrowser.open(explorer.address)

@@ -8,7 +8,7 @@ from typing import Any
 
 from orchestrator.api.case import Case, load
 from orchestrator.errors import InputError
-from orchestrator.explore.certified import CERTIFICATES, Pictures, certified
+from orchestrator.explore.certified import CERTIFICATES, certified
 from orchestrator.report.cells import CELLS, check_case, found_from, read_cells
 from orchestrator.report.html.folder import SUMMARY
 from orchestrator.results.comtrade.reading import is_comtrade
@@ -24,7 +24,6 @@ class Opened:
     case: Case
     beginning: dict[str, Any] = field(default_factory=dict)
     recorded: Mapping[str, str] = field(default_factory=dict)  # by scenario; "" for each that has none of its own
-    pictures: Pictures = field(default_factory=list)  # of a certificate's cells
 
 
 def opened(given: str, *, trust_fmus: bool = False) -> Opened:
@@ -36,8 +35,8 @@ def opened(given: str, *, trust_fmus: bool = False) -> Opened:
         return _of_run(path, trust_fmus)
     file = path if path.name in CERTIFICATES else next((path / n for n in CERTIFICATES if (path / n).is_file()), None)
     if file is not None and not (path / CELLS).is_file():
-        word, study, pictures = certified(file)
-        return Opened(word, load(word, trust_fmus=trust_fmus), {"study": study}, pictures=pictures)
+        word, study = certified(file)
+        return Opened(word, load(word, trust_fmus=trust_fmus), {"study": study})
     if path.is_dir():
         study = read_cells(path)
         case = load(study["case"], trust_fmus=trust_fmus)

@@ -11,7 +11,6 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 from orchestrator.errors import InputError
-from orchestrator.explore.certified import Pictures
 from orchestrator.explore.computing import Answer, Computing
 from orchestrator.explore.files import FILES, PAGE, content_of
 
@@ -29,9 +28,9 @@ class Explorer:
 
     def __init__(
         self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER,
-        recorded: Mapping[str, str] | None = None, pictures: Pictures | None = None,
+        recorded: Mapping[str, str] | None = None,
     ) -> None:  # fmt: skip
-        self.beginning, self.token, self._pictures = beginning, secrets.token_urlsafe(24), pictures or []
+        self.beginning, self.token = beginning, secrets.token_urlsafe(24)
         kinds = ("modes", "slopes", "run")
         self.computing = {kind: Computing(case, trust_fmus=trust_fmus, recorded=recorded) for kind in kinds}
         self._linger = linger
@@ -85,11 +84,6 @@ class Explorer:
             for computing in self.computing.values():
                 computing.cancel(page)
             return {"answer": {}}
-        if question.get("ask") == "pictures":
-            try:
-                return {"answer": {"pictures": self._pictures[question["row"]][question["column"]]}}
-            except (LookupError, TypeError):
-                return {"error": "there is no such row of the certificate", "kind": ""}
         computing = self.computing.get(str(question.get("ask")), self.computing["modes"])
         return computing.ask(page, question, lambda part: self.tell(page, {"of": question.get("ask"), **part}))
 

@@ -67,7 +67,7 @@ class Desk:
             ),
             "response": lambda: linear(scenario(values), signals),
             "recorded": lambda: recorded(
-                self._recorded.get(name) or self._recorded.get("") or "", scenario(values), signals
+                self._recorded.get(name, self._recorded.get("", "")), scenario(values), signals
             ),
             "save": lambda: {
                 "file": str(saved(original.file, explored(case.file, name, values, question.get("places")), _FOLDER))

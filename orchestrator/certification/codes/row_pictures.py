@@ -1,7 +1,6 @@
 """Every response of a row as a picture, with the limits within which its criteria ask it to stay."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from html import escape
 
 import numpy as np
@@ -21,19 +20,14 @@ LIMIT = "#a11d1d"
 BEFORE = 0.25  # so much of the response before an event is shown beside an envelope [s]
 
 
-@dataclass(frozen=True)
-class RowPicture:
-    name: str
-    label: str
-    curves: Sequence[ChartCurve]
-    caption: str
+Picture = tuple[str, str, list[ChartCurve], str]  # name, label of what is drawn, curves, caption
 
 
 def row_pictures(verdict: RowVerdict, result: BenchResult, f_n: float, figures: Figures) -> str:
-    return "".join(_figure(picture, figures) for picture in pictures_of(verdict, result, f_n))
+    return "".join(_figure(*picture, figures) for picture in pictures_of(verdict, result, f_n))
 
 
-def pictures_of(verdict: RowVerdict, result: BenchResult, f_n: float) -> Iterator[RowPicture]:
+def pictures_of(verdict: RowVerdict, result: BenchResult, f_n: float) -> Iterator[Picture]:
     """The response of a row and its limits: beside each envelope, and over the whole run."""
     if len(result.times) < 2:
         return
@@ -47,7 +41,7 @@ def pictures_of(verdict: RowVerdict, result: BenchResult, f_n: float) -> Iterato
     yield from _along_the_run(verdict, measured, [band for band in bands if not band.alone], power=not alone)
 
 
-def _zoomed(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band]) -> Iterator[RowPicture]:
+def _zoomed(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band]) -> Iterator[Picture]:
     said = {finding.criterion: f"{v.word(finding)}: {finding.text}" for finding in v.findings}
     for band in bands:
         part = row.within(float(band.times[0]) - BEFORE, float(band.times[-1]) + 1e-6)
@@ -55,10 +49,10 @@ def _zoomed(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band]) -> Iterator[
         caption = (
             f"{v.row.name}, {band.criterion}: {said.get(band.criterion, '')}. Means over a period; dashed: the envelope"
         )
-        yield RowPicture(f"{v.row.name} {band.criterion}", band.label, curves, caption)
+        yield f"{v.row.name} {band.criterion}", band.label, curves, caption
 
 
-def _along_the_run(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band], *, power: bool) -> Iterator[RowPicture]:
+def _along_the_run(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band], *, power: bool) -> Iterator[Picture]:
     """A picture of each quantity over the whole run, with all of its limits; of the power in any case."""
     labels = dict.fromkeys(([POWER_SHOWN] if power else []) + [band.label for band in bands])
     for label in labels:
@@ -67,7 +61,7 @@ def _along_the_run(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band], *, po
         curves = [_response(row.times, values), *(curve for band in own for curve in _limits(band))]
         asked = f". Dashed, what is asked: {'; '.join(dict.fromkeys(b.criterion for b in own))}" if own else ""
         caption = f"{v.row.name}, {v.row.title}; mean over a period{asked}"
-        yield RowPicture(f"{v.row.name} {label}", label, curves, caption)
+        yield f"{v.row.name} {label}", label, curves, caption
 
 
 def _response(times: Numbers, values: Numbers) -> ChartCurve:
@@ -81,10 +75,9 @@ def _limits(band: Band) -> Iterator[ChartCurve]:
             yield ChartCurve(f"{band.criterion}: {name}", LIMIT, band.times, bound, dashed=True)
 
 
-def _figure(picture: RowPicture, figures: Figures) -> str:
-    curves = picture.curves
+def _figure(name: str, label: str, curves: Sequence[ChartCurve], caption: str, figures: Figures) -> str:
     if not len(curves[0].x):
-        return f"<p>{escape(picture.name)}: no value is a number.</p>"
+        return f"<p>{escape(name)}: no value is a number.</p>"
     names = legend([("response", colour(1)), *([("limit", LIMIT)] if len(curves) > 1 else [])])
-    found, _ = figures.add(names + line_chart(picture.name, "Time [s]", picture.label, curves), picture.caption)
-    return found
+    picture, _ = figures.add(names + line_chart(name, "Time [s]", label, curves), caption)
+    return picture

@@ -101,7 +101,7 @@ function chartOf(name, curves, span, again) {
   const x = t => L + (t - x0) / (x1 - x0) * (W - L - R), y = v => H - B - (v - low) / (high - low) * (H - T - B);
   const svg = draw("svg", { class: "chart", viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${name} over the time`, tabindex: 0 });
   for (const t of ticks(x0, x1, 8)) svg.append(draw("path", { class: "grid", d: `M${x(t)} ${T}V${H - B}` }), draw("text", { class: "faint", x: x(t), y: H - 10, "text-anchor": "middle" }, number(t)));
-  for (const v of ticks(low, high, 4)) svg.append(draw("path", { class: "grid", d: `M${L} ${y(v)}H${W - R}` }), draw("text", { class: "faint", x: L - 5, y: y(v) + 4, "text-anchor": "end" }, number(v, 6)));
+  for (const v of ticks(low, high, 5)) svg.append(draw("path", { class: "grid", d: `M${L} ${y(v)}H${W - R}` }), draw("text", { class: "faint", x: L - 5, y: y(v) + 4, "text-anchor": "end" }, number(v, 6)));
   for (const c of curves) svg.append(draw("path", { class: `curve${c.look}`, stroke: c.colour, d: c.data[0].map((t, k) => [t, c.data[1][k]]).filter(([t]) => t >= x0 && t <= x1).map(([t, v], k) => `${k ? "L" : "M"}${x(t).toFixed(1)} ${y(v).toFixed(1)}`).join("") }));
   const line = draw("path", { class: "cursor" });
   svg.append(line);

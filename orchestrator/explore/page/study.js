@@ -70,7 +70,7 @@ async function openCell(at) {
   paintCells();
   $("study-said").textContent = saidOf(at);
   if (judging()) return showPictures(at);
-  if (SAVED || row.values === null || column.values === null || !s.cells[at.row][at.column]) return;
+  if (SAVED || !row.values || !column.values || !s.cells[at.row][at.column]) return;
   const scenario = row.scenario || column.scenario || s.scenario, values = { ...s.values, ...row.values, ...column.values };
   const found = await ask("the cell", { ask: "cell", scenario, values, base: s.values, step: s.step, own: column.out, lost: row.out, sharing: s.sharing }, $("study-said"));
   if (!found) return;
@@ -83,11 +83,10 @@ async function openCell(at) {
   if (same(state.values, seen.computed?.values) && least) $("study-said").textContent = `Open now: ${saidOf(at)}. Live, least damped: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} %.`;
 }
 // A certificate's row: its response in its limits.
-async function showPictures(at) {
-  const found = study().cells[at.row][at.column] && await ask("the response", { ask: "pictures", ...at }, $("study-said"));
-  const shown = { from: null, to: null }, place = $("study-plots"), colours = ["#0072b2", "#d55e00", "#009e73"];
-  const again = () => place.replaceChildren(...(found ? found.pictures : []).map(one => {
-    const curves = one.curves.map((c, k) => ({ ...c, look: c.limit ? " limit" : "", colour: c.limit ? "#a11d1d" : colours[k % 3] }));
+function showPictures(at) {
+  const shown = { from: null, to: null };
+  const again = () => $("study-plots").replaceChildren(...(study().cells[at.row][at.column]?.pictures ?? []).map(one => {
+    const curves = one.curves.filter(c => c.data[0].length).map(c => ({ ...c, look: c.dashed ? " limit" : "" }));
     return make("div", {}, chartOf(one.label, curves, shown, again), make("p", { class: "soft" }, one.caption));
   }));
   again();
@@ -97,9 +96,9 @@ function beginStudy() {
   if (!s) return;
   $("tab-study").hidden = false;
   $("study-title").textContent = s.title;
-  $("study-scale").textContent = judging() ? "Blue: met; orange: not met; grey: not judged. Dashed red in a response: its limits." : `Orange: below 5 %; blue: above, full at ${FULL} %; U: unstable; –: nothing below the limit of the search; ?, grey: not judged.${s.left_out ? ` ${s.left_out} rows are not shown: they are better than these.` : ""}`;
+  $("study-scale").textContent = judging() ? "Blue: met; orange: not met; grey: not judged. Red in a response: its limits." : `Orange: below 5 %; blue: above, full at ${FULL} %; U: unstable; –: nothing below the limit of the search; ?, grey: not judged.${s.left_out ? ` ${s.left_out} rows are not shown: they are better than these.` : ""}`;
   if (judging()) $("study-said").textContent = "Click a row: its criteria, and its response in its limits. Modes, network and response are of the first row's bench.";
-  else if (s.rows[0].values === null) $("study-said").textContent = "These cells are systems of the study's own; none opens as a live case.";
+  else if (!s.rows[0].values) $("study-said").textContent = "These cells are systems of the study's own; none opens as a live case.";
   if (!location.hash) state.tab = "study";
   const moved = Object.keys(s.columns[0]?.values ?? {});
   if (s.followed && moved.length < 4) for (const name of moved) if (!state.controls.includes(name)) state.controls.push(name);
