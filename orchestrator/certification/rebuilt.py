@@ -121,6 +121,7 @@ def _point(point: dict[str, Any], scenario: str, content: dict[str, Any], respon
         power=point["power"] if having else None, times=responses["time"].values, signals=signals,
         warnings=tuple(point.get("warnings", {}).get(scenario, ())),
         findings=point.get("findings", {}).get(scenario, []),
+        units={str(name): str(values.attrs.get("units", "")) for name, values in kept.items()},
     )  # fmt: skip
 
 

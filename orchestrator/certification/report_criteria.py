@@ -95,16 +95,7 @@ def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[s
     if v.time is None:
         yield f'<p class="bad">{escape("; ".join(v.faults) or v.unknown)}</p>'
         return
-    unit = c.points[WITH, v.X_L].units[v.time.signal]
-    curves = []
-    for k, scenario in enumerate((WITHOUT, WITH)):
-        point = c.points[scenario, v.X_L]
-        if v.time.signal in point.signals:
-            shown = point.times <= c.event_time + _SHOWN
-            curves.append(ChartCurve(f"{scenario} the converter", colour(k), point.times[shown],
-                                point.signals[v.time.signal][shown], dashed=scenario == WITHOUT))  # fmt: skip
-    curves += _construction(v.time, c.event_time + _SHOWN)
-    label = f"{'Frequency at bus 2' if v.time.signal == FREQUENCY else 'Active power of SG1'} [{unit}]"
+    label, curves = response_curves(c, v, v.time)
     picture, link = figures.add(
         line_chart(f"Response at X_L = {v.X_L:g} pu", "Time [s]", label, curves),
         f"Response to +2 % of SG2's voltage reference at X_L = {v.X_L:g} pu. Dashed: without the converter. "
@@ -113,8 +104,22 @@ def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[s
     reasons = f"{escape(v.time.swings.reason)}. By its modes: {escape(v.time.modal.reason)}."
     yield f"<p>{link}: {reasons} {verdict(v.time.accepted)}</p>"
     yield picture
-    yield _swing_table(v.time, unit)
+    yield _swing_table(v.time, c.points[WITH, v.X_L].units[v.time.signal])
     yield _modal_table(v.time)
+
+
+def response_curves(c: Certification, v: PointVerdict, time: TimeVerdict) -> tuple[str, list[ChartCurve]]:
+    """The response with the norm's construction, and what it is of."""
+    unit = c.points[WITH, v.X_L].units[time.signal]
+    curves = []
+    for k, scenario in enumerate((WITHOUT, WITH)):
+        point = c.points[scenario, v.X_L]
+        if time.signal in point.signals:
+            shown = point.times <= c.event_time + _SHOWN
+            curves.append(ChartCurve(f"{scenario} the converter", colour(k), point.times[shown],
+                                point.signals[time.signal][shown], dashed=scenario == WITHOUT))  # fmt: skip
+    curves += _construction(time, c.event_time + _SHOWN)
+    return f"{'Frequency at bus 2' if time.signal == FREQUENCY else 'Active power of SG1'} [{unit}]", curves
 
 
 def _construction(time: TimeVerdict, last: float) -> Iterator[ChartCurve]:

@@ -6,17 +6,18 @@ from pathlib import Path
 from warnings import catch_warnings, simplefilter
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
-from orchestrator.api.case import load
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import UnusualDataWarning
 from orchestrator.asked import read_range, read_whole
 from orchestrator.cli.arguments import assignment, option, repeatable, switch
 from orchestrator.cli.case_arguments import add_trust_argument, values_set
+from orchestrator.cli.terminal import saying_warnings
 from orchestrator.errors import InputError
+from orchestrator.explore.opened import opened
 from orchestrator.explore.saved import save_page
 from orchestrator.explore.server import Explorer
 from orchestrator.explore.worker import Desk
-from orchestrator.report.cells import check_case, read_cells
+from orchestrator.study.comparison import open_trajectory
 from orchestrator.sweep.axes import parse_vary
 
 
@@ -25,12 +26,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "case",
         metavar="CASE",
         help="a built-in case (two_area), the path of a case file or an .ssp, or a folder of "
-        "gfor screen, sweep or interactions",
+        "gfor run, screen, sweep, interactions or certify",
     )
     option(parser, "--scenario", "NAME", "the one that is shown first (default: the case's last one)")
     repeatable(parser, "--set", "COMPONENT.PARAMETER=VALUE", "a value to begin with (repeatable)", read=assignment)
     option(parser, "--range", "LO:HI", "frequencies shown first [Hz] (default: 0.1:2)", read=read_range,
            default=ELECTROMECHANICAL_HZ)  # fmt: skip
+    option(parser, "--beside", "FILE", "a recording drawn beside the responses: COMTRADE, CSV, Excel, or a scenario's "
+           "folder of results", read=Path)  # fmt: skip
     option(
         parser, "--port", "N", "of the server, on this machine alone (default: any that is free)",
         read=read_whole(1, 65535, "a port"), default=0,
@@ -44,20 +47,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Serve the page until it was closed for a minute, or Ctrl-C."""
-    study = read_cells(Path(options.case)) if Path(options.case).is_dir() else None
-    if study is not None and (options.set or options.range != ELECTROMECHANICAL_HZ or options.save):
+    found = opened(options.case, trust_fmus=options.trust_fmus)
+    word, case, kind = found.word, found.case, found.beginning
+    if "study" in kind and (options.set or options.range != ELECTROMECHANICAL_HZ or options.save):
         raise InputError(f"{options.case}: a study has its own values and range, and is not saved as a page; --set, "
                          "--range and --save go with a case")  # fmt: skip
-    word = options.case if study is None else study["case"]
-    case = load(word, trust_fmus=options.trust_fmus)
-    if study is not None:
-        check_case(study, case.file, Path(options.case))
-    name = options.scenario or (case.scenarios[-1] if study is None else study["scenario"])
+    name = options.scenario or kind.get("scenario", case.scenarios[-1])
     if name not in case.scenarios:
         raise InputError(f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}")
-    beginning = {"case": case.name, "scenario": name, "values": values_set(options), "range": list(options.range)}
-    if study is not None:
-        beginning |= {"study": study} | {key: study.get(key) for key in ("step", "values", "range")}
+    values = kind.get("values", {}) | values_set(options)
+    beginning = {"case": case.name, "range": list(options.range)} | kind | {"scenario": name, "values": values}
+    recorded = dict(found.recorded)
+    if options.beside is not None:
+        with saying_warnings():
+            open_trajectory(options.beside)  # what cannot be read is refused here
+        recorded = {"": str(options.beside)}
+        beginning["recorded"] = [""]
     if options.save is not None:
         desk = Desk(word, options.trust_fmus)
         with shown_progress("Points", shown=True) as report, catch_warnings():
@@ -67,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.vary:
         raise InputError("--vary is for a page that is saved; give --save FILE.html as well, or drag the slider")
-    explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus)
+    explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus, recorded=recorded)
     print(f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)", flush=True)
     if not options.no_browser:
         webbrowser.open(explorer.address)

@@ -26,8 +26,11 @@ _ROOT = str(Path(__file__).parents[2])
 class Computing:
     """A worker process, begun when it is first needed, and again after it died or was ended."""
 
-    def __init__(self, case: str, *, trust_fmus: bool = False, longest: float = LONGEST) -> None:
-        self._given = {"case": case, "trust_fmus": trust_fmus}
+    def __init__(
+        self, case: str, *, trust_fmus: bool = False, longest: float = LONGEST,
+        recorded: Mapping[str, str] | None = None,
+    ) -> None:  # fmt: skip
+        self._given = {"case": case, "trust_fmus": trust_fmus, "recorded": recorded}
         self._longest = longest
         self._state = threading.Condition()
         self._numbers = count(1)

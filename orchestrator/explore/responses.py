@@ -1,8 +1,10 @@
 """Time responses for the page: the linear model's at once, and the co-simulation's while it runs."""
 
+import json
 import time
 from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +16,16 @@ from orchestrator.api.scenario import Scenario
 from orchestrator.arrays import Numbers
 from orchestrator.cases.names import variables_of
 from orchestrator.coupling.observers import ObservedRun
+from orchestrator.errors import InputError
 from orchestrator.report.html.charts import thinned
 from orchestrator.results.signals import combined, signal
 from orchestrator.results.staging import new_run_id
+from orchestrator.study.comparison import open_trajectory
 
 _POINTS = 1000  # of a streamed curve
 _PAUSE = 0.25  # between two parts of a streamed curve [s]
 _MOST = 24  # signals that one question may ask for
+_FEW = 6  # of a recording that has none of those that are asked for
 
 Say = Callable[[dict[str, Any]], None]
 
@@ -99,3 +104,27 @@ def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, 
             "frequency_hz": run.ring_down.frequency_hz, "damping_percent": run.ring_down.damping_percent,
         },
     }  # fmt: skip
+
+
+def recorded(place: str, scenario: Scenario, wanted: Sequence[str]) -> dict[str, Any]:
+    """What an earlier run or an instrument recorded: ``curves``, the ``names`` of all signals, and what ``differs``
+    between a run and the scenario as it is now."""
+    if not place:
+        raise InputError(f"nothing was recorded of scenario {scenario.name!r}; choose another one, or run it")
+    prepared, dataset = scenario.prepared, open_trajectory(Path(place))
+    names = [str(name) for name in dataset.data_vars]
+    found = [name for one in wanted for name in ([n for n in names if fnmatchcase(n, one)] or [one])]
+    drawn = curves(dataset, list(dict.fromkeys(found or plotted(scenario)))[:_MOST])
+    told, differs = dataset.attrs, []
+    if "values" in told:
+        were, live = json.loads(told["values"]), prepared.values
+        differs = [f"{name} was {were.get(name, 'not set')}, is {live.get(name, 'not set')}"
+                   for name in {**were, **live} if not _equal(were.get(name), live.get(name))]  # fmt: skip
+        if (events := "; ".join(map(str, prepared.events))) != told.get("events", events):
+            differs.append(f"events were: {told['events'] or 'none'}")
+    return {"curves": drawn or curves(dataset, names[:_FEW]), "names": names, "differs": differs, "of": place}
+
+
+def _equal(one: Any, other: Any) -> bool:
+    numbers = isinstance(one, int | float) and isinstance(other, int | float)
+    return isclose(one, other, rel_tol=1e-9, abs_tol=1e-12) if numbers else bool(one == other)

@@ -5,6 +5,7 @@ import queue
 import secrets
 import threading
 import time
+from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -26,10 +27,12 @@ class Explorer:
     ``beginning``: what the page begins with, as JSON's types."""
 
     def __init__(
-        self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER
-    ) -> None:
+        self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER,
+        recorded: Mapping[str, str] | None = None,
+    ) -> None:  # fmt: skip
         self.beginning, self.token = beginning, secrets.token_urlsafe(24)
-        self.computing = {kind: Computing(case, trust_fmus=trust_fmus) for kind in ("modes", "slopes", "run")}
+        kinds = ("modes", "slopes", "run")
+        self.computing = {kind: Computing(case, trust_fmus=trust_fmus, recorded=recorded) for kind in kinds}
         self._linger = linger
         self._pages: dict[str, queue.SimpleQueue[Answer]] = {}
         self._last_seen = float("inf")  # nobody was there yet

@@ -19,7 +19,7 @@ from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import CosimError
 from orchestrator.explore.copied import copied, events_of, explored, saved
 from orchestrator.explore.diagram import diagram
-from orchestrator.explore.responses import linear, plotted, simulated
+from orchestrator.explore.responses import linear, plotted, recorded, simulated
 from orchestrator.explore.slopes import slopes
 from orchestrator.fmi.interrupts import calls
 from orchestrator.operating_points.item import Item
@@ -35,13 +35,14 @@ _UNEXPECTED = (ArithmeticError, AttributeError, LookupError, MemoryError, Runtim
 class Desk:
     """Answers the questions about one case, which it reads again where its file has changed."""
 
-    def __init__(self, word: str, trust_fmus: bool) -> None:
-        self._word, self._trust = word, trust_fmus
+    def __init__(self, word: str, trust_fmus: bool, recorded: Mapping[str, str] | None = None) -> None:
+        self._word, self._trust, self._recorded = word, trust_fmus, recorded or {}
         self._case: Case | None = None
         self._stamp: list[float] = []
+        self._prepared: tuple[str, ItemPreparation, dict[str, int]] | None = None  # with its points' numbers
 
     def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
-        """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, run or save."""
+        """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, recorded, run, save."""
         ask = str(question["ask"])
         case = self._read()
         if ask == "open":
@@ -57,7 +58,7 @@ class Desk:
         low, high = question.get("range") or (0.1, 2.0)
         signals = question.get("signals") or ()
         if ask == "cell":
-            return {"values": _values_of(case, question, values), "stamp": self._stamp}
+            return {"values": self._values_of(case, question, values), "stamp": self._stamp}
         answers: dict[str, Callable[[], dict[str, Any]]] = {
             "parameters": lambda: _parameters(case, scenario(values)),
             "modes": lambda: self._modes(case, scenario(values), values, (low, high), question),
@@ -65,6 +66,9 @@ class Desk:
                 scenario, values, str(question["parameter"]), (low, high), lambda text: say({"progress": text})
             ),
             "response": lambda: linear(scenario(values), signals),
+            "recorded": lambda: recorded(
+                self._recorded.get(name, self._recorded.get("", "")), scenario(values), signals
+            ),
             "save": lambda: {
                 "file": str(saved(original.file, explored(case.file, name, values, question.get("places")), _FOLDER))
             },
@@ -78,6 +82,23 @@ class Desk:
             self._case = load(self._word, trust_fmus=self._trust)
             self._stamp = _stamp(self._case.file.path)
         return self._case
+
+    def _values_of(self, case: Case, question: Mapping[str, Any], values: dict[str, Value]) -> dict[str, Value]:
+        """Values by which the case is at a cell of a study: at an operating point, with its outage."""
+        own, lost = ([str(name) for name in question.get(key) or ()] for key in ("own", "lost"))
+        if not own and not lost:
+            return values
+        rule, base, step = question.get("sharing"), question.get("base"), question.get("step")
+        key = json.dumps([self._stamp, question["scenario"], rule, base, step])
+        if self._prepared is None or self._prepared[0] != key:  # the base case serves all cells of a study
+            sharing = None if rule is None else SharingRule(rule)
+            layers = [OptionValues.of(base)] if base else ()
+            made = ItemPreparation(case.file, question["scenario"], layers, step, sharing=sharing)
+            self._prepared = key, made, {}
+        _, preparation, points = self._prepared
+        point = points.setdefault(json.dumps([values, own], sort_keys=True), len(points))
+        lost = [name for name in lost if name not in own]
+        return preparation.live(Item(point, int(bool(lost)), values, (*own, *lost), tuple(lost)))
 
     def _modes(
         self, case: Case, scenario: Scenario, values: Mapping[str, Value], frequencies: tuple[float, float],
@@ -97,20 +118,6 @@ class Desk:
                 question.get("places"), question.get("step"),
             ),
         }  # fmt: skip
-
-
-def _values_of(case: Case, question: Mapping[str, Any], values: dict[str, Value]) -> dict[str, Value]:
-    """Values by which the case is at a cell of a study: at an operating point, with its outage."""
-    own, lost = ([str(name) for name in question.get(key) or ()] for key in ("own", "lost"))
-    if not own and not lost:
-        return values
-    rule, base = question.get("sharing"), question.get("base")
-    preparation = ItemPreparation(
-        case.file, question["scenario"], [OptionValues.of(base)] if base else (), question.get("step"),
-        sharing=None if rule is None else SharingRule(rule),
-    )  # fmt: skip
-    lost = [name for name in lost if name not in own]
-    return preparation.live(Item(0, int(bool(lost)), values, (*own, *lost), tuple(lost)))
 
 
 def _parameters(case: Case, scenario: Scenario) -> dict[str, Any]:
@@ -134,7 +141,7 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     given = json.loads(sys.stdin.readline())
-    desk = Desk(given["case"], given["trust_fmus"])
+    desk = Desk(given["case"], given["trust_fmus"], given["recorded"])
 
     def say(content: dict[str, Any]) -> None:
         out.write(json.dumps(content) + "\n")

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from orchestrator.cases.case import BUILT_IN, Case, built_in_cases
+from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
@@ -60,12 +61,10 @@ class Cells:
 
     def save(self, staging: Path, folder: Path) -> Path:
         """Write ``cells.json``; ``folder`` is where it will be read from, and the case is named from there."""
-        path = self.case.path
-        built_in = path.is_relative_to(BUILT_IN)
         fit = max(1, _MOST // max(1, len(self.columns)))
         content = {
             "format": _FORMAT, "title": self.title, "scenario": self.scenario, "range": self.frequencies,
-            "case": path.parent.name if built_in else os.path.relpath(path.resolve(), folder.resolve()),
+            "case": word_of(self.case, folder),
             "hash": _hash(self.case), "values": dict(self.values), "sharing": self.sharing, "step": self.step,
             "followed": self.followed,
             "left_out": max(0, len(self.rows) - fit),
@@ -74,6 +73,17 @@ class Cells:
         }  # fmt: skip
         save_json(content, staging / CELLS)
         return staging / CELLS
+
+
+def word_of(case: CaseDefinition, folder: Path) -> str:
+    """By which a case is found from a folder: the name of a built-in one, or the path of its file."""
+    path = case.path
+    return path.parent.name if path.is_relative_to(BUILT_IN) else os.path.relpath(path.resolve(), folder.resolve())
+
+
+def found_from(word: str, folder: Path) -> Path | str:
+    """The case that `word_of` named."""
+    return word if word in built_in_cases() else (folder / word).resolve()
 
 
 def _hash(case: Case) -> str:
@@ -132,10 +142,8 @@ def read_cells(folder: Path) -> dict[str, Any]:
             )
         if len(kept.cells) != len(kept.rows) or any(len(row) != len(kept.columns) for row in kept.cells):
             raise ValueError("rows and columns do not fit the cells")
-        if kept.case in built_in_cases():
-            return found
-        near = (folder / kept.case).resolve()
-        if not near.is_file():
+        near = found_from(kept.case, folder)
+        if isinstance(near, Path) and not near.is_file():
             raise InputError(f"{file}: its case {near} is not there; put the folder where it was, beside its case")
         return found | {"case": str(near)}
     except (ValueError, TypeError, OSError, RecursionError) as error:

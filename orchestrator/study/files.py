@@ -10,6 +10,7 @@ from typing import Any
 from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import RunInterruptedError
+from orchestrator.report.cells import word_of
 from orchestrator.report.power_flow import COLUMNS
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.recorded import in_memory, open_whole
@@ -76,7 +77,9 @@ def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd |
     write_text(folder / "case.toml", case.text)
     save_table(_shift_rows(results), folder / "step_size.csv")
     ended = None if early_end is None else early_end.as_json()
-    summary = {"case": case.name, "ended_early": ended, "scenarios": [summary_of(r) for r in results]}
+    made_of = {"case": case.name, "case_file": word_of(case, folder.parent)}  # the files are put there at the end
+    given = {r.modes.prepared.name: dict(r.modes.prepared.given) for r in results}
+    summary = {**made_of, "ended_early": ended, "given": given, "scenarios": [summary_of(r) for r in results]}
     save_json(summary, folder / "summary.json")
     plots = []
     for table in case.table.plots:

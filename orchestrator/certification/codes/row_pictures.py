@@ -20,20 +20,28 @@ LIMIT = "#a11d1d"
 BEFORE = 0.25  # so much of the response before an event is shown beside an envelope [s]
 
 
+Picture = tuple[str, str, list[ChartCurve], str]  # name, label of what is drawn, curves, caption
+
+
 def row_pictures(verdict: RowVerdict, result: BenchResult, f_n: float, figures: Figures) -> str:
+    return "".join(_figure(*picture, figures) for picture in pictures_of(verdict, result, f_n))
+
+
+def pictures_of(verdict: RowVerdict, result: BenchResult, f_n: float) -> Iterator[Picture]:
+    """The response of a row and its limits: beside each envelope, and over the whole run."""
     if len(result.times) < 2:
-        return ""
+        return
     programme = verdict.row.programme(f_n)
     measured = MeasuredRow(result.times, result.signals, f_n, programme.times, tuple(result.findings))
     whole = result.times[-1] >= programme.stop - 2e-3
     bands = [band for judge in verdict.row.criteria if isinstance(judge, Bounded) for band in judge.bands(measured)
              ] if whole else []  # fmt: skip
-    parts = list(_zoomed(verdict, measured, [band for band in bands if band.alone], figures))
-    parts += _along_the_run(verdict, measured, [band for band in bands if not band.alone], figures, power=not parts)
-    return "".join(parts)
+    alone = [band for band in bands if band.alone]
+    yield from _zoomed(verdict, measured, alone)
+    yield from _along_the_run(verdict, measured, [band for band in bands if not band.alone], power=not alone)
 
 
-def _zoomed(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band], figures: Figures) -> Iterator[str]:
+def _zoomed(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band]) -> Iterator[Picture]:
     said = {finding.criterion: f"{v.word(finding)}: {finding.text}" for finding in v.findings}
     for band in bands:
         part = row.within(float(band.times[0]) - BEFORE, float(band.times[-1]) + 1e-6)
@@ -41,12 +49,10 @@ def _zoomed(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band], figures: Fig
         caption = (
             f"{v.row.name}, {band.criterion}: {said.get(band.criterion, '')}. Means over a period; dashed: the envelope"
         )
-        yield _figure(f"{v.row.name} {band.criterion}", band.label, curves, caption, figures)
+        yield f"{v.row.name} {band.criterion}", band.label, curves, caption
 
 
-def _along_the_run(
-    v: RowVerdict, row: MeasuredRow, bands: Sequence[Band], figures: Figures, *, power: bool
-) -> Iterator[str]:
+def _along_the_run(v: RowVerdict, row: MeasuredRow, bands: Sequence[Band], *, power: bool) -> Iterator[Picture]:
     """A picture of each quantity over the whole run, with all of its limits; of the power in any case."""
     labels = dict.fromkeys(([POWER_SHOWN] if power else []) + [band.label for band in bands])
     for label in labels:
@@ -54,9 +60,8 @@ def _along_the_run(
         values = own[0].quantity(row) if own else row.mean_p
         curves = [_response(row.times, values), *(curve for band in own for curve in _limits(band))]
         asked = f". Dashed, what is asked: {'; '.join(dict.fromkeys(b.criterion for b in own))}" if own else ""
-        yield _figure(
-            f"{v.row.name} {label}", label, curves, f"{v.row.name}, {v.row.title}; mean over a period{asked}", figures
-        )
+        caption = f"{v.row.name}, {v.row.title}; mean over a period{asked}"
+        yield f"{v.row.name} {label}", label, curves, caption
 
 
 def _response(times: Numbers, values: Numbers) -> ChartCurve:

@@ -10,7 +10,17 @@ function fitNetwork() {
 }
 function zoomNetwork(factor, x = lens.x + lens.w / 2, y = lens.y + lens.h / 2) {
   Object.assign(lens, { x: x + (lens.x - x) * factor, y: y + (lens.y - y) * factor, w: lens.w * factor, h: lens.h * factor });
-  $("network").setAttribute("viewBox", `${lens.x} ${lens.y} ${lens.w} ${lens.h}`);
+  paintLabels();
+}
+// Names and figures keep their size on the screen, so that more of them find a place where one zooms in.
+let names = { labels: [], taken: [] };
+function paintLabels() {
+  const svg = $("network"), box = svg.getBoundingClientRect(), group = document.getElementById("names");
+  svg.setAttribute("viewBox", `${lens.x} ${lens.y} ${lens.w} ${lens.h}`);
+  if (!group || !box.width) return;
+  const scale = Math.max(lens.w / box.width, lens.h / box.height), w = box.width * scale, h = box.height * scale;
+  const shown = { x0: lens.x + (lens.w - w) / 2, y0: lens.y + (lens.h - h) / 2, x1: lens.x + (lens.w + w) / 2, y1: lens.y + (lens.h + h) / 2 };
+  group.replaceChildren(...placedTexts(names.labels, names.taken, 11 * scale, shown));
 }
 const flowOf = () => seen.answer?.modes.scenarios[0].power_flow ?? null;
 function things(kind, name, label, ...children) {
@@ -32,7 +42,9 @@ function paintNetwork() {
   const at = Object.fromEntries(d.buses.map(b => [b.name, b])), volts = Object.fromEntries((flow?.buses ?? []).map(b => [b.name, b]));
   const branches = Object.fromEntries((flow?.branches ?? []).map(b => [b.name, b])), machines = Object.fromEntries((flow?.machines ?? []).map(m => [m.name, m]));
   const most = Math.max(1, ...(flow?.branches ?? []).map(b => Math.abs(b.p_from_mw)));
-  const few = d.buses.length <= 45, parts = [], between = {};
+  const few = d.buses.length <= 45, parts = [], between = {}, flows = [], ofUnits = [];
+  names = { labels: [], taken: [] };
+  const keepFree = (x, y, r) => names.taken.push({ x0: x - r, y0: y - r, x1: x + r, y1: y + r });
   const middle = { x: d.buses.reduce((s, b) => s + b.x, 0) / d.buses.length, y: d.buses.reduce((s, b) => s + b.y, 0) / d.buses.length };
   for (const line of d.lines) {
     const a = at[line.from], b = at[line.to], key = [line.from, line.to].sort().join("\u0000");
@@ -45,9 +57,10 @@ function paintNetwork() {
     if (p !== null && closed) wire.style.strokeWidth = (1.2 + 4 * Math.abs(p) / most).toFixed(2);
     const group = things("line", line.name, label, draw("path", { class: "hit", d: path }), wire);
     if (line.kind === "branch") for (const s of [-1, 1]) group.append(draw("circle", { class: "unit", cx: mx + s * 3 * (b.x - a.x) / length, cy: my + s * 3 * (b.y - a.y) / length, r: 4.5, "fill-opacity": 0 }));
-    if (p !== null && closed && few) {
+    if (p !== null && closed) {
       const way = p >= 0 ? 1 : -1, ux = way * (b.x - a.x) / length, uy = way * (b.y - a.y) / length;
-      group.append(draw("path", { class: "wire", d: arrow(mx - 5 * ux, my - 5 * uy, mx + 6 * ux, my + 6 * uy) }), draw("text", { class: "flow", x: mx + 6, y: my - 6 }, `${fixed(Math.abs(p), 0)} MW`));
+      group.append(draw("path", { class: "wire", d: arrow(mx - 5 * ux, my - 5 * uy, mx + 6 * ux, my + 6 * uy) }));
+      flows.push({ x: (mx + (a.x + b.x) / 2) / 2, y: (my + (a.y + b.y) / 2) / 2, r: 6, look: "flow", words: [`${fixed(Math.abs(p), 0)} MW`], size: Math.abs(p) });
     }
     parts.push(group);
   }
@@ -63,9 +76,12 @@ function paintNetwork() {
     if (kind === "unit") {
       const m = machines[thing.name], on = isOn(thing.out);
       seen.unitPlaces[thing.name] = p;
+      keepFree(p.x, p.y, 10);
+      ofUnits.push({ x: p.x, y: p.y, r: 12, look: "flow", words: [thing.name] });
       const label = `unit ${thing.name} at ${name}: ${on ? (m ? `${fixed(m.p_mw, 1)} MW, ${fixed(m.q_mvar, 1)} Mvar, ${fixed(m.loading_percent, 0)} % of ${fixed(m.rating_mva, 0)} MVA` : "in service") : "out of service"}`;
-      parts.push(things(kind, thing.name, label, stub, thing.machine ? draw("circle", { class: `unit${on ? "" : " out"}`, cx: p.x, cy: p.y, r: 10 }) : draw("rect", { class: `unit${on ? "" : " out"}`, x: p.x - 9, y: p.y - 9, width: 18, height: 18 }), draw("path", { class: "wire", d: `M${p.x - 5} ${p.y}q2.5 -6 5 0t5 0` }), ...(d.units.length <= 40 ? [draw("text", { class: "flow", x: p.x + 12, y: p.y + 4 }, thing.name)] : [])));
+      parts.push(things(kind, thing.name, label, stub, thing.machine ? draw("circle", { class: `unit${on ? "" : " out"}`, cx: p.x, cy: p.y, r: 10 }) : draw("rect", { class: `unit${on ? "" : " out"}`, x: p.x - 9, y: p.y - 9, width: 18, height: 18 }), draw("path", { class: "wire", d: `M${p.x - 5} ${p.y}q2.5 -6 5 0t5 0` })));
     } else {
+      keepFree(p.x, p.y, 6);
       const scale = thing.scale ? state.values[thing.scale] ?? 1 : 1;
       const label = `load ${thing.name} at ${name}: ${fixed(thing.p_mw * scale, 1)} MW${scale !== 1 ? `, ${number(scale)} times the case's` : ""}`;
       parts.push(things(kind, thing.name, label, stub, draw("path", { class: "load", d: `M${p.x - 6} ${p.y - 4}H${p.x + 6}L${p.x} ${p.y + 7}z` })));
@@ -76,10 +92,13 @@ function paintNetwork() {
     const dot = things("bus", bus.name, label, draw("circle", { class: `bus${v < 0.95 ? " low" : v > 1.05 ? " high" : ""}`, cx: bus.x, cy: bus.y, r: few ? 6 : 4.5 }));
     dot.addEventListener("pointerdown", event => dragBus(event, bus));
     parts.push(dot);
-    if (d.buses.length <= 130) parts.push(draw("text", { class: "flow", x: bus.x + 8, y: bus.y + 14 }, few && v ? `${bus.name} ${fixed(v, 3)}` : bus.name));
+    keepFree(bus.x, bus.y, 5);
+    names.labels.push({ x: bus.x, y: bus.y, r: 8, look: "flow", words: v ? [`${bus.name} ${fixed(v, 3)}`, bus.name] : [bus.name] });
   }
-  parts.push(draw("g", { id: "arrows" }));
+  names.labels.push(...ofUnits, ...flows.sort((a, b) => b.size - a.size));
+  parts.push(draw("g", { id: "names" }), draw("g", { id: "arrows" }));
   svg.replaceChildren(...parts);
+  paintLabels();
   paintArrows(1);
   if (focused !== undefined) svg.querySelector(`[data-thing="${CSS.escape(focused)}"]`)?.focus({ preventScroll: true });
 }
@@ -110,7 +129,7 @@ const isOn = name => (name ? (state.values[name] ?? parameterOf(name)?.value ?? 
 
 function paintElement() {
   const place = $("element"), d = seen.info?.diagram;
-  if (!element || !d) { place.replaceChildren(make("p", { class: "soft" }, "Click a bus, a line, a unit or a load; drag a bus to where it belongs.")); return; }
+  if (!element || !d) { place.replaceChildren(make("p", { class: "soft" }, "Click a bus, a line, a unit or a load; drag a bus to where it belongs. Zoom in for all names and flows. Buses: pink above 1.05 pu, orange below 0.95. Dashed red: open or out. Circles are machines, squares converters, arrows the chosen mode's shape.")); return; }
   const error = make("p", { class: "bad", role: "alert" }), parts = [make("h3", {}, `${element.kind} ${element.name}`)];
   const onOff = (name, text) => {
     const tick = make("input", { type: "checkbox" });
@@ -179,5 +198,13 @@ function beginNetwork() {
   svg.addEventListener("pointerdown", event => { if (!event.target.closest(".thing")) { from = { x: event.clientX, y: event.clientY, lx: lens.x, ly: lens.y }; svg.setPointerCapture(event.pointerId); } });
   svg.addEventListener("pointermove", event => { if (from) { lens.x = from.lx - (event.clientX - from.x) * scale(); lens.y = from.ly - (event.clientY - from.y) * scale(); zoomNetwork(1); } });
   for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { from = null; });
-  svg.addEventListener("keydown", event => { if (event.key === "+") zoomNetwork(1 / 1.3); else if (event.key === "-") zoomNetwork(1.3); else if (event.key === "0") fitNetwork(); });
+  svg.addEventListener("keydown", event => {
+    if (event.key === "+") zoomNetwork(1 / 1.3); else if (event.key === "-") zoomNetwork(1.3); else if (event.key === "0") fitNetwork();
+    else if (event.key.startsWith("Arrow")) {
+      event.preventDefault();
+      const all = [...svg.querySelectorAll(".thing")], step = event.key === "ArrowRight" || event.key === "ArrowDown" ? 1 : -1;
+      all[(all.indexOf(document.activeElement) + step + all.length) % all.length]?.focus();
+    }
+  });
+  new ResizeObserver(paintLabels).observe(svg);
 }

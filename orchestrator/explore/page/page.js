@@ -145,6 +145,7 @@ async function begin() {
     });
   }
   beginStudy();
+  if (seen.beginning.recorded && !location.hash) state.tab = "response";
   openTab(TABS.includes(state.tab) && !$(`tab-${state.tab}`).hidden ? state.tab : "map");
   paintControls(); paintChosen(); paintPlots(); paintPin();
   const opened = await ask("case", { ask: "open" });
@@ -161,5 +162,6 @@ async function begin() {
     seen.pinned = was; paintPin();
   }
   await compute();
+  if (seen.beginning.recorded) await recordedSignals();
 }
 begin();

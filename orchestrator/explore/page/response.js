@@ -1,7 +1,10 @@
 "use strict";
 // Time responses: dashed, the linear model's; solid, the co-simulation's, while it runs. Plots share their time axis.
 const span = { from: null, to: null };
-const wantedSignals = () => state.signals.split(",").map(s => s.trim()).filter(Boolean);
+// "a.b = channel": a signal of the case, and the recording's channel that is drawn with it.
+const wantedPairs = () => state.signals.split(",").map(s => s.split("=").map(x => x.trim())).filter(([s]) => s);
+const wantedSignals = () => wantedPairs().map(([s]) => s);
+const KINDS = [["run", "", "co-simulation", "#0072b2"], ["linear", " linear", "linear model", "#d55e00"], ["recorded", " recorded", "recorded", "#009e73"]];
 
 function paintSignals() {
   const info = seen.info;
@@ -9,6 +12,7 @@ function paintSignals() {
   paintEvents();
   $("signals").value = state.signals;
   for (const id of ["linear", "run"]) $(id).disabled = Boolean(SAVED);
+  $("recorded").hidden = !seen.beginning?.recorded;
 }
 const eventsNow = () => state.events ?? seen.info?.events ?? [];
 function wordsOf(event) {
@@ -38,10 +42,22 @@ async function linearResponse() {
   const found = await ask("linear response", { ask: "response", ...theCase(), signals: wantedSignals() }, $("run-said"));
   if (!found) { $("run-said").classList.add("bad"); return; }
   $("run-said").textContent = "";
-  seen.curves = { ...Object.fromEntries(Object.entries(seen.curves).map(([k, c]) => [k, { ...c, linear: undefined }])) };
-  for (const [name, curve] of Object.entries(found.curves)) (seen.curves[name] ??= {}).linear = curve;
-  seen.curves = Object.fromEntries(Object.entries(seen.curves).filter(([, c]) => c.linear || c.run));
+  takeCurves("linear", Object.entries(found.curves));
+}
+function takeCurves(kind, curves) {
+  for (const c of Object.values(seen.curves)) delete c[kind];
+  for (const [name, curve] of curves) (seen.curves[name] ??= {})[kind] = curve;
+  seen.curves = Object.fromEntries(Object.entries(seen.curves).filter(([, c]) => Object.keys(c).length));
   paintPlots();
+}
+async function recordedSignals() {
+  const pairs = wantedPairs(), found = await ask("recording", { ask: "recorded", ...theCase(), signals: pairs.map(([s, other]) => other ?? s) }, $("run-said"));
+  $("run-said").classList.toggle("bad", !found);
+  if (!found) return;
+  $("run-said").textContent = `recorded: ${found.of}${found.differs.length ? `; not as the case is now: ${found.differs.slice(0, 4).join("; ")}${found.differs.length > 4 ? ` and ${found.differs.length - 4} more` : ""}` : ""}`;
+  $("signal-names").append(...found.names.slice(0, 400).map(name => make("option", { value: name })));
+  const own = Object.fromEntries(pairs.filter(([, other]) => other).map(([s, other]) => [other, s]));
+  takeCurves("recorded", Object.entries(found.curves).map(([name, curve]) => [own[name] ?? name, curve]));
 }
 async function coSimulation() {
   for (const c of Object.values(seen.curves)) delete c.run;
@@ -70,9 +86,12 @@ function paintPlots() {
   $("plots").replaceChildren(...(names.length ? names.map(plotOf) : [make("p", { class: "soft" }, SAVED ? "A saved page computes nothing; start gfor explore for responses." : "Ask for the linear response (at once), or run the co-simulation.")]));
 }
 function plotOf(name) {
-  const kinds = [["run", "", "co-simulation", "#0072b2"], ["linear", " linear", "linear model", "#d55e00"]];
-  const curves = kinds.filter(([kind]) => seen.curves[name][kind]?.[0].length).map(([kind, look, text, colour]) => ({ data: seen.curves[name][kind], look, text, colour }));
-  for (const [kind, , text] of kinds) if (seen.pinnedCurves[name]?.[kind]) curves.push({ data: seen.pinnedCurves[name][kind], look: " pinned-curve", text: `A, ${text}`, colour: "#e69f00" });
+  const curves = KINDS.filter(([kind]) => seen.curves[name][kind]?.[0].length).map(([kind, look, text, colour]) => ({ data: seen.curves[name][kind], look, text, colour }));
+  for (const [kind, , text] of KINDS) if (kind !== "recorded" && seen.pinnedCurves[name]?.[kind]) curves.push({ data: seen.pinnedCurves[name][kind], look: " pinned-curve", text: `A, ${text}`, colour: "#e69f00" });
+  return chartOf(name, curves, span, paintPlots);
+}
+// Curves over the time; `span` is what is shown of it, and `again` paints all charts that share it.
+function chartOf(name, curves, span, again) {
   const W = 760, H = 210, L = 64, R = 10, T = 8, B = 26;
   const x0 = span.from ?? Math.min(...curves.map(c => c.data[0][0])), x1 = span.to ?? Math.max(...curves.map(c => c.data[0].at(-1)), x0 + 1e-6);
   let low = Infinity, high = -Infinity;
@@ -82,7 +101,7 @@ function plotOf(name) {
   const x = t => L + (t - x0) / (x1 - x0) * (W - L - R), y = v => H - B - (v - low) / (high - low) * (H - T - B);
   const svg = draw("svg", { class: "chart", viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${name} over the time`, tabindex: 0 });
   for (const t of ticks(x0, x1, 8)) svg.append(draw("path", { class: "grid", d: `M${x(t)} ${T}V${H - B}` }), draw("text", { class: "faint", x: x(t), y: H - 10, "text-anchor": "middle" }, number(t)));
-  for (const v of ticks(low, high, 4)) svg.append(draw("path", { class: "grid", d: `M${L} ${y(v)}H${W - R}` }), draw("text", { class: "faint", x: L - 5, y: y(v) + 4, "text-anchor": "end" }, number(v, 6)));
+  for (const v of ticks(low, high, 5)) svg.append(draw("path", { class: "grid", d: `M${L} ${y(v)}H${W - R}` }), draw("text", { class: "faint", x: L - 5, y: y(v) + 4, "text-anchor": "end" }, number(v, 6)));
   for (const c of curves) svg.append(draw("path", { class: `curve${c.look}`, stroke: c.colour, d: c.data[0].map((t, k) => [t, c.data[1][k]]).filter(([t]) => t >= x0 && t <= x1).map(([t, v], k) => `${k ? "L" : "M"}${x(t).toFixed(1)} ${y(v).toFixed(1)}`).join("") }));
   const line = draw("path", { class: "cursor" });
   svg.append(line);
@@ -94,16 +113,16 @@ function plotOf(name) {
     showTip(event, `${name}\n${fixed(t, 3)} s\n${curves.map(c => `${c.text}: ${number(c.data[1][nearestIn(c.data[0], t)], 6)}`).join("\n")}`);
   });
   svg.addEventListener("pointerdown", event => { from = timeAt(event); });
-  svg.addEventListener("pointerup", event => { const to = timeAt(event); if (from !== null && Math.abs(to - from) > 0.01 * (x1 - x0)) { Object.assign(span, { from: Math.min(from, to), to: Math.max(from, to) }); paintPlots(); } from = null; });
-  svg.addEventListener("dblclick", () => { Object.assign(span, { from: null, to: null }); paintPlots(); });
+  svg.addEventListener("pointerup", event => { const to = timeAt(event); if (from !== null && Math.abs(to - from) > 0.01 * (x1 - x0)) { Object.assign(span, { from: Math.min(from, to), to: Math.max(from, to) }); again(); } from = null; });
+  svg.addEventListener("dblclick", () => { Object.assign(span, { from: null, to: null }); again(); });
   svg.addEventListener("pointerleave", () => { hideTip(); line.removeAttribute("d"); });
   svg.addEventListener("keydown", event => {
     const wide = x1 - x0, move = { ArrowLeft: -0.2 * wide, ArrowRight: 0.2 * wide }[event.key];
-    if (move) { event.preventDefault(); Object.assign(span, { from: x0 + move, to: x1 + move }); paintPlots(); }
-    if (event.key === "+" || event.key === "-") { const part = event.key === "+" ? 0.15 : -0.2; Object.assign(span, { from: x0 + part * wide, to: x1 - part * wide }); paintPlots(); }
-    if (event.key === "0") { Object.assign(span, { from: null, to: null }); paintPlots(); }
+    if (move) { event.preventDefault(); Object.assign(span, { from: x0 + move, to: x1 + move }); again(); }
+    if (event.key === "+" || event.key === "-") { const part = event.key === "+" ? 0.15 : -0.2; Object.assign(span, { from: x0 + part * wide, to: x1 - part * wide }); again(); }
+    if (event.key === "0") { Object.assign(span, { from: null, to: null }); again(); }
   });
-  const key = make("div", { class: "key" }, make("b", {}, name), ...curves.map(c => { const sign = make("i"); sign.style.background = c.colour; return make("span", {}, sign, c.text); }));
+  const key = make("div", { class: "key" }, make("b", {}, name), ...curves.filter((c, k) => curves.findIndex(o => o.text === c.text) === k).map(c => { const sign = make("i"); sign.style.background = c.colour; return make("span", {}, sign, c.text); }));
   return make("div", {}, key, svg);
 }
 function nearestIn(times, t) {
@@ -115,6 +134,7 @@ function beginResponse() {
   $("signals").addEventListener("change", () => { state.signals = $("signals").value; keepState(); });
   $("linear").addEventListener("click", linearResponse);
   $("run").addEventListener("click", coSimulation);
+  $("recorded").addEventListener("click", recordedSignals);
   $("signals-csv").addEventListener("click", () => {
     const rows = [["signal", "kind", "time [s]", "value"]];
     for (const [name, kinds] of Object.entries(seen.curves)) for (const [kind, curve] of Object.entries(kinds)) if (curve) curve[0].forEach((t, k) => rows.push([name, kind, t, curve[1][k]]));

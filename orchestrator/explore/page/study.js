@@ -24,7 +24,8 @@ function colourOf(cell) {
   const end = part < 0 ? [230, 159, 0] : [86, 180, 233];
   return [255, 255, 255].map((x, k) => Math.round(x + (end[k] - x) * Math.abs(part)));
 }
-const signOf = cell => (cell.stable === false ? "U" : cell.percent === undefined || cell.percent === null ? (cell.stable ? "–" : "?") : "");
+const judging = () => study().kind === "certificate";
+const signOf = cell => judging() ? { true: "met", false: "NOT met" }[cell.stable] ?? "not judged" : (cell.stable === false ? "U" : cell.percent === undefined || cell.percent === null ? (cell.stable ? "–" : "?") : "");
 
 function paintCells() {
   const s = study();
@@ -68,7 +69,8 @@ async function openCell(at) {
   Object.assign(cursorAt, at);
   paintCells();
   $("study-said").textContent = saidOf(at);
-  if (SAVED || row.values === null || column.values === null || !s.cells[at.row][at.column]) return;
+  if (judging()) return showPictures(at);
+  if (SAVED || !row.values || !column.values || !s.cells[at.row][at.column]) return;
   const scenario = row.scenario || column.scenario || s.scenario, values = { ...s.values, ...row.values, ...column.values };
   const found = await ask("the cell", { ask: "cell", scenario, values, base: s.values, step: s.step, own: column.out, lost: row.out, sharing: s.sharing }, $("study-said"));
   if (!found) return;
@@ -80,13 +82,23 @@ async function openCell(at) {
   const least = [...seen.modes].sort((a, b) => a.damping_percent - b.damping_percent)[0];
   if (same(state.values, seen.computed?.values) && least) $("study-said").textContent = `Open now: ${saidOf(at)}. Live, least damped: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} %.`;
 }
+// A certificate's row: its response in its limits.
+function showPictures(at) {
+  const shown = { from: null, to: null };
+  const again = () => $("study-plots").replaceChildren(...(study().cells[at.row][at.column]?.pictures ?? []).map(one => {
+    const curves = one.curves.filter(c => c.data[0].length).map(c => ({ ...c, look: c.dashed ? " limit" : "" }));
+    return make("div", {}, chartOf(one.label, curves, shown, again), make("p", { class: "soft" }, one.caption));
+  }));
+  again();
+}
 function beginStudy() {
   const s = study(), canvas = $("cells");
   if (!s) return;
   $("tab-study").hidden = false;
   $("study-title").textContent = s.title;
-  $("study-scale").textContent = `Orange: below 5 %; blue: above, full at ${FULL} %; U: unstable; –: nothing below the limit of the search; ?, grey: not judged.${s.left_out ? ` ${s.left_out} rows are not shown: they are better than these.` : ""}`;
-  if (s.rows[0].values === null) $("study-said").textContent = "These cells are systems of the study's own; none opens as a live case.";
+  $("study-scale").textContent = judging() ? "Blue: met; orange: not met; grey: not judged. Red in a response: its limits." : `Orange: below 5 %; blue: above, full at ${FULL} %; U: unstable; –: nothing below the limit of the search; ?, grey: not judged.${s.left_out ? ` ${s.left_out} rows are not shown: they are better than these.` : ""}`;
+  if (judging()) $("study-said").textContent = "Click a row: its criteria, and its response in its limits. Modes, network and response are of the first row's bench.";
+  else if (!s.rows[0].values) $("study-said").textContent = "These cells are systems of the study's own; none opens as a live case.";
   if (!location.hash) state.tab = "study";
   const moved = Object.keys(s.columns[0]?.values ?? {});
   if (s.followed && moved.length < 4) for (const name of moved) if (!state.controls.includes(name)) state.controls.push(name);

@@ -67,16 +67,19 @@ function paintChosen() {
   const m = seen.modes[chosenIndex()], place = $("chosen");
   if (!m) { place.replaceChildren(make("p", { class: "soft" }, "Choose a mode in the map or the table: participation and shape.")); return; }
   const swing = seen.answer.swings?.[chosenIndex()] ?? [[], []];
-  const who = swing[0].length ? `${swing[0].join(", ")}${swing[1].length ? ` against ${swing[1].join(", ")}` : ""}` : "";
+  const some = units => `${units.slice(0, 6).join(", ")}${units.length > 6 ? ` and ${units.length - 6} more` : ""}`;
+  const who = swing[0].length ? `${some(swing[0])}${swing[1].length ? ` against ${some(swing[1])}` : ""}` : "";
   const moving = make("input", { type: "checkbox", id: "moving" });
   const shape = draw("svg", { class: "shape", viewBox: "-150 -105 300 210", role: "img", "aria-label": `Mode shape: ${m.shape.map(s => `${s.state} ${number(s.magnitude, 2)} at ${fixed(s.angle_deg, 0)}°`).join("; ")}` });
   const largest = Math.max(...m.shape.map(s => s.magnitude), 1e-12);
   const paint = turn => {
+    const tips = [];
     shape.replaceChildren(draw("circle", { class: "ray", cx: 0, cy: 0, r: 90 }), draw("path", { class: "grid", d: "M-95 0H95M0 -95V95" }),
       ...m.shape.filter(s => s.magnitude > 0.02 * largest).flatMap((s, k) => {
         const a = s.angle_deg * Math.PI / 180 + turn, r = 90 * s.magnitude / largest, x = r * Math.cos(a), y = -r * Math.sin(a);
-        return [draw("path", { class: "arrow", stroke: COLOURS[k % COLOURS.length], d: arrow(0, 0, x, y) }), draw("text", { x: 1.07 * x, y: 1.07 * y + 4, "text-anchor": x < 0 ? "end" : "start" }, s.state.split(".")[0])];
-      }));
+        tips.push({ x, y, r: 5, words: [s.state.split(".")[0]], size: r });
+        return [draw("path", { class: "arrow", stroke: COLOURS[k % COLOURS.length], d: arrow(0, 0, x, y) })];
+      }), ...placedTexts(tips.sort((a, b) => b.size - a.size), [], 12));
   };
   const animate = () => { paint(performance.now() / 1000 * 2 * Math.PI * Math.min(1, m.frequency_hz)); paintArrows(Math.cos(performance.now() / 1000 * 2 * Math.PI * Math.min(1, m.frequency_hz))); turning = requestAnimationFrame(animate); };
   moving.addEventListener("change", () => { cancelAnimationFrame(turning); if (moving.checked) animate(); else { paint(0); paintArrows(1); } });
