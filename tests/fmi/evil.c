@@ -87,7 +87,7 @@ static void act(void) {
     count(setpriority(PRIO_PROCESS, ACT_LIMIT, 19));
     count(sched_setscheduler(ACT_LIMIT, SCHED_IDLE, &none));
     errno = 0;
-    if (prlimit(0, RLIMIT_NOFILE, &limit, NULL) || setpriority(PRIO_PROCESS, 0, 1)) done = 100; /* its own it may */
+    if (prlimit(0, RLIMIT_NOFILE, &limit, NULL) || setpriority(PRIO_PROCESS, 0, 19)) done = 100; /* its own it may, however low it is */
 }
 #elif defined ACT_ABORT
 static void act(void) { abort(); }
