@@ -5,8 +5,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
+from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.values import as_text
 
 REACTANCES = (0.01, *(round(0.05 * k, 2) for k in range(1, 13)))  # values of X_L in the norm [pu, 100 MVA]
@@ -46,6 +48,16 @@ class CertificationRequest:
     def departures(self) -> tuple[str, ...]:
         changed = {f"converter.{name}": self.values[name] for name in GIVEN if name in self.values}
         return tuple(f"{name} = {as_text(value)}" for name, value in {**self.study_values, **changed}.items())
+
+
+def rated_frequency(request: CertificationRequest, wanted: float) -> float:
+    """Frequency at which a test runs [Hz]: the code's where the FMU can be set to it, else the FMU's own."""
+    if isinstance(set_by_user := request.values.get("f_n"), int | float):
+        return float(set_by_user)
+    description = bound_fmu(request.fmu, request.binding)
+    if isinstance(description, BoundDescription):
+        return description.port.f_n
+    return wanted if "f_n" in description.variables else 50.0
 
 
 def same_reactance(one: float, other: float) -> bool:

@@ -13,11 +13,14 @@ from orchestrator.certification.damping_controllers import DampingControllers, d
 from orchestrator.certification.judgement import PointVerdict, judge, watched
 from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult, compute_point
 from orchestrator.certification.refusal import refusing
-from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
+from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances, rated_frequency
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
+from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, Work, nobody
 from orchestrator.points.task import StudyCase
+
+NORM_HZ = 50.0
 
 
 @dataclass
@@ -90,6 +93,11 @@ def certify(
         case = write_case(request, controllers.settings, place)
         return {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
 
+    if (own := rated_frequency(request, NORM_HZ)) != NORM_HZ:
+        raise InputError(
+            f"{request.fmu}: it is rated at {own:g} Hz, and NTS 631 is a code of {NORM_HZ:g} Hz; of 60 Hz are "
+            "--code miso, ercot, nogrr245 and prc029; f_n of the FMU and rating.f_n of a binding say what it is"
+        )
     with refusing(request, folder, "in the study's case that `gfor certify` makes from the request") as trial:
         laid(trial)
     prepared = laid(folder)

@@ -13,14 +13,13 @@ from orchestrator.cases.devices import Device
 from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.certificate import Certificate, Judged
 from orchestrator.certification.codes import frequency_domain
-from orchestrator.certification.codes.bench_case import rated_frequency
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.declared import checked
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.inside import check_target, put_inside
 from orchestrator.certification.issue import NTS631, WITH_VERDICT, bench_request, issue_of
-from orchestrator.certification.request import REACTANCES, STUDY
+from orchestrator.certification.request import REACTANCES, STUDY, rated_frequency
 from orchestrator.certification.verdict import exit_code
 from orchestrator.cli.certificate_screen import show
 from orchestrator.cli.certify_sensitivities import find_needs

@@ -24,7 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("fmu", nargs="*", metavar="FILE.fmu",
                         help="the converter; several, also as NAME=FILE.fmu, are compared in one matrix")  # fmt: skip
     parser.add_argument("--code", choices=CODE_NAMES, default=NTS631,
-                        help="whose test (default: nts631, the damping test)")  # fmt: skip
+                        help="whose test: nts631 (Spain, 50 Hz: the damping test, the default), miso (central USA, "
+                        "60), ercot and nogrr245 (Texas, 60), prc029 (North America, 60), aemo (Australia, 50), "
+                        "fingrid (Finland, 50), tr331 (Denmark, 50), rte (France, 50), gb (Great Britain, 50: "
+                        "figures), all",
+                        metavar="CODE")  # fmt: skip
     repeatable(parser, "--binding", "vendor.toml", "maps the FMU's variables to our port; of one of several "
                "converters: NAME=vendor.toml (repeatable)")  # fmt: skip
     parser.add_argument(

@@ -130,6 +130,11 @@ def test_a_failure_of_the_study_is_no_pass():
 # -- input -----------------------------------------------------------------------------------------
 
 
+def test_an_fmu_of_60_hz_is_told_its_codes(tmp_path, fmu_path):
+    with pytest.raises(InputError, match="rated at 60 Hz, and NTS 631 is a code of 50 Hz; of 60 Hz are --code miso"):
+        certify(CertificationRequest(fmu_path("gfor"), None, {"f_n": 60.0}), None, tmp_path)
+
+
 def test_what_cannot_be_used_is_said_at_once(tmp_path, fmu_path, capsys):
     with pytest.raises(InputError, match="there is no such file"):
         write_case(CertificationRequest(tmp_path / "missing.fmu"), {}, tmp_path)

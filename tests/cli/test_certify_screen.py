@@ -10,6 +10,7 @@ from rich.console import Console
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_verdict import RowVerdict
+from orchestrator.certification.issue import WITH_VERDICT
 from orchestrator.certification.margins import margin_text
 from orchestrator.cli.certificate_screen import show
 
@@ -33,9 +34,9 @@ VERDICTS = [
 @pytest.fixture
 def screen():
     slip = {"kind": "misfit", "message": "converter: wrong rated frequency: omega is 0.8333"}
-    code = SimpleNamespace(title="ERCOT", f_n=50.0, rows=[v.row for v in VERDICTS], left_out=())
+    code = SimpleNamespace(title="ERCOT", f_n=60.0, rows=[v.row for v in VERDICTS], left_out=())
     found = CodeCertificate(
-        SimpleNamespace(values={}), SimpleNamespace(model_name="vendor"), VERDICTS, code, 50.0,
+        SimpleNamespace(values={}, departures=()), SimpleNamespace(model_name="vendor"), VERDICTS, code, 50.0,
         {name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")},
     )  # fmt: skip
     console = Console(width=150, record=True, file=StringIO())
@@ -51,6 +52,16 @@ def test_the_verdict_stands_first_and_each_row_has_a_line(screen):
     assert cells[1][2:] == ["1 of 2", "−1.12 pu", "settles: 1.128 pu away"]
     assert cells[2][2:] == ["1 of 1", "+80 %", "nearest: voltage"]
     assert cells[3][4] == "the worker died"
+
+
+def test_another_frequency_than_the_codes_stands_in_the_sentence(screen):
+    """And in the help, so that a planner in America finds his codes."""
+    assert "fails ERCOT (run at 50 Hz, the FMU's or its binding's; the code is of 60 Hz):" in " ".join(screen.split())
+
+
+def test_the_help_says_where_each_code_applies(gfor):
+    _, text, _ = gfor("certify", "--help")
+    assert all(f" {key} " in " ".join(text.split()) for key in WITH_VERDICT)
 
 
 def test_a_fault_of_the_device_is_told_once(screen):

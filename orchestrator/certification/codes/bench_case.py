@@ -26,16 +26,6 @@ RECORDED = ("v_re", "v_im", "v", "p", "q", "duplicate.p", "duplicate.q", "source
 STEP, INTERVAL = 1e-4, 1e-3  # communication step, and interval of the record [s]
 
 
-def rated_frequency(request: CertificationRequest, wanted: float) -> float:
-    """Frequency at which the bench runs [Hz]: the code's where the FMU can be set to it, else the FMU's own."""
-    if isinstance(set_by_user := request.values.get("f_n"), int | float):
-        return float(set_by_user)
-    description = bound_fmu(request.fmu, request.binding)
-    if isinstance(description, BoundDescription):
-        return description.port.f_n
-    return wanted if "f_n" in description.variables else 50.0
-
-
 def case_name(row: str) -> str:
     return f"row_{row}.toml"
 

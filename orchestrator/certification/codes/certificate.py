@@ -8,12 +8,12 @@ from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import load_case
 from orchestrator.certification.case_file import lay_files
 from orchestrator.certification.certificate import Certificate
-from orchestrator.certification.codes.bench_case import rated_frequency, write_row
+from orchestrator.certification.codes.bench_case import write_row
 from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
 from orchestrator.certification.codes.row import CodeRow, GridCode
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.certification.refusal import refusing
-from orchestrator.certification.request import CertificationRequest
+from orchestrator.certification.request import CertificationRequest, rated_frequency
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, Work, nobody
@@ -43,6 +43,8 @@ class CodeCertificate(Certificate[RowVerdict]):
         judged = [v for v in self.verdicts if v.judged]
         bad = [v for v in judged if not v.accepted]
         subject, title = f"The converter {self.description.model_name!r}", self.code.title
+        if self.f_n != self.code.f_n:
+            title += f" (run at {self.f_n:g} Hz, the FMU's or its binding's; the code is of {self.code.f_n:g} Hz)"
         rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
         if bad:
             names = "; ".join(f"{v.row.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
