@@ -41,7 +41,7 @@ def damping_percent(eigenvalue: complex) -> float:
     return -100 * eigenvalue.real / abs(eigenvalue) if eigenvalue else 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Mode:
     """One eigenvalue λ [rad/s] with its participation factors and its shape."""
 
@@ -49,7 +49,11 @@ class Mode:
     participation: tuple[tuple[str, float], ...]  # factor of every state, largest first; the factors of a mode sum to 1
     shape: dict[str, complex]  # right eigenvector by state name, scaled so that its largest element is 1
     # left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere
-    left: dict[str, complex] = field(default_factory=dict, repr=False)
+    left: dict[str, complex] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        led = ", ".join(f"{state} {factor:.2f}" for state, factor in self.participation[:2])
+        return f"<Mode {self.frequency_hz:.3f} Hz, {self.damping_percent:.2f} %: {led}>"
 
     @property
     def frequency_hz(self) -> float:

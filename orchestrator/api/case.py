@@ -113,6 +113,8 @@ class Case:
     """
 
     def __init__(self, file: CaseFile) -> None:
+        if not isinstance(file, CaseFile):
+            raise InputError(f"Case({file!r}): a case is opened by load({file!r})")
         self.file = file
 
     @property

@@ -96,7 +96,7 @@ def certify(
     >>> import orchestrator as gfor
     >>> gfor.certify("vendor.fmu", "miso", folder="certificate").verdict  # doctest: +SKIP
     'passes'
-    >>> gfor.certify("vendor.fmu", "misa")
+    >>> gfor.certify("vendor.fmu", "misa")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
     orchestrator.errors.InputError: code = 'misa'; choose from nts631, miso, ...

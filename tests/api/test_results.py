@@ -10,6 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 
 import orchestrator as face
+from orchestrator.analysis.modes import Mode
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import RunEndedWarning, UnusualDataWarning
 from orchestrator.coupling.master import Master
@@ -17,6 +18,14 @@ from orchestrator.coupling.run_state import NOT_KEPT
 from orchestrator.errors import AnalysisError, CaseError, InputError, ResultsError
 
 mpl.use("Agg")
+
+
+def test_a_mode_and_a_wrong_case_say_what_they_are_in_a_cell():
+    assert repr(Mode(-0.5 + 6.28j, (("sg1.omega", 0.6), ("sg2.omega", 0.4)), {})) == (
+        "<Mode 0.999 Hz, 7.94 %: sg1.omega 0.60, sg2.omega 0.40>"
+    )
+    with pytest.raises(InputError, match=r"a case is opened by load\('two_area'\)"):
+        face.Case("two_area")
 
 
 @pytest.fixture(scope="module")
