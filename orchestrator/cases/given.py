@@ -84,7 +84,10 @@ def kept(given: Any, name: str, argument: str) -> Path:
         except (TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{argument}: {error}; give what TOML has: tables, lists, numbers and text") from error
         return keep(text, name)
-    table = given if hasattr(given, "to_csv") else pd.DataFrame.from_dict(given, orient="index")
+    if isinstance(given, Mapping) and all(isinstance(row, Mapping) for row in given.values()):
+        table = pd.DataFrame([*given.values()], index=[*given])  # a row without values is the case as it is
+    else:
+        table = given if hasattr(given, "to_csv") else pd.DataFrame.from_dict(given, orient="index")
     if not hasattr(table, "columns"):
         raise InputError(f"{argument}: a {type(given).__name__} has no columns; give a DataFrame, a row each")
     named = {"time", "name"} & set(table.columns)

@@ -54,6 +54,13 @@ def test_points_are_tables_and_mappings():
         case.screen({"short": {"grid.X_l": 0.1}}, scenario="gfor")
 
 
+def test_a_point_without_values_is_the_case_as_it_is():
+    case = gfor.load("two_area_rms")
+    items = case.screen({"usual": {}, "long": {"grid.X_L": 0.2}}, scenario="gfor").items()
+    assert items["point"].tolist() == ["usual", "long"]
+    assert case.screen({"usual": {}}, scenario="gfor").items()["point"].tolist() == ["usual"]
+
+
 def test_a_binding_is_a_mapping(tmp_path):
     fmu = gfor.build("gfor", tmp_path)
     binding = tomllib.loads(gfor.bind(fmu))
