@@ -35,7 +35,7 @@ def screen():
     slip = {"kind": "misfit", "message": "converter: wrong rated frequency: omega is 0.8333"}
     code = SimpleNamespace(title="ERCOT", f_n=50.0, rows=[v.row for v in VERDICTS], left_out=())
     found = CodeCertificate(
-        SimpleNamespace(values={}), SimpleNamespace(model_name="vendor"), VERDICTS, code, 50.0,
+        SimpleNamespace(values={}, departures=()), SimpleNamespace(model_name="vendor"), VERDICTS, code, 50.0,
         {name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")},
     )  # fmt: skip
     console = Console(width=150, record=True, file=StringIO())
