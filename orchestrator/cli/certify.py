@@ -24,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("fmu", nargs="*", metavar="FILE.fmu",
                         help="the converter; several, also as NAME=FILE.fmu, are compared in one matrix")  # fmt: skip
     parser.add_argument("--code", choices=CODE_NAMES, default=NTS631,
-                        help="whose test (default: nts631, the damping test)")  # fmt: skip
+                        help="whose test: nts631, the damping test, where none is named; of 60 Hz are miso, ercot and "
+                        "prc029, the others of 50 Hz")  # fmt: skip
     repeatable(parser, "--binding", "vendor.toml", "maps the FMU's variables to our port; of one of several "
                "converters: NAME=vendor.toml (repeatable)")  # fmt: skip
     parser.add_argument(
