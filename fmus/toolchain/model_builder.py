@@ -50,8 +50,6 @@ class ModelBuilder:
             minimum=1e-6, maximum=longest_step,
         )  # fmt: skip
 
-    # -- names -------------------------------------------------------------------------------
-
     @contextmanager
     def scope(self, name: str) -> Iterator[None]:
         """Put ``name.`` before every name declared inside."""
@@ -72,8 +70,6 @@ class ModelBuilder:
         made = symbol(variable.name)
         self._declared[variable.name] = (variable, made)
         return made
-
-    # -- declarations ------------------------------------------------------------------------
 
     def declare(self, variable: Parameter | Input) -> Expr:
         """Declare a parameter or an input that is described elsewhere, such as one of the port's."""
@@ -180,8 +176,6 @@ class ModelBuilder:
     def require(self, positive: Scalar, rule: str) -> None:
         """Refuse to initialise (or to go on, for tunable parameters) unless ``positive`` > 0."""
         self._requirements.append((Expr(positive), rule))
-
-    # -- the model ---------------------------------------------------------------------------
 
     def build(self, integrator: Integrator = "runge_kutta") -> Model:
         """Return the finished model.

@@ -142,8 +142,6 @@ class Slave(Fmi2Slave):
             cls._tape = (resources / "tape.bin").read_bytes()
         return cls._tape
 
-    # -- reports ---------------------------------------------------------------------------------
-
     def _report(self, text):
         self.log(f"{self.instance_name}: {text}", Fmi2Status.error)
 
@@ -166,8 +164,6 @@ class Slave(Fmi2Slave):
         broken = [rule for rule, margin in zip(self._rules, self._margins) if not margin > 0.0]
         if broken:
             self._fail("parameters cannot be used: " + "; ".join(broken))
-
-    # -- life cycle ------------------------------------------------------------------------------
 
     def enter_initialization_mode(self):
         self._phase, self._step_size = INITIALISING, None
@@ -238,8 +234,6 @@ class Slave(Fmi2Slave):
             self._parameters_changed = False
         self._kernel.outputs(*self._arguments)
         self._outputs_stale = False
-
-    # -- values ----------------------------------------------------------------------------------
 
     def get_real(self, vrs):
         try:
@@ -344,8 +338,6 @@ class Slave(Fmi2Slave):
             self._z[reference] = value
             self._parameters_changed = True
             self._step_size = None  # internal_step may be what changed
-
-    # -- state -----------------------------------------------------------------------------------
 
     def _get_fmu_state(self):
         """Everything that this instance is, as bytes: identity, phase, variables."""

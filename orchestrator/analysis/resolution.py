@@ -138,9 +138,6 @@ def _is_slow(pair: Pair) -> bool:
     return min(abs(pair.seen.imag), abs(pair.exact.imag)) < 2 * np.pi * SLOW_HZ
 
 
-# -- which modes -------------------------------------------------------------------------------------
-
-
 def _pairs(
     model: LinearModel, system: LinearModel, modes: Sequence[Mode], frequency_range: tuple[float, float]
 ) -> list[Pair]:
@@ -168,9 +165,6 @@ def _nearest(model: LinearModel) -> Callable[[complex], complex]:
         return lambda wanted: nearest_eigenvalue(model, wanted)
     values: NDArray[np.complex128] = eigenvalues(model)
     return lambda wanted: complex(values[np.argmin(np.abs(values - wanted))])
-
-
-# -- which step --------------------------------------------------------------------------------------
 
 
 def _short_step(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> float | None:

@@ -134,9 +134,6 @@ def _digest(model: ContinuousModel, values: Matrix, step_size: float) -> bytes:
     return hashlib.sha256(text + b"".join(np.ascontiguousarray(m).tobytes() for m in matrices)).digest()
 
 
-# -- what the FMU does -----------------------------------------------------------------------------
-
-
 def _measure(
     component: Component, model: ContinuousModel, plan: _Plan, at_rest: Matrix, time: float, step_size: float
 ) -> _Response:
@@ -210,9 +207,6 @@ def _refuse_edges(component: Component, model: ContinuousModel, response: _Respo
             f"{model.signals[worst]} that differ by {200 * part[worst]:.3g} % of each other; no linear model holds at "
             "the edge of a limit or a dead band: move the operating point off it"
         )
-
-
-# -- what the model says ---------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)

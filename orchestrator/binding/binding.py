@@ -77,8 +77,6 @@ class _Reader:
             raise BindingError(self._source, self._problems)
         return port
 
-    # -- helpers ---------------------------------------------------------------------------------
-
     @contextmanager
     def _at(self, place: str) -> Iterator[None]:
         try:
@@ -113,8 +111,6 @@ class _Reader:
                 raise ValueError(f"I_max = {declared}; it must be above 0 and below 100, in pu of the rated current")
             return limit
         return None
-
-    # -- voltage and current ---------------------------------------------------------------------
 
     def _phasor(
         self, place: str, table: PhasorTable, causality: str, scale: Callable[[str, VariableInfo], float]
@@ -202,8 +198,6 @@ class _Reader:
         if to_fmu[0] * to_fmu[3] < 0:
             raise ValueError("P and Q need one sign; turn both with 'direction'")
         return (factor / to_fmu[0], 0.0, 0.0, factor / to_fmu[3])
-
-    # -- start values, signals, settings ---------------------------------------------------------
 
     def _start(self, bases: Bases, own_rating: bool) -> dict[str, tuple[StartMap, ...]]:
         found = {}

@@ -94,9 +94,6 @@ def _relative(path: Path, beside: Path) -> str:
         return path.resolve().as_posix()
 
 
-# -- guesses -------------------------------------------------------------------------------------
-
-
 def _find(
     fmu: FmuDescription, causality: str, names: re.Pattern[str], units: Sequence[str], forms: Sequence[str]
 ) -> Guess | None:
@@ -151,9 +148,6 @@ def _start(fmu: FmuDescription, name: str, taken: Sequence[str]) -> VariableInfo
     text = hints.START_TEXTS.get(name)
     told = [v for v in known if v.causality == "parameter" and text is not None and text.search(v.description)]
     return told[0] if told else None
-
-
-# -- text ----------------------------------------------------------------------------------------
 
 
 def _rating(S_n: VariableInfo | None, fmu: FmuDescription, *ports: Guess | None) -> list[str]:

@@ -130,8 +130,6 @@ class Runs:
                 self._state = None
             component.close()
 
-    # -- inside ----------------------------------------------------------------------------------
-
     def _start(self) -> None:
         bench = self._bench
         component = self._component = open_component("box", bench.description, isolated=bench.isolated)

@@ -109,9 +109,6 @@ def _trip(draft: Draft, table: schema.ComponentTripTable, where: str) -> list[Ev
     return [WireFault(table.time, c.target.component, c, DropOut(0.0)) for c in given]
 
 
-# -- what cannot stand together --------------------------------------------------------------------
-
-
 def note_conflicts(draft: Draft, events: Sequence[tuple[Event, str]], clock: Clock) -> list[Event]:
     """Note events that set the same at the same time; the others, without ends that another beginning replaces."""
     seen: dict[tuple[int, str], tuple[Event, str]] = {}

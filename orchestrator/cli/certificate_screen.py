@@ -26,7 +26,10 @@ _LONGEST = 100  # of a remark in the first table [characters]
 
 def show(found: Certificate[Judged], files: Sequence[Path], folder: Path, console: Console) -> None:
     colour = {INCOMPLETE: "yellow"}.get(found.verdict, "green" if found.passed and not found.refused else "red")
-    console.print(f"[bold {colour}]{escape(found.sentence())}[/]", soft_wrap=True)
+    said = found.sentence()
+    if isinstance(found, CodeCertificate) and found.departures:
+        said += f" Not as the code has it: {', '.join(found.departures)}."
+    console.print(f"[bold {colour}]{escape(said)}[/]", soft_wrap=True)
     if isinstance(found, Certification):
         _show_damping_test(found, console)
     elif isinstance(found, CodeCertificate):
@@ -59,8 +62,7 @@ def _verdicts(found: CodeCertificate) -> PlainTable:
 
 def _remarks(found: CodeCertificate) -> list[str]:
     """Remarks on the device, its acceptance tests and parts not tested, each once."""
-    said = [f"Not as the code has it: {', '.join(found.departures)}."] if found.departures else []
-    said += _misfits(r.findings for r in found.results.values())
+    said = _misfits(r.findings for r in found.results.values())
     if isinstance(found.description, BoundDescription):
         said += [f"the binding has {text}" for text in found.description.unlike_delivered().values()]
     if left := [part for part in found.missing if part not in found.departures]:

@@ -108,8 +108,6 @@ class FilteredRecorder(Recorder):
             self._record(self._pending.pop(number) + self._last_values * self._sums_of_weights[missing])
         super().end(run)
 
-    # -- taking a run up again -------------------------------------------------------------------
-
     def position(self) -> dict[str, Any]:
         """As `Recorder.position`, with the rows that are not complete."""
         numbers = sorted(self._pending)

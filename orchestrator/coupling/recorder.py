@@ -132,8 +132,6 @@ class Recorder:
     def end(self, run: ObservedRun) -> None:
         self._hand_over()
 
-    # -- taking a run up again -------------------------------------------------------------------
-
     def position(self) -> dict[str, Any]:
         """Where the recording stands, with all rows handed to the sink; without one, the rows themselves.
 

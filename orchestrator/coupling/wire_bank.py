@@ -118,8 +118,6 @@ class WireBank:
     def step(self, time: float, step_size: float) -> None:
         self._do_step(self.pointer, time, step_size, 1)
 
-    # -- settings --------------------------------------------------------------------------------
-
     def begin(self, k: int, imperfection: Imperfection) -> None:
         """From now on a connection has this imperfection, in place of another of its kind."""
         plan = self.plans[k]
@@ -162,8 +160,6 @@ class WireBank:
     @quiet.setter
     def quiet(self, value: bool) -> None:
         self._bank.quiet = value
-
-    # -- values ----------------------------------------------------------------------------------
 
     def prepare(self, index: int, count: int) -> None:
         """Make the noise of the next communication steps, at most `STRETCH`."""
@@ -208,8 +204,6 @@ class WireBank:
             w["last"] = self.outputs.values[k] = value
         self._bank.position += 1
         return 0
-
-    # -- state -----------------------------------------------------------------------------------
 
     def state(self) -> dict[str, NDArray[np.float64]]:
         """All that the next step depends on beside the components, as arrays of numbers."""

@@ -61,8 +61,6 @@ class FederatedComponent(Derived):
         self.get_real = exchange(self._guarded(self._get_real))
         self.do_step = step(self._guarded(self._do_step))
 
-    # -- numbers ---------------------------------------------------------------------------------
-
     def _guarded(self, function: Callable[..., int]) -> Callable[..., int]:
         """A function for C, which no exception may leave; `check` raises it."""
 
@@ -134,8 +132,6 @@ class FederatedComponent(Derived):
     def progress_of_step(self) -> tuple[bool, float | None]:
         return (False, None) if self._remote or self.inner is None else self.inner.progress_of_step()
 
-    # -- handing over ----------------------------------------------------------------------------
-
     @property
     def is_foreign(self) -> bool:
         return self.inner is None
@@ -189,8 +185,6 @@ class FederatedComponent(Derived):
         kind = "a foreign federate has no FMU here" if self.inner is None else "it runs in its federate"
         raise ComponentError(self.name, call, "nothing", kind)
 
-    # -- life cycle ------------------------------------------------------------------------------
-
     def setup(self, start_time: float, stop_time: float | None) -> None:
         if self.inner is not None:
             self._local("setup", start_time, stop_time)
@@ -209,8 +203,6 @@ class FederatedComponent(Derived):
     def close(self) -> None:
         if self.inner is not None and not self._remote:
             self.inner.close()
-
-    # -- values ----------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, float | bool]) -> None:
         if self.inner is not None and not self._remote:
@@ -242,8 +234,6 @@ class FederatedComponent(Derived):
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
         found: NDArray[np.float64] = self._local("jacobian", unknowns, knowns, kept=False)
         return found
-
-    # -- state -----------------------------------------------------------------------------------
 
     def save_state(self) -> Any:
         return self._local("save_state", kept=False)

@@ -84,8 +84,6 @@ class OwnFederate:
         assert self._component is not None
         return self._component
 
-    # -- steps -----------------------------------------------------------------------------------
-
     def _steps(self) -> None:
         helics = helics_calls.library()
         period, offset = self._setting["period"], self._setting["offset"]
@@ -110,8 +108,6 @@ class OwnFederate:
             for handle, value in zip(self._outputs, values, strict=False):
                 helics.helicsPublicationPublishDouble(handle, value)
             index += 1
-
-    # -- commands --------------------------------------------------------------------------------
 
     def _listen(self) -> None:
         helics = helics_calls.library()

@@ -82,8 +82,6 @@ class Federation(Closing):
             raise
         return self
 
-    # -- processes -------------------------------------------------------------------------------
-
     def _start(self) -> None:
         choice, own = self._choice, None
         if choice.broker is None:
@@ -141,8 +139,6 @@ class Federation(Closing):
         if time.monotonic() > deadline:
             patience = self._choice.patience
             raise ComponentError("the hub", "HELICS", "no answer", f"within {patience:g} s; its processes were ended")
-
-    # -- conversation ----------------------------------------------------------------------------
 
     def _receive(self, kind: bytes, seconds: float) -> bytes:
         assert self._hub is not None
@@ -227,8 +223,6 @@ class Federation(Closing):
                 end = begin + len(self._published[part.name])
                 self._values[part.name], begin = numbers[begin:end], end
 
-    # -- beginning -------------------------------------------------------------------------------
-
     def _join(self) -> None:
         assert self._hub is not None
         self._hub.send(frames.JOIN)
@@ -306,8 +300,6 @@ class Federation(Closing):
             component = master.components[name]
             assert isinstance(component, FederatedComponent)
             component.hand_over()
-
-    # -- the end ---------------------------------------------------------------------------------
 
     def close(self) -> None:
         """End all processes and remove what was written for them; calling it again does nothing."""

@@ -73,8 +73,6 @@ class Hub:
         with self._sending:
             self._gfor.send(kind, answer)
 
-    # -- beginning -------------------------------------------------------------------------------
-
     def _begin(self) -> None:
         helics, own = helics_calls.library(), self._request["own_broker"]
         if own is not None:
@@ -171,8 +169,6 @@ class Hub:
                     "no such name", f"somebody subscribes to {name!r}, which nobody publishes; {hint}"
                 )
 
-    # -- commands to federates of ours -----------------------------------------------------------
-
     def _command(self, component: str, text: str) -> str:
         helics = helics_calls.library()
         number = json.loads(text)["number"]
@@ -187,8 +183,6 @@ class Hub:
         raise _FederationError(
             "no answer", f"within {self._request['patience']:g} s; it hangs, or the way to it is broken", component
         )
-
-    # -- steps -----------------------------------------------------------------------------------
 
     def _first(self, foreign: list[str]) -> bytes:
         self._request_time(FIRST_NS, None)
@@ -241,8 +235,6 @@ class Hub:
         if round(granted * 1e9) != nanoseconds:
             raise _FederationError("an end", "the broker or a federate ended the federation", names[0])
         self._now = nanoseconds
-
-    # -- the end ---------------------------------------------------------------------------------
 
     def _watch(self) -> None:
         """Look whether HELICS lets this process wait for too long: a call of HELICS cannot be interrupted."""

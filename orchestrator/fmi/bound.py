@@ -109,8 +109,6 @@ class BoundComponent(Derived):
         self._adapter.current.matrix[:] = [factor * element for element in current.matrix]
         self._adapter.power_scale = SYSTEM_BASE_MVA / S_n
 
-    # -- what goes to the FMU itself -------------------------------------------------------------
-
     @property
     def one_thread(self) -> str | None:
         return self.inner.one_thread
@@ -144,8 +142,6 @@ class BoundComponent(Derived):
 
     def close(self) -> None:
         self.inner.close()
-
-    # -- values ----------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, float | bool], *, own: bool = False) -> None:
         """Set variables by name; ``own`` means the FMU's own names."""
@@ -205,8 +201,6 @@ class BoundComponent(Derived):
             for target in self._port.start.get(name, ()):
                 scale = rating if target.per_rating else 1.0
                 self.inner.set({target.variable: scale * target.factor * value + target.offset})
-
-    # -- state -----------------------------------------------------------------------------------
 
     def save_state(self) -> Any:
         """The FMU's state together with what the conversion remembers."""

@@ -39,8 +39,6 @@ class Component(Protocol):
     def progress_of_step(self) -> tuple[bool, float | None]:
         """After a step that was refused: whether the FMU ended its simulation by itself, and how far it came [s]."""
 
-    # -- life cycle ------------------------------------------------------------------------------
-
     def setup(self, start_time: float, stop_time: float | None) -> None:
         """Tell the times between which it is to run [s]."""
 
@@ -65,8 +63,6 @@ class Component(Protocol):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None: ...
 
-    # -- values ----------------------------------------------------------------------------------
-
     def set(self, values: Mapping[str, float | bool]) -> None:
         """Set variables of any numeric type by name."""
 
@@ -83,8 +79,6 @@ class Component(Protocol):
         """Partial derivatives of Real variables by others, from the FMU's own directional derivatives.
 
         Returns shape (unknowns, knowns)."""
-
-    # -- state -----------------------------------------------------------------------------------
 
     def save_state(self) -> Any:
         """A handle to a copy of the FMU's whole state; give it back to `restore_state`, then `free_state`."""

@@ -69,8 +69,6 @@ class IsolatedComponent(RemoteCalls):
         assert self._process is not None
         return self._process.group
 
-    # -- errors ----------------------------------------------------------------------------------
-
     def check(self, status: int, call: str, time: float | None = None) -> None:
         if status <= 1:
             return
@@ -113,8 +111,6 @@ class IsolatedComponent(RemoteCalls):
             return "; ".join(texts)
         return self._process.last_words()
 
-    # -- conversation ----------------------------------------------------------------------------
-
     def _remote(self, call: str, command: str, *arguments: Any) -> Any:
         if self._end is not None:
             raise ComponentError(self.name, call, self._end, "", kind=self._end_kind)
@@ -140,8 +136,6 @@ class IsolatedComponent(RemoteCalls):
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
         found = self._remote("fmi2GetDirectionalDerivative", "jacobian", list(unknowns), list(knowns))
         return self._typed(matrix, found, len(unknowns), len(knowns))
-
-    # -- the end ---------------------------------------------------------------------------------
 
     def close(self) -> None:
         """End the process and remove what was written for it."""

@@ -129,8 +129,6 @@ class LoadedComponent(Derived):
             return PYTHON_BACKED
         return None if self._ours else "an FMU of others, whose instances may share data"
 
-    # -- errors ----------------------------------------------------------------------------------
-
     def _texts(self, least: int = 0) -> list[str]:
         return texts(self._messages, least)
 
@@ -165,8 +163,6 @@ class LoadedComponent(Derived):
         check_log(self.name, self._texts, call)
         return result
 
-    # -- life cycle ------------------------------------------------------------------------------
-
     def setup(self, start_time: float, stop_time: float | None) -> None:
         self._call("fmi2SetupExperiment", lambda: self._fmu.setupExperiment(startTime=start_time, stopTime=stop_time))
 
@@ -198,8 +194,6 @@ class LoadedComponent(Derived):
         if self._own_directory is not None:
             remove_tree(self._own_directory)
             self._own_directory = None
-
-    # -- values ----------------------------------------------------------------------------------
 
     def set(self, values: Mapping[str, float | bool]) -> None:
         for name, value in values.items():
@@ -242,8 +236,6 @@ class LoadedComponent(Derived):
             for reference in (variables[name].reference for name in knowns)
         ]
         return np.array(columns).reshape(len(knowns), len(unknowns)).T
-
-    # -- state -----------------------------------------------------------------------------------
 
     def save_state(self) -> Any:
         return self._call("fmi2GetFMUstate", self._fmu.getFMUState)

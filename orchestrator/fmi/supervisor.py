@@ -71,9 +71,6 @@ def _entered() -> str:
     return ""
 
 
-# -- the supervisor -----------------------------------------------------------------------------------
-
-
 def _supervise(request: dict[str, Any], told: int, work: Path, means: Means) -> NoReturn:
     """Wait for the end of the worker or of gfor, whichever comes first."""
     limits, me = Limits(**request["limits"]), os.getpid()
@@ -126,9 +123,6 @@ def _end_as(status: int) -> NoReturn:
     _exit(status)
 
 
-# -- the keeper ---------------------------------------------------------------------------------------
-
-
 def _keep(request: dict[str, Any], means: Means, work: Path, tell: int, alive: int) -> NoReturn:
     """Start the worker, reap all that ends, tell how the worker ended, and end with it."""
     if _LINUX:
@@ -167,9 +161,6 @@ def _attach(path: Path, descriptor: int) -> None:
     opened = os.open(path, os.O_RDONLY)
     os.dup2(opened, descriptor)
     os.close(opened)
-
-
-# -- the worker ---------------------------------------------------------------------------------------
 
 
 def _work(request: dict[str, Any], means: Means) -> NoReturn:

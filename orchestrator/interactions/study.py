@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 from orchestrator.asked import names
 from orchestrator.cases.case import Case
@@ -19,8 +18,6 @@ from orchestrator.interactions.systems import Exchanged, Kind, SystemName, assig
 from orchestrator.points.key import component_content
 from orchestrator.points.points import Work
 from orchestrator.points.task import StudyCase
-
-Placed = Mapping[str, tuple[ComponentTable, Any]]
 
 
 @dataclass(frozen=True)

@@ -207,9 +207,6 @@ def _shift(model: LinearModel, varied: LinearModel, pair: Eigenpair) -> complex:
     return eigenvalue_shift(model, varied, pair.eigenvalue, pair.left, pair.right)
 
 
-# -- in the running system ---------------------------------------------------------------------------
-
-
 def _stays(master: Master, parameter: Parameter, period: int) -> bool:
     """Whether the system is where it was, with another value of a parameter: its component now and a step later, or all
     of it a period [communication steps] later where sampled controllers make the steps differ."""
@@ -276,9 +273,6 @@ def _started_anew(again: Again, at: _Mode, parameter: Parameter, *, directional:
             return at.shift(Blocks(master, derivatives=True, directional=directional), master)
 
     return shift
-
-
-# -- rows --------------------------------------------------------------------------------------------
 
 
 def _row(parameter: Parameter, mode: Mode, operating_point: str, shift_at: Callable[[float], Shift]) -> Sensitivity:

@@ -60,8 +60,6 @@ class _Reader:
                 self._connect(sink)
         return self._structure
 
-    # -- elements --------------------------------------------------------------------------------
-
     def _walk(self, system: Element, owner: Owner) -> None:
         for path, what in _REFUSED.items():
             for element in children(system, path):
@@ -100,8 +98,6 @@ class _Reader:
             except InputError as error:
                 self._refuse(owner, str(error))
         return ""
-
-    # -- connections -----------------------------------------------------------------------------
 
     def _connection(self, connection: Element, owner: Owner) -> None:
         ends = [self._end(connection, end, owner) for end in ("start", "end")]
@@ -143,8 +139,6 @@ class _Reader:
             self._structure.connections.append((source, sink))
         elif last in self._given:
             self._structure.values[sink[0]].setdefault(sink[1], self._given[last])
-
-    # -- values ----------------------------------------------------------------------------------
 
     def _bind(self, element: Element, owner: Owner) -> None:
         """Give values from the inside out: bindings of an outer system override those of an inner one."""

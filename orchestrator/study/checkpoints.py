@@ -103,8 +103,6 @@ class Checkpoints:
         if not any(path.suffix == self._path.suffix for path in self._path.parent.glob("*")):
             self._case.unlink(missing_ok=True)
 
-    # -- what the master asks --------------------------------------------------------------------
-
     def latest(self) -> RunState | None:
         return self._kept
 
@@ -141,8 +139,6 @@ class Checkpoints:
     def _give_up(self, reason: str) -> None:
         self._unable = True
         self._say(f"scenario {self._name!r}: no checkpoints are written any more: {reason}")
-
-    # -- what was left ---------------------------------------------------------------------------
 
     def _found(self) -> RunState | None:
         damaged = []

@@ -116,8 +116,6 @@ class _Reading:
                 f"{[*refused]} in [network], and put what they feed or draw into loads"
             )
 
-    # -- buses -------------------------------------------------------------------------------------
-
     def _buses(self, leaving_out: Sequence[str]) -> None:
         buses = self._source.get_buses(all_attributes=True)
         levels = self._source.get_voltage_levels()["nominal_v"]
@@ -196,8 +194,6 @@ class _Reading:
                     "its ends, so an export that wrote a transformer as a line has lost a part of it"
                 )  # fmt: skip
 
-    # -- injections ----------------------------------------------------------------------------------
-
     def _injections(self) -> None:
         for row in self._source.get_loads(all_attributes=True).itertuples():
             if row.connected and row.bus_id in self._numbers:
@@ -245,8 +241,6 @@ class _Reading:
                     self._changes.note(
                         name, f"{kind} tap changer: at SSH's position, which is not that of SV's solution"
                     )
-
-    # -- generators ----------------------------------------------------------------------------------
 
     def _generators(self) -> Any:
         rows = []

@@ -43,8 +43,6 @@ class CodeCertificate(Certificate[RowVerdict]):
         judged = [v for v in self.verdicts if v.judged]
         bad = [v for v in judged if not v.accepted]
         subject, title = f"The converter {self.description.model_name!r}", self.code.title
-        if self.f_n != self.code.f_n:
-            title += f" (run at {self.f_n:g} Hz, the FMU's or its binding's; the code is of {self.code.f_n:g} Hz)"
         rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
         if bad:
             names = "; ".join(f"{v.row.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)

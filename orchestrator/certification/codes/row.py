@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from orchestrator.arrays import Numbers
 from orchestrator.certification.codes.measured import MeasuredRow
@@ -103,5 +104,7 @@ class GridCode:
     def of(
         cls, key: str, rows: tuple[CodeRow, ...], declared: Mapping[str, float] = MappingProxyType({})
     ) -> "GridCode":
-        texts = {name: tuple(text) if isinstance(text, list) else text for name, text in _WORDS[key].items()}
+        texts: dict[str, Any] = {
+            name: tuple(text) if isinstance(text, list) else text for name, text in _WORDS[key].items()
+        }
         return cls(key, rows=rows, declared=dict(declared), **texts)

@@ -72,8 +72,10 @@ def judge_row(
         if current and (not current.accepted or stated is None or any(c["criterion"] == CURRENT for c in stated)):
             found.append(current)
         if reason := measured.broken:
-            unmet = {"accepted": None, "margin": None}  # what a broken response meets has no meaning
-            found = [replace(f, **unmet, text=f"{f.text}; {NOT_JUDGED}, {reason}") if f.accepted else f for f in found]
+            why = f"{NOT_JUDGED}, {reason}"  # what a broken response meets has no meaning
+            found = [
+                replace(f, accepted=None, margin=None, text=f"{f.text}; {why}") if f.accepted else f for f in found
+            ]
     if row.shown_only:
         return RowVerdict(row, tuple(replace(finding, accepted=None) for finding in found))
     return RowVerdict(row, tuple(found))
