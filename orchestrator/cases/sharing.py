@@ -217,6 +217,10 @@ def _reserves(
 def _as_shared(
     flow: PowerFlow, found: Mapping[str, float], rating: Mapping[str, float], at_slack: set[str]
 ) -> dict[str, complex]:
-    """The units' powers, those at the slack bus with their own shares instead of equal ones."""
-    own = {name: complex(found[name] / rating[name], flow.powers[name].imag) for name in at_slack}
+    """The units' powers, those at the slack bus with their own shares instead of equal ones.
+
+    What little is missing is theirs as well: without a governor nothing else would ever make up for it."""
+    missing = sum(flow.powers[name].real * rating[name] - found[name] for name in at_slack)
+    rest = missing / (sum(rating[name] for name in at_slack) or 1.0)
+    own = {name: complex(found[name] / rating[name] + rest, flow.powers[name].imag) for name in at_slack}
     return flow.powers | own

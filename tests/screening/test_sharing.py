@@ -40,6 +40,15 @@ def critical(item):
     return item.record.eigenvalues[list(item.record.critical)]
 
 
+def test_what_little_the_shares_leave_is_the_slacks(five, tmp_path):
+    """Nothing else makes up for it where no machine has a governor: a steady state would never be found."""
+    item = Item(0, 1, {}, ("load_12",), ("load_12",))
+    found = ItemPreparation(five, "base", ()).prepared(item).scenario.power_flow
+    alone = five.prepare(["base"], {f"sg{n}.P_0": found.powers[f"sg{n}"].real for n in (1, 2, 3, 4)} | {
+        "grid.load_12.scale": 0.0})[0].power_flow  # fmt: skip
+    assert found.powers["sg5"].real == pytest.approx(alone.powers["sg5"].real, abs=1e-12)
+
+
 def at(case, lost, sharing=None):
     """The prepared item of an outage: powers [MW] by unit."""
     item = Item(0, 1, {}, tuple(lost), tuple(lost))

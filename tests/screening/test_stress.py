@@ -90,7 +90,8 @@ def test_the_outages_come_worst_first(plan):
     console.print(overview(found))
     lines = [line for line in console.export_text().splitlines() if "│" in line]
     assert [line.split("│")[1].strip() for line in lines] == ["sg2", "sg1", "line_11_12", "intact"]
-    assert "UNSTABLE" in lines[0]
+    assert " UNSTABLE" in lines[0]
+    assert "Marked" not in lines[0]
     assert "[bold" not in lines[0]
     assert "no steady state" in lines[1]
 
