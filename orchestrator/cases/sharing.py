@@ -158,8 +158,8 @@ def _overload(reserves: Sequence[Reserve], change: float, rest: float) -> str:
         first = f"{worst.name} would have to go down to {need:.4g} MW"
     return (
         f"{first}: {abs(change):.4g} MW {'more' if change > 0 else 'less'} cannot be shared, {abs(rest):.4g} MW "
-        "are left when all units with a governor or a droop are at their limits; give another dispatch, lose load "
-        'with the unit (unit+load), or leave it to the slack: sharing = "slack"'
+        "are left when all units with a governor or a droop are at their limits; give another dispatch, or lose load "
+        "with the unit (unit+load)"
     )
 
 

@@ -238,6 +238,7 @@ def test_what_cannot_be_shared_says_who_would_need_how_much(five, tmp_path):
     (_, lost, fine) = screened(five, tmp_path, "sg1+sg2,sg2")
     assert (lost.record.status, fine.record.status) == (Status.STEADY_STATE, Status.COMPUTED)
     assert re.search(r"sg3 would need 122 % of its 263.8 MW: 320 MW more cannot be shared", lost.record.text)
+    assert "slack" not in lost.record.text, "it alone cannot do what all together cannot"
 
 
 def test_what_hangs_on_a_branch_is_lost_with_it(five, tmp_path):
