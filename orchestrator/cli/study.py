@@ -83,14 +83,12 @@ def working_in(
                 lambda report: study.compute(planned, executor, folder, report, *more), executor,
                 make_console(stderr=options.json),
             )  # fmt: skip
-            if others and not getattr(found.result, "stored", True):  # a design has its tables elsewhere
-                say(
-                    "warning",
-                    [
-                        f"{folder} holds another study, with no {study.counted[:-1]} of this one: its tables are "
-                        "replaced, and its points stay; give another --out to keep both"
-                    ],
+            # parts are of one study; a design has its tables elsewhere
+            if others and not any(more) and not getattr(found.result, "stored", True):
+                text = (
+                    f"{folder} holds another study, with no {study.counted[:-1]} of this one: its tables are replaced"
                 )
+                say("warning", [f"{text}, and its points stay; give another --out to keep both"])
             return found
 
         with held(made_folder(folder, "--out")):

@@ -73,6 +73,11 @@ def test_what_was_not_judged_says_what_it_has_in_common(plan, where, said):
     assert text in verdict_sentence(found)
 
 
+def test_of_two_points_the_one_that_was_not_judged_is_named(plan):
+    found = summary(replace(plan, points=plan.points[:2]), {("morning", "sg1"): LOST, ("morning", "sg2"): LOST})
+    assert not_judged(found) == "2 not judged (2 no steady state), all with a unit out at morning"
+
+
 def test_what_was_not_judged_is_told_of_an_unstable_network_too(plan):
     found = summary(plan, {("night", "sg1"): LOST, ("noon", "sg2"): mode(0.1)})
     assert verdict_sentence(found).startswith("UNSTABLE: 1 item of 16; worst: noon, sg2: ")
