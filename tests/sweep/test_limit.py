@@ -12,7 +12,7 @@ from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import parse_vary
-from orchestrator.sweep.limit import HALVINGS, Ending, Until, search
+from orchestrator.sweep.limit import HALVINGS, Ending, ParameterLimit, Until, search
 from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep, run_sweep
 from tests.coupling.small_fmus import small_fmu
