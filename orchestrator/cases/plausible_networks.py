@@ -14,6 +14,7 @@ from orchestrator.coupling.system import ComponentPlan
 
 _SHOWN = 3  # equivalents that are named; lines beyond which one is compared with the others
 _UNLIKE = 8.0  # times from which on a line is unlike the others
+_TWINS = 4.0  # and from which on one of two parallel circuits is unlike the other
 
 
 def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
@@ -22,6 +23,7 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
         return
     yield from _equivalents(draft, draft.grid, draft.network)
     yield from _unlike_others(draft, draft.grid, grid, draft.network)
+    yield from _unlike_twins(draft, draft.grid, grid, draft.network)
     for line in draft.network.lines:
         yield from _line(draft, draft.grid, grid, line)
     for transformer in draft.network.transformers:
@@ -62,6 +64,21 @@ def _unlike_others(draft: Draft, name: str, grid: ComponentPlan, network: Networ
                 f"middle line; has X a digit too {'many' if times[0] > 1 else 'few'}?"
             )
             yield UnusualValue(f"{name}.{variable}", _place(draft, "lines", line.name, "X", variable), text)
+
+
+def _unlike_twins(draft: Draft, name: str, grid: ComponentPlan, network: Network) -> Iterator[UnusualValue]:
+    """Parallel circuits of which one of R, X and B is far from the other's, and the two others are alike."""
+    circuits: dict[frozenset[str], list[tuple[Line, dict[str, float]]]] = {}
+    for line in network.lines:
+        found = {q: value_of(grid, line.variable(q)) or 0.0 for q in "RXB"}
+        circuits.setdefault(frozenset((line.from_bus, line.to_bus)), []).append((line, found))
+    for parallel in circuits.values():
+        for (one, own), (other, its) in combinations(parallel, 2):
+            odd = [q for q in "RXB" if abs(own[q] - its[q]) > 0.25 * max(abs(own[q]), abs(its[q]))]
+            if len(odd) == 1 and max(sizes := [abs(own[odd[0]]), abs(its[odd[0]])]) > _TWINS * min(sizes):
+                variable, its_twins = other.variable(odd[0]), f"the parallel {one.name} has {own[odd[0]]:g} pu"
+                text = f"{variable} = {its[odd[0]]:g} pu, and {its_twins}, with like other data"
+                yield UnusualValue(f"{name}.{variable}", _place(draft, "lines", other.name, odd[0], variable), text)
 
 
 def _line(draft: Draft, name: str, grid: ComponentPlan, line: Line) -> Iterator[UnusualValue]:

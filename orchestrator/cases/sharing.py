@@ -158,8 +158,8 @@ def _overload(reserves: Sequence[Reserve], change: float, rest: float) -> str:
         first = f"{worst.name} would have to go down to {need:.4g} MW"
     return (
         f"{first}: {abs(change):.4g} MW {'more' if change > 0 else 'less'} cannot be shared, {abs(rest):.4g} MW "
-        "are left when all units with a governor or a droop are at their limits; give another dispatch, lose load "
-        'with the unit (unit+load), or leave it to the slack: sharing = "slack"'
+        "are left when all units with a governor or a droop are at their limits; give another dispatch, or lose load "
+        "with the unit (unit+load)"
     )
 
 
@@ -217,6 +217,10 @@ def _reserves(
 def _as_shared(
     flow: PowerFlow, found: Mapping[str, float], rating: Mapping[str, float], at_slack: set[str]
 ) -> dict[str, complex]:
-    """The units' powers, those at the slack bus with their own shares instead of equal ones."""
-    own = {name: complex(found[name] / rating[name], flow.powers[name].imag) for name in at_slack}
+    """The units' powers, those at the slack bus with their own shares instead of equal ones.
+
+    What little is missing is theirs as well: without a governor nothing else would ever make up for it."""
+    missing = sum(flow.powers[name].real * rating[name] - found[name] for name in at_slack)
+    rest = missing / (sum(rating[name] for name in at_slack) or 1.0)
+    own = {name: complex(found[name] / rating[name] + rest, flow.powers[name].imag) for name in at_slack}
     return flow.powers | own

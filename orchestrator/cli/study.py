@@ -18,6 +18,7 @@ from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, print_questions, say
 from orchestrator.cli.verdict import add_verdict_argument
+from orchestrator.points.store import POINTS, any_kept
 from orchestrator.points.study import PointStudy, StudyAtOnce
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
@@ -77,10 +78,18 @@ def working_in(
         print_questions(study.prepared(planned), as_json=options.json)
 
         def compute(*more: object) -> Any:
-            return progress.compute(
+            others = any_kept(folder / POINTS)
+            found = progress.compute(
                 lambda report: study.compute(planned, executor, folder, report, *more), executor,
                 make_console(stderr=options.json),
             )  # fmt: skip
+            # parts are of one study; a design has its tables elsewhere
+            if others and not any(more) and not getattr(found.result, "stored", True):
+                text = (
+                    f"{folder} holds another study, with no {study.counted[:-1]} of this one: its tables are replaced"
+                )
+                say("warning", [f"{text}, and its points stay; give another --out to keep both"])
+            return found
 
         with held(made_folder(folder, "--out")):
             yield planned, compute, folder

@@ -173,7 +173,10 @@ def verdict(d: PodDesign) -> str:
         text += f"; but {d.broken}"
     if d.damping_met:
         if not d.refinement and d.active_bound == "lower":
-            text += f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it"
+            text += (
+                f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "
+                f"--gain-bounds 0:{d.request.gain_bounds[1]:g} --refine finds the least gain that meets it"
+            )
         return text
     if d.refinement:
         return text + _out_of_reach(d, d.refinement)

@@ -83,6 +83,8 @@ def _out(summary: Summary, items: Sequence[ScreenedItem]) -> str:
 def _loading(summary: Summary, items: Sequence[ScreenedItem]) -> str:
     plan = summary.result.plan
     loads = {point.name: load_of(plan, point) for point in plan.points}
+    if len(loads) == 2 and len(at := {item.point.name for item in items}) == 1:
+        return f"at {at.pop()}"
     middle, here = float(np.median(list(loads.values()))), [loads[item.point.name] for item in items]
     if min(here) > middle:
         return f"at high load (from {min(here):.4g} MW on; half of the points have at most {middle:.4g} MW)"

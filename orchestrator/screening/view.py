@@ -200,7 +200,7 @@ def _cell(item: ScreenedItem | None) -> str | Marked:
         return "–" if item is None else str(item.record.status)
     least = _least(item)
     if item.record.stable is False:
-        return Marked(f"{damping(least.damping)} UNSTABLE" if least else "UNSTABLE", "bad")
+        return Marked(f"{least.damping:.2f} UNSTABLE" if least else "UNSTABLE", "bad")
     return "more" if least is None else damping(least.damping)
 
 

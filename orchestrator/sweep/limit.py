@@ -7,6 +7,7 @@ import fnmatch
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -123,10 +124,18 @@ class ParameterLimit:
         what = self.until.failing if self.kind is Ending.FAILS else str(self.kind)
         if self.holds_at is None:
             return f"{what} already at the start, {self.key} = {at}{mode}{why}"
-        up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}"
+        up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}{self._dip()}"
         if self.kind is Ending.FAILS:
             return f"{up_to}, {what} at {at}{mode}"
         return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{why}"
+
+    def _dip(self) -> str:
+        """The least damping on the way, where it is less than at both ends."""
+        held = [x for x in takewhile(lambda x: x["kind"] == str(Ending.HOLDS), self.tried) if x["damping_percent"]]
+        least = min(held, key=lambda x: x["damping_percent"], default=None)
+        if least is None or least is held[0] or least is held[-1]:
+            return ""
+        return f" (on the way {least['damping_percent']:.2f} % at {self._value(least['value'])})"
 
     @property
     def remarks(self) -> list[str]:

@@ -40,6 +40,15 @@ def critical(item):
     return item.record.eigenvalues[list(item.record.critical)]
 
 
+def test_what_little_the_shares_leave_is_the_slacks(five, tmp_path):
+    """Nothing else makes up for it where no machine has a governor: a steady state would never be found."""
+    item = Item(0, 1, {}, ("load_12",), ("load_12",))
+    found = ItemPreparation(five, "base", ()).prepared(item).scenario.power_flow
+    alone = five.prepare(["base"], {f"sg{n}.P_0": found.powers[f"sg{n}"].real for n in (1, 2, 3, 4)} | {
+        "grid.load_12.scale": 0.0})[0].power_flow  # fmt: skip
+    assert found.powers["sg5"].real == pytest.approx(alone.powers["sg5"].real, abs=1e-12)
+
+
 def at(case, lost, sharing=None):
     """The prepared item of an outage: powers [MW] by unit."""
     item = Item(0, 1, {}, tuple(lost), tuple(lost))
@@ -229,6 +238,7 @@ def test_what_cannot_be_shared_says_who_would_need_how_much(five, tmp_path):
     (_, lost, fine) = screened(five, tmp_path, "sg1+sg2,sg2")
     assert (lost.record.status, fine.record.status) == (Status.STEADY_STATE, Status.COMPUTED)
     assert re.search(r"sg3 would need 122 % of its 263.8 MW: 320 MW more cannot be shared", lost.record.text)
+    assert "slack" not in lost.record.text, "it alone cannot do what all together cannot"
 
 
 def test_what_hangs_on_a_branch_is_lost_with_it(five, tmp_path):

@@ -73,6 +73,11 @@ def test_what_was_not_judged_says_what_it_has_in_common(plan, where, said):
     assert text in verdict_sentence(found)
 
 
+def test_of_two_points_the_one_that_was_not_judged_is_named(plan):
+    found = summary(replace(plan, points=plan.points[:2]), {("morning", "sg1"): LOST, ("morning", "sg2"): LOST})
+    assert not_judged(found) == "2 not judged (2 no steady state), all with a unit out at morning"
+
+
 def test_what_was_not_judged_is_told_of_an_unstable_network_too(plan):
     found = summary(plan, {("night", "sg1"): LOST, ("noon", "sg2"): mode(0.1)})
     assert verdict_sentence(found).startswith("UNSTABLE: 1 item of 16; worst: noon, sg2: ")
@@ -90,7 +95,8 @@ def test_the_outages_come_worst_first(plan):
     console.print(overview(found))
     lines = [line for line in console.export_text().splitlines() if "│" in line]
     assert [line.split("│")[1].strip() for line in lines] == ["sg2", "sg1", "line_11_12", "intact"]
-    assert "UNSTABLE" in lines[0]
+    assert " UNSTABLE" in lines[0]
+    assert "Marked" not in lines[0]
     assert "[bold" not in lines[0]
     assert "no steady state" in lines[1]
 

@@ -12,7 +12,7 @@ from orchestrator.points.points import Work
 from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import parse_vary
-from orchestrator.sweep.limit import HALVINGS, Ending, Until, search
+from orchestrator.sweep.limit import HALVINGS, Ending, ParameterLimit, Until, search
 from orchestrator.sweep.request import SweepRequest
 from orchestrator.sweep.sweep import plan_sweep, run_sweep
 from tests.coupling.small_fmus import small_fmu
@@ -61,6 +61,17 @@ def test_what_has_no_operating_point_before_it_is_unstable_ends_the_search_as_su
 
 def test_no_value_between_ends_the_search():
     assert search([H, F], lambda _: pytest.fail("asked"), lambda *_: False) == (0.0, 1.0, [])
+
+
+def test_damping_that_is_least_on_the_way_is_told():
+    def limit(*dampings):
+        tried = [{"value": k, "kind": str(H), "damping_percent": d} for k, d in enumerate(dampings)]
+        tried.append({"value": len(dampings), "kind": str(F), "damping_percent": -1.0})
+        end = float(len(dampings))
+        return ParameterLimit("x", "", "s", "S", Until(), F, end - 0.5, end, None, "", tuple(tried), (), "", end).sentence
+
+    assert "x = 2.5 (on the way 3.06 % at 1), " in limit(3.98, 3.06, 4.2)
+    assert "on the way" not in limit(3.98, 3.06, 2.9)
 
 
 # -- coupled FMUs --------------------------------------------------------------------------------------

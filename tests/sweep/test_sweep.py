@@ -290,8 +290,11 @@ def test_an_interrupted_sweep_continues(gfor, case, tmp_path, monkeypatch):
     code, text, _ = gfor(*arguments)
     assert code == 0
     assert "4 points computed, 4 were there already" in text
-    code, text, _ = gfor(*arguments)
+    code, text, err = gfor(*arguments)
     assert "0 points computed, 8 were there already" in text
+    assert "another study" not in err
+    _, _, err = gfor(case, "--vary", "a1.gain=5:11:2", "--workers", 1, "--out", out)
+    assert "out holds another study, with no point of this one: its tables are replaced" in err
 
 
 def test_what_a_stored_point_depends_on(case, tmp_path):

@@ -192,6 +192,14 @@ RAWS = {
         changed(RAW, ("5,  6, '1 ', 0.0025, 0.025,", "5,  6, '1 ', 0.0025, 0.0025,")),
         "has X a digit too few?",
     ),
+    "circuit of a tenth": (
+        changed(RAW, ("7,  8, '2 ', 0.011, 0.11,", "7,  8, '2 ', 0.011, 0.011,")),
+        "X_line_7_8_2 = 0.011 pu, and the parallel line_7_8 has 0.11 pu, with like other data",
+    ),
+    "charging of one circuit": (
+        changed(RAW, ("7,  8, '2 ', 0.011, 0.11, 0.1925", "7,  8, '2 ', 0.011, 0.11, 0.0")),
+        "B_line_7_8_2 = 0 pu, and the parallel line_7_8 has 0.1925 pu",
+    ),
     "load in pu": (changed(RAW, ("967.000, 100.000", "9.67, 1.0")), "load at bus_7 has 9.67 MW, where the others have"),
     "power in pu": (changed(RAW, (" 2, '1 ', 700.000", " 2, '1 ', 7.00")), "more than the rating of the machine"),
     "conductance for a capacitor": (
