@@ -98,6 +98,7 @@ def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, 
     return {
         "folder": str(folder),
         "curves": curves(run.dataset, names),
+        "answer": run.summary()["answer"],
         "findings": [finding.message for finding in run.findings],
         "ended_early": None if run.failure is None else str(run.failure),
         "ring_down": None if run.ring_down is None else {

@@ -19,6 +19,21 @@ def resident(pid):
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
+def heap(view):
+    return view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }")
+
+
+def dragged(view, worker, times=DRAGS):
+    """Megabytes of page and worker before and after so many drags of the first slider."""
+    before = heap(view), resident(worker)
+    view.evaluate(
+        "async n => { for (let k = 0; k < n; k++) { estimateAt(state.controls[0], 1 + (k % 100)); "
+        "if (k % 50 === 0) await new Promise(requestAnimationFrame); } }",
+        times,
+    )  # fmt: skip
+    return before, (heap(view), resident(worker))
+
+
 def main(case, scenario, parameter, times=11):
     explorer = Explorer(case, {"case": case, "scenario": scenario, "values": {}, "range": [0.1, 2.0]})
     threading.Thread(target=explorer.serve, daemon=True).start()
@@ -46,14 +61,8 @@ def main(case, scenario, parameter, times=11):
             for name, found in (("exact", exact), ("estimate", estimate)):
                 print(f"{name}: median {statistics.median(found):.0f} ms, {min(found):.0f} to {max(found):.0f}")
             worker = explorer.computing["modes"]._process.pid
-            before = view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }"), resident(worker)
             begin = time.monotonic()
-            view.evaluate(
-                "async n => { for (let k = 0; k < n; k++) { estimateAt(state.controls[0], 1 + (k % 100)); "
-                "if (k % 50 === 0) await new Promise(requestAnimationFrame); } }",
-                DRAGS,
-            )  # fmt: skip
-            after = view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }"), resident(worker)
+            before, after = dragged(view, worker)
             print(f"{DRAGS} drags in {time.monotonic() - begin:.0f} s: page {before[0]:.1f} to {after[0]:.1f} MB, "
                   f"worker {before[1]:.0f} to {after[1]:.0f} MB")  # fmt: skip
         browser.close()

@@ -84,9 +84,10 @@ function paintChosen() {
   const animate = () => { paint(performance.now() / 1000 * 2 * Math.PI * Math.min(1, m.frequency_hz)); paintArrows(Math.cos(performance.now() / 1000 * 2 * Math.PI * Math.min(1, m.frequency_hz))); turning = requestAnimationFrame(animate); };
   moving.addEventListener("change", () => { cancelAnimationFrame(turning); if (moving.checked) animate(); else { paint(0); paintArrows(1); } });
   paint(0);
+  const swings = m.shape.length ? [make("label", {}, moving, " move (slowed to 1 Hz at most)"), shape] : [make("p", { class: "soft" }, "No machine swings in it.")];
   place.replaceChildren(
     make("h3", {}, `${m.name ?? "Mode"}: ${fixed(m.frequency_hz, 4)} Hz, ${fixed(m.damping_percent, 2)} %`), ...(who ? [make("p", {}, who)] : []),
-    make("h3", {}, "Shape "), make("label", {}, moving, " move (slowed to 1 Hz at most)"), shape,
+    make("h3", {}, "Shape "), ...swings,
     ...bars("Participation by component", Object.entries(m.components).slice(0, 6)),
     ...bars("Participation by state", m.participation.slice(0, 8).map(p => [p.state, p.factor])));
 }
