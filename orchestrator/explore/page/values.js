@@ -90,7 +90,7 @@ function paintControls() {
 // Where the least damped mode of the range reaches so many percent: outwards from the value in steps, then by halves.
 // `valuesAt` makes the case's values from one number, `apply` sets what was found.
 function finder(now, low, high, valuesAt, apply, words) {
-  const wanted = make("input", { type: "text", value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find");
+  const wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find");
   const search = async () => {
     const percent = Number(wanted.value.replace(",", ".")), error = make("span"), tried = [];
     if (!(percent > -100 && percent < 100)) { said.textContent = "give a damping in percent"; return; }
