@@ -145,13 +145,13 @@ async function begin() {
     });
   }
   beginStudy();
-  if (seen.beginning.recorded && !location.hash) state.tab = "response";
+  if (seen.beginning.recorded && !SAVED && !location.hash) state.tab = "response";
   openTab(TABS.includes(state.tab) && !$(`tab-${state.tab}`).hidden ? state.tab : "map");
   paintControls(); paintChosen(); paintPlots(); paintPin();
   const opened = await ask("case", { ask: "open" });
   if (!opened) { $("verdict").textContent = ""; return; }
   seen.titles = opened.scenarios;
-  $("title").textContent = opened.title;
+  $("title").textContent = $("title").title = opened.title;
   document.title = `${opened.case}: gfor explore`;
   if (!(state.scenario in opened.scenarios)) state.scenario = seen.beginning.scenario;
   $("scenario").replaceChildren(...Object.entries(opened.scenarios).map(([name, title]) => make("option", { value: name }, `${name}: ${title}`)));
@@ -162,6 +162,6 @@ async function begin() {
     seen.pinned = was; paintPin();
   }
   await compute();
-  if (seen.beginning.recorded) await recordedSignals();
+  if (seen.beginning.recorded && !SAVED) await recordedSignals();
 }
 begin();

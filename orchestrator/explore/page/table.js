@@ -27,7 +27,7 @@ function highlight(k) {
 function paintTable() {
   const partners = pinnedPartners(), estimated = seen.estimate;
   const columns = [...COLUMNS];
-  if (seen.pinned) columns.splice(2, 0, ["Δf from A", (m, k) => (partners[k] ? m.frequency_hz - partners[k].frequency_hz : -Infinity), (m, k) => (partners[k] ? fixed(m.frequency_hz - partners[k].frequency_hz, 4) : "–")],
+  if (seen.pinned) columns.splice(2, 1, ["Δf from A", (m, k) => (partners[k] ? m.frequency_hz - partners[k].frequency_hz : -Infinity), (m, k) => (partners[k] ? fixed(m.frequency_hz - partners[k].frequency_hz, 4) : "–")],
     ["Δdamping", (m, k) => (partners[k] ? m.damping_percent - partners[k].damping_percent : -Infinity), (m, k) => (partners[k] ? fixed(m.damping_percent - partners[k].damping_percent, 2) : "–")]);
   const table = $("table"), focused = document.activeElement?.closest?.("#table tr")?.dataset.mode;
   table.tHead.rows[0].replaceChildren(...columns.map(([name], k) => {
@@ -77,7 +77,7 @@ function paintChosen() {
     shape.replaceChildren(draw("circle", { class: "ray", cx: 0, cy: 0, r: 90 }), draw("path", { class: "grid", d: "M-95 0H95M0 -95V95" }),
       ...m.shape.filter(s => s.magnitude > 0.02 * largest).flatMap((s, k) => {
         const a = s.angle_deg * Math.PI / 180 + turn, r = 90 * s.magnitude / largest, x = r * Math.cos(a), y = -r * Math.sin(a);
-        tips.push({ x, y, r: 5, words: [s.state.split(".")[0]], size: r });
+        tips.push({ x, y, r: 5, first: [Math.cos(a), -Math.sin(a)], words: [s.state.split(".")[0]], size: r });
         return [draw("path", { class: "arrow", stroke: COLOURS[k % COLOURS.length], d: arrow(0, 0, x, y) })];
       }), ...placedTexts(tips.sort((a, b) => b.size - a.size), [], 12));
   };

@@ -131,7 +131,7 @@ function finder(now, low, high, valuesAt, apply, words) {
     await apply(+good.x.toPrecision(6), text);
   };
   begin.addEventListener("click", search);
-  return make("div", {}, make("label", {}, "least damped at ", wanted, " % "), begin, said);
+  return make("div", { class: "finder" }, make("label", {}, "least damped at ", wanted, " % "), begin, said);
 }
 
 async function setValue(name, value, place = null) {
