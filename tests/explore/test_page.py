@@ -303,10 +303,10 @@ def test_a_value_with_a_wanted_damping_is_found(view, capsys):
 @needs_chromium
 def test_rows_of_a_certificate_show_their_limits(browser, issued):
     found = opened_folder(str(issued("fingrid")))
-    study = found.beginning["study"]
+    study = found[2]["study"]
     study["columns"][0]["name"] = "<img src=x onerror=alert(1)>"
     explorer = Explorer(
-        found.word, {"scenario": found.case.scenarios[-1], "values": {}, "range": [0.1, 2.0], "study": study}
+        found[0], {"scenario": found[1].scenarios[-1], "values": {}, "range": [0.1, 2.0], "study": study}
     )
     threading.Thread(target=explorer.serve, daemon=True).start()
     with opened(browser, explorer.address) as view:
