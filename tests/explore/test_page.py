@@ -215,6 +215,10 @@ def test_a_click_on_the_diagram_takes_a_unit_out_and_makes_a_line_longer(view, c
     content = of_command(view, capsys)
     assert view.evaluate("state.values['grid.X_L']") > 0.1
     assert view.evaluate("seen.modes") == content["modes"]
+    view.locator('#element input[size="3"]').fill("20")
+    view.locator("#element button", has_text="find").click()
+    view.locator("#element [role=status]", has_text="at length ×").wait_for()
+    assert 20 <= min(m["damping_percent"] for m in of_command(view, capsys)["modes"]) < 20.2
 
 
 @needs_chromium
@@ -321,7 +325,7 @@ def test_rows_of_a_certificate_show_their_limits(browser, issued):
 
 @needs_chromium
 def test_ten_thousand_drags_leave_the_memory_flat(view, two_area):
-    from tests.explore.speed import dragged  # noqa: PLC0415 - it imports this module
+    from tests.benchmarks.explorer import dragged  # noqa: PLC0415 - it imports this module
 
     add(view, "gfor.pod_p.K").locator('input[type="range"]').focus()
     view.wait_for_function("() => seen.slopes[slopeKey(state.controls[0])]")

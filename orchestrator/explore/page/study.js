@@ -13,7 +13,7 @@ function followedPaths() {
 }
 function sizeOfCells() {
   const s = study(), wide = Math.max(300, $("panel-study").clientWidth - 20);
-  LEFT = Math.min(wide / 2, 12 + 6.4 * Math.max(8, ...s.rows.map(row => row.name.length)));
+  LEFT = Math.min(wide / 2, 14 + 7.4 * Math.max(8, ...s.rows.map(row => row.name.length)));
   return { w: Math.max(3, Math.min(96, (wide - LEFT) / s.columns.length)), h: Math.max(7, Math.min(30, 460 / s.rows.length)) };
 }
 function colourOf(cell) {

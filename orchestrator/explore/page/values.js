@@ -96,7 +96,8 @@ function finder(now, low, high, valuesAt, apply, words) {
     if (!(percent > -100 && percent < 100)) { said.textContent = "give a damping in percent"; return; }
     const above = async x => {
       said.textContent = `${words} ${number(x)} …`;
-      const found = await ask("search", { ask: "modes", ...theCase(), values: { ...state.values, ...valuesAt(x) }, range: state.range }, error);
+      const values = Object.fromEntries(Object.entries({ ...state.values, ...valuesAt(x) }).filter(([, value]) => value !== null));
+      const found = await ask("search", { ask: "modes", ...theCase(), values, range: state.range }, error);
       if (!found) return found;
       const one = found.modes.scenarios[0], least = Math.min(100, ...one.modes.map(m => m.damping_percent));
       tried.push({ x, f: (one.stable === false ? Math.min(least, -1e-9) : least) - percent });
