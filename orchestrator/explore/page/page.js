@@ -2,18 +2,18 @@
 // What happens when: the page is opened, a value is set, a button pressed.
 const TABS = ["map", "network", "response", "study"];
 
-// The exact modes of the state; `place` is where a refusal is said.
+// The exact modes of the state, and whether they are there; `place` is where a refusal is said.
 async function compute(place = null) {
   const begin = performance.now(), asked = copyOf({ ask: "modes", ...theCase(), range: state.range });
   failed("");
   document.querySelectorAll(".control .error").forEach(one => { one.textContent = ""; });
   const found = await ask("modes", asked, place);
-  if (found === undefined) return;
+  if (found === undefined) return false;
   if (found === null) {  // the figures, the address and the copies stay those of the values before
     if (seen.computed) { Object.assign(state, copyOf(seen.computed)); $("scenario").value = state.scenario; keepState(); }
     seen.estimate = null;
     if (seen.answer) { paintVerdict(); paintMap(); paintTable(); }
-    return;
+    return false;
   }
   seen.computed = { scenario: asked.scenario, values: asked.values, events: asked.events, range: asked.range };
   const before = seen.modes, after = found.modes.scenarios[0].modes;
@@ -31,6 +31,7 @@ async function compute(place = null) {
   keepState();
   painted(begin, "exact");
   if (seen.infoOf !== state.scenario) await loadInfo();
+  return true;
 }
 function paintVerdict() {
   const one = seen.answer.modes.scenarios[0];

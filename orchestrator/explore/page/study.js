@@ -78,9 +78,9 @@ async function openCell(at) {
   $("scenario").value = scenario;
   $("low").value = s.range[0]; $("high").value = s.range[1];
   keepState(); paintControls();
-  await compute($("study-said"));
+  if (!await compute($("study-said"))) return;
   const least = [...seen.modes].sort((a, b) => a.damping_percent - b.damping_percent)[0];
-  if (same(state.values, seen.computed?.values) && least) $("study-said").textContent = `Open now: ${saidOf(at)}. Live, least damped: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} %.`;
+  if (least) $("study-said").textContent = `Open now: ${saidOf(at)}. Live, least damped: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} %.`;
 }
 // A certificate's row: its response in its limits.
 function showPictures(at) {
