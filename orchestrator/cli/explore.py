@@ -47,8 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Serve the page until it was closed for a minute, or Ctrl-C."""
-    found = opened(options.case, trust_fmus=options.trust_fmus)
-    word, case, kind = found.word, found.case, found.beginning
+    word, case, kind = opened(options.case, trust_fmus=options.trust_fmus)
     if "study" in kind and (options.set or options.range != ELECTROMECHANICAL_HZ or options.save):
         raise InputError(f"{options.case}: a study has its own values and range, and is not saved as a page; --set, "
                          "--range and --save go with a case")  # fmt: skip
@@ -57,12 +56,10 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--scenario: there is no scenario {name!r}; the case has: {', '.join(case.scenarios)}")
     values = kind.get("values", {}) | values_set(options)
     beginning = {"case": case.name, "range": list(options.range)} | kind | {"scenario": name, "values": values}
-    recorded = dict(found.recorded)
     if options.beside is not None:
         with saying_warnings():
             open_trajectory(options.beside)  # what cannot be read is refused here
-        recorded = {"": str(options.beside)}
-        beginning["recorded"] = [""]
+        beginning["recorded"] = {"": str(options.beside)}
     if options.save is not None:
         desk = Desk(word, options.trust_fmus)
         with shown_progress("Points", shown=True) as report, catch_warnings():
@@ -72,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.vary:
         raise InputError("--vary is for a page that is saved; give --save FILE.html as well, or drag the slider")
-    explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus, recorded=recorded)
+    explorer = Explorer(word, beginning, port=options.port, trust_fmus=options.trust_fmus)
     print(f"{explorer.address}  (ends by Ctrl-C, or a minute after its last page was closed)", flush=True)
     if not options.no_browser:
         webbrowser.open(explorer.address)

@@ -17,6 +17,7 @@ from orchestrator.certification.margins import margin_text
 from orchestrator.certification.matrix_record import MATRIX_JSON
 from orchestrator.certification.rebuilt import rebuilt
 from orchestrator.certification.report_criteria import response_curves
+from orchestrator.certification.study import Certification
 from orchestrator.certification.verification import read_certificate, verify_files
 from orchestrator.errors import InputError
 from orchestrator.report.html.charts import ChartCurve, thinned
@@ -72,7 +73,7 @@ def _rows(certificate: Certificate[Any]) -> Iterator[tuple[str, str, dict[str, A
         else:
             name, bench, said = f"X_L = {verdict.X_L:g} pu", CASE, list(verdict.faults)
             said += [f"{m.criterion}: {m.text} (margin {margin_text(m.margin)})" for m in verdict.margins()]
-            if verdict.time is not None:
+            if isinstance(certificate, Certification) and verdict.time is not None:
                 pictures = [(*response_curves(certificate, verdict, verdict.time), verdict.time.swings.reason)]
         said += [f"not judged: {verdict.unknown}"] if verdict.unknown else []
         yield name, bench, {

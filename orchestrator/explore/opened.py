@@ -1,8 +1,6 @@
 """What `gfor explore` is given: a case, or a folder of results with the case behind it."""
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +13,9 @@ from orchestrator.results.comtrade.reading import is_comtrade
 from orchestrator.results.csv_recording import SUFFIXES
 from orchestrator.results.recording import TRAJECTORY
 
-
-@dataclass(frozen=True)
-class Opened:
-    """``word`` opens the case; ``beginning`` is what the page begins with, where that is not as always."""
-
-    word: str
-    case: Case
-    beginning: dict[str, Any] = field(default_factory=dict)
-    recorded: Mapping[str, str] = field(default_factory=dict)  # by scenario; "" for each that has none of its own
+Opened = tuple[str, Case, dict[str, Any]]
+"""A word that opens the case, the case, and what the page begins with where that is not as always: ``recorded`` in it
+is a file or folder by scenario, "" for each that has none of its own."""
 
 
 def opened(given: str, *, trust_fmus: bool = False) -> Opened:
@@ -36,16 +28,16 @@ def opened(given: str, *, trust_fmus: bool = False) -> Opened:
     file = path if path.name in CERTIFICATES else next((path / n for n in CERTIFICATES if (path / n).is_file()), None)
     if file is not None and not (path / CELLS).is_file():
         word, study = certified(file)
-        return Opened(word, load(word, trust_fmus=trust_fmus), {"study": study})
+        return word, load(word, trust_fmus=trust_fmus), {"study": study}
     if path.is_dir():
         study = read_cells(path)
         case = load(study["case"], trust_fmus=trust_fmus)
         check_case(study, case.file, path)
         kept = {key: study.get(key) for key in ("scenario", "step", "values", "range")}
-        return Opened(study["case"], case, {"study": study, **kept})
+        return study["case"], case, {"study": study, **kept}
     if is_comtrade(path) or path.suffix.lower() in SUFFIXES:
         raise InputError(f"{given}: a recording is shown beside a simulation: gfor explore CASE --beside {given}")
-    return Opened(given, load(given, trust_fmus=trust_fmus))
+    return given, load(given, trust_fmus=trust_fmus), {}
 
 
 def _of_run(folder: Path, trust_fmus: bool, scenario: str = "") -> Opened:
@@ -55,14 +47,16 @@ def _of_run(folder: Path, trust_fmus: bool, scenario: str = "") -> Opened:
         word, given = str(found_from(summary["case_file"], folder)), summary["given"]
         recorded = {name: str(folder / name) for name in given if (folder / name / TRAJECTORY).is_file()}
         name = scenario or next(reversed(recorded))
-        wanted = dict(given[name])
+        wanted, text = dict(given[name]), (folder / "case.toml").read_text(encoding="utf-8")
+        (step,) = (one["step_size_s"] for one in summary["scenarios"] if one["name"] == name)
     except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
         raise InputError(f"{folder / SUMMARY}: it does not tell which case was run, and how ({error!r}); run it again "
                          "with `gfor run`, or give the case and --beside FOLDER/SCENARIO") from error  # fmt: skip
     case = load(word, trust_fmus=trust_fmus)
-    if (folder / "case.toml").read_text(encoding="utf-8") != case.file.text:
+    if text != case.file.text:
         raise InputError(f"{word} is not as it was when {folder} was made; run it again, or give the case and --beside "
                          f"{folder / name}")  # fmt: skip
-    own = case.scenario(name).prepared.given
-    values = {key: value for key, value in wanted.items() if own.get(key) != value}
-    return Opened(word, case, {"scenario": name, "values": values, "recorded": list(recorded)}, recorded)
+    own = case.scenario(name).prepared
+    values = {key: value for key, value in wanted.items() if own.given.get(key) != value}
+    beginning = {"scenario": name, "values": values, "recorded": recorded}
+    return word, case, beginning if step == own.step_size else beginning | {"step": step}

@@ -98,6 +98,7 @@ def simulated(scenario: Scenario, wanted: Sequence[str], say: Say) -> dict[str, 
     return {
         "folder": str(folder),
         "curves": curves(run.dataset, names),
+        "answer": run.summary()["answer"],
         "findings": [finding.message for finding in run.findings],
         "ended_early": None if run.failure is None else str(run.failure),
         "ring_down": None if run.ring_down is None else {
@@ -120,8 +121,8 @@ def recorded(place: str, scenario: Scenario, wanted: Sequence[str]) -> dict[str,
         were, live = json.loads(told["values"]), prepared.values
         differs = [f"{name} was {were.get(name, 'not set')}, is {live.get(name, 'not set')}"
                    for name in {**were, **live} if not _equal(were.get(name), live.get(name))]  # fmt: skip
-        if (events := "; ".join(map(str, prepared.events))) != told.get("events", events):
-            differs.append(f"events were: {told['events'] or 'none'}")
+        now = {"events": "; ".join(map(str, prepared.events)), "step_size_s": prepared.step_size}
+        differs += [f"{key}: {told.get(key) or 'none'}" for key, value in now.items() if told.get(key) != value]
     return {"curves": drawn or curves(dataset, names[:_FEW]), "names": names, "differs": differs, "of": place}
 
 

@@ -5,7 +5,6 @@ import queue
 import secrets
 import threading
 import time
-from collections.abc import Mapping
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -27,11 +26,10 @@ class Explorer:
     ``beginning``: what the page begins with, as JSON's types."""
 
     def __init__(
-        self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER,
-        recorded: Mapping[str, str] | None = None,
-    ) -> None:  # fmt: skip
+        self, case: str, beginning: Answer, *, port: int = 0, trust_fmus: bool = False, linger: float = LINGER
+    ) -> None:
         self.beginning, self.token = beginning, secrets.token_urlsafe(24)
-        kinds = ("modes", "slopes", "run")
+        kinds, recorded = ("modes", "slopes", "run"), beginning.get("recorded")
         self.computing = {kind: Computing(case, trust_fmus=trust_fmus, recorded=recorded) for kind in kinds}
         self._linger = linger
         self._pages: dict[str, queue.SimpleQueue[Answer]] = {}

@@ -196,6 +196,7 @@ class Linearised:
 
     def _at_gains(self, gains: Mapping[str, float]) -> LinearModel:
         """The model with other values of parameters that leave the operating point where it is."""
+        gains = {n: gain for n, gain in gains.items() if n.partition(".")[0] in self._master.components}  # in service
         before = {name: _value(self._prepared, name) for name in gains}
         blocks = self._blocks
         with changed(self._master, gains, before):

@@ -14,6 +14,8 @@ PLACE = Path(__file__).parents[2] / ".docs" / "how-to" / "pictures"
 
 
 def taken(view, name):
+    view.wait_for_function("() => !atWork.size")
+    view.evaluate("() => { seen.timing.text = ''; tick(); }")  # how busy this machine was
     picture = Image.open(io.BytesIO(view.screenshot())).convert("RGB").quantize(96)
     picture.save(PLACE / f"{name}.png", optimize=True)
 

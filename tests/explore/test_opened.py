@@ -28,21 +28,25 @@ def run(tmp_path_factory):
 
 
 def recorded(found, signals, values=None, scenario="dip"):
-    desk = Desk(found.word, False, found.recorded)
-    values = found.beginning.get("values", {}) if values is None else values
+    desk = Desk(found[0], False, found[2]["recorded"])
+    values = found[2].get("values", {}) if values is None else values
     return desk.answer({"ask": "recorded", "scenario": scenario, "values": values, "signals": signals}, print)
 
 
 @pytest.mark.parametrize("place", ["results", "results/dip", "results/dip/trajectory.nc"])
 def test_a_run_opens_with_its_case_values_and_signals(run, place):
     found = opened(str(run / place))
-    assert (found.word, found.beginning["values"]) == (str(run / "own.toml"), {"gfor.P_0": 0.5})
+    assert (found[0], found[2]["values"]) == (str(run / "own.toml"), {"gfor.P_0": 0.5})
     answer = recorded(found, ["gfor.p"])
     times, values = answer["curves"]["gfor.p"]
     kept = gfor.open(run / "results")["dip/trajectory.nc"]["gfor.p"]
     assert (min(values), max(values), times[-1]) == (float(kept.min()), float(kept.max()), float(kept["time"][-1]))
     assert answer["differs"] == []
     assert recorded(found, ["gfor.p"], {"gfor.P_0": 0.4})["differs"] == ["gfor.P_0 was 0.5, is 0.4"]
+    other = Desk("infinite_bus", False, found[2]["recorded"])
+    question = {"ask": "recorded", "scenario": "dip", "values": {"gfor.P_0": 0.5}, "signals": [], "step": 5e-5}
+    differs = other.answer(question | {"events": []}, print)["differs"]
+    assert [text.split(":")[0] for text in differs] == ["events", "step_size_s"]
     with pytest.raises(InputError, match="nothing was recorded of scenario 'load_step'"):
         recorded(found, [], scenario="load_step")
 
@@ -80,7 +84,7 @@ def test_a_recording_goes_beside_a_case(tmp_path, capsys):
 def test_rows_of_a_certificate_open_with_their_limits(issued, name):
     folder = issued(name)
     found = opened(str(folder))
-    study = found.beginning["study"]
+    study = found[2]["study"]
     content = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
     assert study["title"] == content["sentence"]
     if name == "fingrid":
@@ -95,7 +99,7 @@ def test_rows_of_a_certificate_open_with_their_limits(issued, name):
         {"code": "x", "device": device, "certificate": f"{name}/certificate.json"} for device in ("a", "<b>")
     ]}  # fmt: skip
     (folder.parent / "matrix.json").write_text(json.dumps(matrix), encoding="utf-8")
-    both = opened(str(folder.parent)).beginning["study"]
+    both = opened(str(folder.parent))[2]["study"]
     assert [column["name"] for column in both["columns"]] == ["a", "<b>"]
     assert [row[0] for row in both["cells"]] == [row[1] for row in both["cells"]] == [row[0] for row in study["cells"]]
 
@@ -108,3 +112,8 @@ def test_a_certificate_that_does_not_hold_is_refused(issued, change):
     forged(folder, content)
     with pytest.raises(InputError, match="does not hold"):
         opened(str(folder))
+
+
+def test_a_run_of_another_step_opens_with_it(tmp_path):
+    gfor.load("infinite_bus").scenario("dip", step=5e-5).run(stop=0.01).save(tmp_path)
+    assert opened(str(tmp_path))[2]["step"] == 5e-5

@@ -12,7 +12,11 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cli import main
+from orchestrator.explore.opened import opened as opened_folder
 from orchestrator.explore.server import Explorer
+from tests.certification.test_issued import issued
+
+__all__ = ["issued"]
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +33,7 @@ def browser():
         pytest.skip("needs chromium (Debian: apt-get install chromium)")
     playwright = pytest.importorskip("playwright.sync_api")
     with playwright.sync_playwright() as tools:
-        found = tools.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        found = tools.chromium.launch(executable_path=CHROMIUM, args=[*OPTIONS, "--js-flags=--expose-gc"])
         yield found
         found.close()
 
@@ -211,6 +215,10 @@ def test_a_click_on_the_diagram_takes_a_unit_out_and_makes_a_line_longer(view, c
     content = of_command(view, capsys)
     assert view.evaluate("state.values['grid.X_L']") > 0.1
     assert view.evaluate("seen.modes") == content["modes"]
+    view.locator('#element input[size="3"]').fill("20")
+    view.locator("#element button", has_text="find").click()
+    view.locator("#element [role=status]", has_text="at length ×").wait_for()
+    assert 20 <= min(m["damping_percent"] for m in of_command(view, capsys)["modes"]) < 20.2
 
 
 @needs_chromium
@@ -279,3 +287,50 @@ def test_a_saved_page_moves_without_a_server(browser, tmp_path, capsys):
         content = json.loads(out[out.index("{") :])["scenarios"][0]
         assert [row[:2] for row in rows(view)] == shown(content["modes"])
         assert view.locator("#run").is_disabled()
+
+
+@needs_chromium
+def test_a_value_with_a_wanted_damping_is_found(view, capsys):
+    control = add(view, "gfor.pod_p.K")
+    control.locator('input[size="3"]').fill("20")
+    control.locator("button", has_text="find").click()
+    control.locator("[role=status]", has_text="beyond").wait_for()
+    content = of_command(view, capsys)
+    least = min(mode["damping_percent"] for mode in content["modes"])
+    assert 20 <= least < 20.2
+    assert f"{least:.2f} % at K" in control.locator("[role=status]").inner_text()
+    control.locator('input[size="3"]').fill("99")
+    control.locator("button", has_text="find").click()
+    control.locator("[role=status]", has_text="not reached at 11 values").wait_for()
+
+
+@needs_chromium
+def test_rows_of_a_certificate_show_their_limits(browser, issued):
+    found = opened_folder(str(issued("fingrid")))
+    study = found[2]["study"]
+    study["columns"][0]["name"] = "<img src=x onerror=alert(1)>"
+    explorer = Explorer(
+        found[0], {"scenario": found[1].scenarios[-1], "values": {}, "range": [0.1, 2.0], "study": study}
+    )
+    threading.Thread(target=explorer.serve, daemon=True).start()
+    with opened(browser, explorer.address) as view:
+        view.locator("#cells").focus()
+        view.keyboard.press("Enter")
+        view.locator("#study-plots .curve.limit").first.wait_for(state="attached")
+        assert view.locator("#study-plots .curve:not(.limit)").count() >= 1
+        assert study["cells"][0][0]["text"].split("\n")[0] in view.locator("#study-said").inner_text()
+        assert view.locator("img").count() == 0
+    explorer.close()
+
+
+@needs_chromium
+def test_ten_thousand_drags_leave_the_memory_flat(view, two_area):
+    from tests.benchmarks.explorer import dragged  # noqa: PLC0415 - it imports this module
+
+    add(view, "gfor.pod_p.K").locator('input[type="range"]').focus()
+    view.wait_for_function("() => seen.slopes[slopeKey(state.controls[0])]")
+    worker = two_area.computing["modes"]._process.pid
+    dragged(view, worker, 500)
+    before, after = dragged(view, worker)
+    assert after[0] - before[0] < 2  # [MB]
+    assert after[1] - before[1] < 2

@@ -158,3 +158,25 @@ def test_a_click_on_a_cell_opens_it_and_faults_places_and_scenario_are_kept(
     assert any("bus_7" in str(event) for event in saved.prepared.events)
     assert "bus_7" in saved.prepared.case.table.diagram.positions
     assert shown(saved.modes().as_json()["scenarios"][0]["modes"]) == shown(content["modes"])
+
+
+@pytest.mark.slow
+def test_a_converter_with_a_pod_can_be_out():
+    """Modes are named with all PODs at rest; one that is out of service has no instance to be set."""
+    values = {f"grid.{unit}.connected": False for unit in ("gfor1", "sg1")}
+    values |= {"sg2.P_0": 1.030949925781284, "sg3.P_0": 1.0521636820326883, "sg4.P_0": 1.030949925781284}
+    modes = gfor.load("kundur").scenario("pod_p", values).modes()
+    assert min(mode.damping_percent for mode in modes) == pytest.approx(-4.95, abs=0.01)
+
+
+@needs_chromium
+@pytest.mark.slow
+@pytest.mark.parametrize("screened", ["slack"], indirect=True)
+def test_a_cell_that_cannot_be_opened_has_no_live_figure(browser, screened):
+    folder, _ = screened
+    with served(folder) as explorer, opened(browser, explorer.address) as view:
+        view.evaluate("() => { study().values['gfor3.droop.R_f'] = -1; }")
+        view.locator("#cells").focus()
+        view.keyboard.press("Enter")
+        view.locator("#study-said", has_text="R_f").wait_for()
+        assert "Live" not in view.locator("#study-said").inner_text()

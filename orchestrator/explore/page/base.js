@@ -47,9 +47,10 @@ function hideTip() { $("tip").hidden = true; }
 function placedTexts(labels, taken, size, inside = { x0: -Infinity, y0: -Infinity, x1: Infinity, y1: Infinity }) {
   const boxes = [...taken], texts = [];
   const free = b => b.x0 >= inside.x0 && b.x1 <= inside.x1 && b.y0 >= inside.y0 && b.y1 <= inside.y1 && !boxes.some(o => o.x0 < b.x1 && b.x0 < o.x1 && o.y0 < b.y1 && b.y0 < o.y1);
-  for (const { x, y, r, words, look } of labels) {
-    const spots = words.flatMap(text => [[1, 0], [-1, 0], [0, 1], [0, -1], [0.7, 0.7], [0.7, -0.7], [-0.7, 0.7], [-0.7, -0.7]].map(([dx, dy]) => {
-      const w = 0.6 * size * text.length, x0 = x + dx * r - (dx > 0 ? 0 : dx < 0 ? w : w / 2), y0 = y + dy * (r + size / 2) - size / 2;
+  const ways = [[0.7, 0.7], [0.7, -0.7], [-0.7, 0.7], [-0.7, -0.7], [1, 0], [-1, 0], [0, 1], [0, -1]];
+  for (const { x, y, r, words, look, first } of labels) {
+    const spots = words.flatMap(text => [...(first ? [first] : []), ...ways].map(([dx, dy]) => {
+      const w = 0.6 * size * text.length, x0 = x + dx * r - (dx > 0.3 ? 0 : dx < -0.3 ? w : w / 2), y0 = y + dy * (r + size / 2) - size / 2;
       return { text, x0, y0, x1: x0 + w, y1: y0 + size };
     }));
     const at = spots.find(free);

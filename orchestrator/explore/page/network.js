@@ -161,7 +161,13 @@ function paintElement() {
     if (line.open) parts.push(onOff(line.open, "closed"));
     if (line.length && parameterOf(line.length)) {
       const now = (state.values[line.length] ?? original(line.length)) / original(line.length);
-      parts.push(times("Length, times the case's", now, 0.2, 5, factor => setOnes(Object.fromEntries([line.length, line.resistance, line.charging].filter(n => n && parameterOf(n) && original(n)).map(n => [n, factor === 1 ? null : original(n) * factor])), error)));
+      const scaled = factor => Object.fromEntries([line.length, line.resistance, line.charging].filter(n => n && parameterOf(n) && original(n)).map(n => [n, factor === 1 ? null : original(n) * factor]));
+      parts.push(times("Length, times the case's", now, 0.2, 5, factor => setOnes(scaled(factor), error)));
+      if (!SAVED) parts.push(finder(now, 0.2, 5, scaled, async (factor, text) => {
+        await setOnes(scaled(factor), error);
+        paintElement();
+        $("element").querySelector("[role=status]").textContent = text;
+      }, "length ×"));
     }
     parts.push(happens("It opens", 0, "", 0, () => ({ type: "line_trip", line: element.name })));
   } else if (element.kind === "load") {

@@ -2,18 +2,18 @@
 // What happens when: the page is opened, a value is set, a button pressed.
 const TABS = ["map", "network", "response", "study"];
 
-// The exact modes of the state; `place` is where a refusal is said.
+// The exact modes of the state, and whether they are there; `place` is where a refusal is said.
 async function compute(place = null) {
   const begin = performance.now(), asked = copyOf({ ask: "modes", ...theCase(), range: state.range });
   failed("");
   document.querySelectorAll(".control .error").forEach(one => { one.textContent = ""; });
   const found = await ask("modes", asked, place);
-  if (found === undefined) return;
+  if (found === undefined) return false;
   if (found === null) {  // the figures, the address and the copies stay those of the values before
     if (seen.computed) { Object.assign(state, copyOf(seen.computed)); $("scenario").value = state.scenario; keepState(); }
     seen.estimate = null;
     if (seen.answer) { paintVerdict(); paintMap(); paintTable(); }
-    return;
+    return false;
   }
   seen.computed = { scenario: asked.scenario, values: asked.values, events: asked.events, range: asked.range };
   const before = seen.modes, after = found.modes.scenarios[0].modes;
@@ -31,6 +31,7 @@ async function compute(place = null) {
   keepState();
   painted(begin, "exact");
   if (seen.infoOf !== state.scenario) await loadInfo();
+  return true;
 }
 function paintVerdict() {
   const one = seen.answer.modes.scenarios[0];
@@ -145,13 +146,13 @@ async function begin() {
     });
   }
   beginStudy();
-  if (seen.beginning.recorded && !location.hash) state.tab = "response";
+  if (seen.beginning.recorded && !SAVED && !location.hash) state.tab = "response";
   openTab(TABS.includes(state.tab) && !$(`tab-${state.tab}`).hidden ? state.tab : "map");
   paintControls(); paintChosen(); paintPlots(); paintPin();
   const opened = await ask("case", { ask: "open" });
   if (!opened) { $("verdict").textContent = ""; return; }
   seen.titles = opened.scenarios;
-  $("title").textContent = opened.title;
+  $("title").textContent = $("title").title = opened.title;
   document.title = `${opened.case}: gfor explore`;
   if (!(state.scenario in opened.scenarios)) state.scenario = seen.beginning.scenario;
   $("scenario").replaceChildren(...Object.entries(opened.scenarios).map(([name, title]) => make("option", { value: name }, `${name}: ${title}`)));
@@ -162,6 +163,6 @@ async function begin() {
     seen.pinned = was; paintPin();
   }
   await compute();
-  if (seen.beginning.recorded) await recordedSignals();
+  if (seen.beginning.recorded && !SAVED) await recordedSignals();
 }
 begin();

@@ -66,8 +66,10 @@ async function coSimulation() {
   const found = await ask("co-simulation", { ask: "run", ...theCase(), signals: wantedSignals() }, $("run-said"));
   if (!found) { $("run-said").classList.add("bad"); return; }
   for (const [name, curve] of Object.entries(found.curves)) (seen.curves[name] ??= {}).run = curve;
+  const { verdict, remark } = found.answer;
   const ring = found.ring_down ? `; it rings with ${fixed(found.ring_down.frequency_hz, 4)} Hz, ${fixed(found.ring_down.damping_percent, 2)} %` : "";
-  $("run-said").textContent = `kept in ${found.folder}${ring}${found.ended_early ? `; ended early: ${found.ended_early}` : ""}${found.findings.map(text => `; found: ${text}`).join("")}`;
+  const first = make("b", { class: { true: "good", false: "bad" }[found.answer.stable] }, `${verdict}${remark ? `: ${remark}` : ""}`);
+  $("run-said").replaceChildren(first, `${ring}${found.ended_early ? `; ended early: ${found.ended_early}` : ""}. Kept in ${found.folder}.${found.findings.map(text => `\nfound: ${text}`).join("")}`);
   paintPlots();
 }
 // A part of a run that goes on.

@@ -13,7 +13,7 @@ function followedPaths() {
 }
 function sizeOfCells() {
   const s = study(), wide = Math.max(300, $("panel-study").clientWidth - 20);
-  LEFT = Math.min(wide / 2, 12 + 6.4 * Math.max(8, ...s.rows.map(row => row.name.length)));
+  LEFT = Math.min(wide / 2, 14 + 7.4 * Math.max(8, ...s.rows.map(row => row.name.length)));
   return { w: Math.max(3, Math.min(96, (wide - LEFT) / s.columns.length)), h: Math.max(7, Math.min(30, 460 / s.rows.length)) };
 }
 function colourOf(cell) {
@@ -78,9 +78,9 @@ async function openCell(at) {
   $("scenario").value = scenario;
   $("low").value = s.range[0]; $("high").value = s.range[1];
   keepState(); paintControls();
-  await compute($("study-said"));
+  if (!await compute($("study-said"))) return;
   const least = [...seen.modes].sort((a, b) => a.damping_percent - b.damping_percent)[0];
-  if (same(state.values, seen.computed?.values) && least) $("study-said").textContent = `Open now: ${saidOf(at)}. Live, least damped: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} %.`;
+  if (least) $("study-said").textContent = `Open now: ${saidOf(at)}. Live, least damped: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} %.`;
 }
 // A certificate's row: its response in its limits.
 function showPictures(at) {

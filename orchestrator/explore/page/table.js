@@ -27,7 +27,7 @@ function highlight(k) {
 function paintTable() {
   const partners = pinnedPartners(), estimated = seen.estimate;
   const columns = [...COLUMNS];
-  if (seen.pinned) columns.splice(2, 0, ["Δf from A", (m, k) => (partners[k] ? m.frequency_hz - partners[k].frequency_hz : -Infinity), (m, k) => (partners[k] ? fixed(m.frequency_hz - partners[k].frequency_hz, 4) : "–")],
+  if (seen.pinned) columns.splice(2, 1, ["Δf from A", (m, k) => (partners[k] ? m.frequency_hz - partners[k].frequency_hz : -Infinity), (m, k) => (partners[k] ? fixed(m.frequency_hz - partners[k].frequency_hz, 4) : "–")],
     ["Δdamping", (m, k) => (partners[k] ? m.damping_percent - partners[k].damping_percent : -Infinity), (m, k) => (partners[k] ? fixed(m.damping_percent - partners[k].damping_percent, 2) : "–")]);
   const table = $("table"), focused = document.activeElement?.closest?.("#table tr")?.dataset.mode;
   table.tHead.rows[0].replaceChildren(...columns.map(([name], k) => {
@@ -77,16 +77,17 @@ function paintChosen() {
     shape.replaceChildren(draw("circle", { class: "ray", cx: 0, cy: 0, r: 90 }), draw("path", { class: "grid", d: "M-95 0H95M0 -95V95" }),
       ...m.shape.filter(s => s.magnitude > 0.02 * largest).flatMap((s, k) => {
         const a = s.angle_deg * Math.PI / 180 + turn, r = 90 * s.magnitude / largest, x = r * Math.cos(a), y = -r * Math.sin(a);
-        tips.push({ x, y, r: 5, words: [s.state.split(".")[0]], size: r });
+        tips.push({ x, y, r: 5, first: [Math.cos(a), -Math.sin(a)], words: [s.state.split(".")[0]], size: r });
         return [draw("path", { class: "arrow", stroke: COLOURS[k % COLOURS.length], d: arrow(0, 0, x, y) })];
       }), ...placedTexts(tips.sort((a, b) => b.size - a.size), [], 12));
   };
   const animate = () => { paint(performance.now() / 1000 * 2 * Math.PI * Math.min(1, m.frequency_hz)); paintArrows(Math.cos(performance.now() / 1000 * 2 * Math.PI * Math.min(1, m.frequency_hz))); turning = requestAnimationFrame(animate); };
   moving.addEventListener("change", () => { cancelAnimationFrame(turning); if (moving.checked) animate(); else { paint(0); paintArrows(1); } });
   paint(0);
+  const swings = m.shape.length ? [make("label", {}, moving, " move (slowed to 1 Hz at most)"), shape] : [make("p", { class: "soft" }, "No machine swings in it.")];
   place.replaceChildren(
     make("h3", {}, `${m.name ?? "Mode"}: ${fixed(m.frequency_hz, 4)} Hz, ${fixed(m.damping_percent, 2)} %`), ...(who ? [make("p", {}, who)] : []),
-    make("h3", {}, "Shape "), make("label", {}, moving, " move (slowed to 1 Hz at most)"), shape,
+    make("h3", {}, "Shape "), ...swings,
     ...bars("Participation by component", Object.entries(m.components).slice(0, 6)),
     ...bars("Participation by state", m.participation.slice(0, 8).map(p => [p.state, p.factor])));
 }

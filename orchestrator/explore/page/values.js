@@ -68,6 +68,14 @@ function paintControls() {
         row.prepend(slider);
       }
       box.append(row);
+      if (p && typeof p.value === "number" && p.type === "Real" && !SAVED) {
+        const scale = scaleOf({ ...p, value: original(name) });
+        box.append(finder(value, scale.low, scale.high, x => ({ [name]: x }), async (x, text) => {
+          await setValue(name, x, error);
+          const status = document.querySelector(`.control[data-name="${CSS.escape(name)}"] [role="status"]`);
+          if (status) status.textContent = text;
+        }, name.split(".").at(-1)));
+      }
     }
     const bounds = p && (p.minimum !== null || p.maximum !== null) ? `, from ${p.minimum === null ? "any" : number(p.minimum)} to ${p.maximum === null ? "any" : number(p.maximum)}` : "";
     box.append(make("small", {}, p ? `${p.description}${p.description ? "; " : ""}${p.variability}${bounds}; ${number(original(name))} in the case` : "this scenario has no such parameter"), error);
@@ -75,6 +83,56 @@ function paintControls() {
     return box;
   }));
   if (focused) document.querySelector(`.control[data-name="${CSS.escape(focused)}"] input[type="${kind === "range" ? "range" : kind === "text" ? "text" : "checkbox"}"]`)?.focus({ preventScroll: true });
+}
+
+// -- a value that is looked for -----------------------------------------------------------------------------------
+
+// Where the least damped mode of the range reaches so many percent: outwards from the value in steps, then by halves.
+// `valuesAt` makes the case's values from one number, `apply` sets what was found.
+function finder(now, low, high, valuesAt, apply, words) {
+  const wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find");
+  const search = async () => {
+    const percent = Number(wanted.value.replace(",", ".")), error = make("span"), tried = [];
+    if (!(percent > -100 && percent < 100)) { said.textContent = "give a damping in percent"; return; }
+    const above = async x => {
+      said.textContent = `${words} ${number(x)} …`;
+      const values = Object.fromEntries(Object.entries({ ...state.values, ...valuesAt(x) }).filter(([, value]) => value !== null));
+      const found = await ask("search", { ask: "modes", ...theCase(), values, range: state.range }, error);
+      if (!found) return found;
+      const one = found.modes.scenarios[0], least = Math.min(100, ...one.modes.map(m => m.damping_percent));
+      tried.push({ x, f: (one.stable === false ? Math.min(least, -1e-9) : least) - percent });
+      return tried.at(-1).f;
+    };
+    const here = await above(now), ends = [{ x: now, f: here, to: high }, { x: now, f: here, to: low }];
+    if (here === undefined || here === null) { said.textContent = error.textContent || "a newer question took its place"; return; }
+    let bracket = null;
+    for (let k = 1; k <= 5 && !bracket; k++) {
+      for (const end of ends.filter(e => !e.refused && e.to !== now)) {
+        const x = now > 0 && low > 0 ? now * (end.to / now) ** (k / 5) : now + (end.to - now) * k / 5, f = await above(x);
+        if (f === undefined) { said.textContent = ""; return; }
+        if (f === null) { end.refused = true; continue; }
+        if (f < 0 !== here < 0) { bracket = [end, { x, f }]; break; }
+        Object.assign(end, { x, f });
+      }
+    }
+    if (!bracket) {
+      const best = tried.reduce((a, b) => (Math.abs(b.f) < Math.abs(a.f) ? b : a));
+      said.textContent = `not reached at ${tried.length} values from ${number(ends[1].x)} to ${number(ends[0].x)}; nearest: ${fixed(best.f + percent, 2)} % at ${number(best.x)}${error.textContent ? `; ${error.textContent}` : ""}`;
+      return;
+    }
+    let [a, b] = bracket;
+    for (let k = 0; k < 20 && Math.abs(b.x - a.x) > 1e-3 * Math.abs(b.x); k++) {
+      const part = Math.min(0.9, Math.max(0.1, a.f / (a.f - b.f))), x = a.x + part * (b.x - a.x), f = await above(x);
+      if (f === undefined || f === null) { said.textContent = error.textContent; return; }
+      if (f < 0 === a.f < 0) a = { x, f }; else b = { x, f };
+      if (Math.abs(f) < 0.005) break;
+    }
+    const good = a.f >= 0 ? a : b;
+    const text = `${fixed(good.f + percent, 2)} % at ${words} ${number(good.x)}; beyond ${number(a.f >= 0 ? b.x : a.x)} it is below ${number(percent)} %`;
+    await apply(+good.x.toPrecision(6), text);
+  };
+  begin.addEventListener("click", search);
+  return make("div", { class: "finder" }, make("label", {}, "least damped at ", wanted, " % "), begin, said);
 }
 
 async function setValue(name, value, place = null) {

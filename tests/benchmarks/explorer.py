@@ -1,4 +1,5 @@
-"""How long the page takes from an input to the painted map: `python -m tests.explore.speed CASE SCENARIO PARAMETER`."""
+"""How long the page takes from an input to the painted map:
+`python -m tests.benchmarks.explorer CASE SCENARIO PARAMETER [TIMES]`."""
 
 import os
 import statistics
@@ -15,8 +16,29 @@ from tests.explore.test_page import CHROMIUM, OPTIONS, add, computed, opened
 DRAGS = 10_000
 
 
+def worked(pid):
+    """Processor time of a process so far [s]."""
+    parts = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(parts[11]) + int(parts[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def resident(pid):
     return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def heap(view):
+    return view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }")
+
+
+def dragged(view, worker, times=DRAGS):
+    """Megabytes of page and worker before and after so many drags of the first slider."""
+    before = heap(view), resident(worker)
+    view.evaluate(
+        "async n => { for (let k = 0; k < n; k++) { estimateAt(state.controls[0], 1 + (k % 100)); "
+        "if (k % 50 === 0) await new Promise(requestAnimationFrame); } }",
+        times,
+    )  # fmt: skip
+    return before, (heap(view), resident(worker))
 
 
 def main(case, scenario, parameter, times=11):
@@ -28,8 +50,9 @@ def main(case, scenario, parameter, times=11):
         with opened(browser, explorer.address) as view:
             print(f"opened after {time.monotonic() - begin:.1f} s")
             slider = add(view, parameter).locator('input[type="range"]')
-            exact, estimate = [], []
-            for count in range(2, times + 2):
+            exact, estimate, busy = [], [], []
+            worker = explorer.computing["modes"]._process.pid
+            for count in range(2, int(times) + 2):
                 slider.focus()
                 view.evaluate("() => wantSlopes(state.controls[0])")
                 while view.evaluate("() => !seen.slopes[slopeKey(state.controls[0])]"):
@@ -40,20 +63,15 @@ def main(case, scenario, parameter, times=11):
                     view.evaluate("x => estimateAt(state.controls[0], x)", part * value)
                     view.wait_for_selector(f'body[data-estimate-count="{int(painted) + 1}"]', state="attached")
                     estimate.append(float(view.locator("body").get_attribute("data-estimate")))
+                before = worked(worker)
                 slider.press("ArrowLeft")
                 computed(view, count)
+                busy.append(1e3 * (worked(worker) - before))
                 exact.append(float(view.locator("body").get_attribute("data-exact")))
-            for name, found in (("exact", exact), ("estimate", estimate)):
+            for name, found in (("exact", exact), ("of them processor time", busy), ("estimate", estimate)):
                 print(f"{name}: median {statistics.median(found):.0f} ms, {min(found):.0f} to {max(found):.0f}")
-            worker = explorer.computing["modes"]._process.pid
-            before = view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }"), resident(worker)
             begin = time.monotonic()
-            view.evaluate(
-                "async n => { for (let k = 0; k < n; k++) { estimateAt(state.controls[0], 1 + (k % 100)); "
-                "if (k % 50 === 0) await new Promise(requestAnimationFrame); } }",
-                DRAGS,
-            )  # fmt: skip
-            after = view.evaluate("() => { gc(); return performance.memory.usedJSHeapSize / 1e6; }"), resident(worker)
+            before, after = dragged(view, worker)
             print(f"{DRAGS} drags in {time.monotonic() - begin:.0f} s: page {before[0]:.1f} to {after[0]:.1f} MB, "
                   f"worker {before[1]:.0f} to {after[1]:.0f} MB")  # fmt: skip
         browser.close()
