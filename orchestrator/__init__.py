@@ -13,13 +13,20 @@ Examples
 from importlib import import_module
 
 _HOMES = {
-    "Case": "api.case", "CosimError": "errors", "LinearSystem": "api.linear", "Modes": "api.results",
-    "ParameterSweep": "sweep.view", "Run": "api.results", "Scenario": "api.scenario", "Screening": "screening.view",
-    "admittance": "api.admittance", "bind": "api.binding", "build": "api.models", "built_in_cases": "api.case",
-    "certify": "api.certification", "check": "api.acceptance", "compare": "api.comparison", "export": "api.export",
-    "export_comtrade": "api.comtrade", "identify": "api.identification", "info": "api.fmu", "load": "api.case",
-    "nyquist": "api.nyquist", "open": "api.saved", "open_fmu": "api.fmu", "read_linear_model": "api.linear",
-    "source": "api.source", "verify": "api.certification",
+    "Acceptance": "api.acceptance", "Admittance": "api.admittance", "Case": "api.case",
+    "ControllerDesign": "pod_design.view", "CoordinatedDesign": "coordinated_design.view", "CosimError": "errors",
+    "Fmu": "api.fmu", "FmuInfo": "api.fmu", "Interactions": "interactions.view",
+    "IssuedCertificate": "api.certification", "LinearSystem": "api.linear", "Modes": "api.results",
+    "Nyquist": "immittance.view", "ParameterSweep": "sweep.view", "Run": "api.results",
+    "RunComparison": "study.signal_modes", "Saved": "api.saved", "Scenario": "api.scenario",
+    "Screening": "screening.view", "Sensitivities": "sensitivities.view", "SignalModes": "study.signal_modes",
+    "Siting": "siting.view", "Sources": "oscillations.view", "StepChoice": "study.step_choice",
+    "Verification": "certification.verification", "admittance": "api.admittance", "bind": "api.binding",
+    "build": "api.models", "built_in_cases": "api.case", "certify": "api.certification", "check": "api.acceptance",
+    "compare": "api.comparison", "export": "api.export", "export_comtrade": "api.comtrade",
+    "identify": "api.identification", "info": "api.fmu", "load": "api.case", "nyquist": "api.nyquist",
+    "open": "api.saved", "open_fmu": "api.fmu", "read_linear_model": "api.linear", "source": "api.source",
+    "verify": "api.certification",
 }  # fmt: skip
 """Name → module of this package that defines it."""
 

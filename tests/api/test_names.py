@@ -16,6 +16,9 @@ NAMES = {
     *("Case", "CosimError", "Modes", "Run", "Scenario", "build", "built_in_cases", "check", "compare", "load"),
     *("admittance", "bind", "certify", "export", "verify"),
     *("LinearSystem", "ParameterSweep", "Screening", "open"),
+    *("Acceptance", "Admittance", "ControllerDesign", "CoordinatedDesign", "Fmu", "FmuInfo", "Interactions"),
+    *("IssuedCertificate", "Nyquist", "RunComparison", "Saved", "Sensitivities", "SignalModes", "Siting", "Sources"),
+    *("StepChoice", "Verification"),
     *("export_comtrade", "identify", "info", "nyquist", "open_fmu", "read_linear_model", "source"),
 }
 
