@@ -5,9 +5,10 @@ import re
 import shutil
 
 import pytest
+import xarray as xr
 
 from orchestrator.errors import InputError
-from orchestrator.report.html.chapters import chapters_of
+from orchestrator.report.html.chapters import chapters_of, of_sweep
 from orchestrator.report.html.page import write_report
 from orchestrator.sweep.limit import Ending, ParameterLimit, Until
 
@@ -190,5 +191,7 @@ def test_the_answer_of_a_search_for_a_limit_is_on_the_page(tmp_path):
     )
     (tmp_path / "limits.json").write_text(json.dumps([limit.as_json()]), encoding="utf-8")
     (chapter,) = chapters_of(tmp_path)
+    swept = xr.Dataset({"damping": ("k", [3.0]), "named": ("k", [1])})
+    assert of_sweep(tmp_path, swept).answer == chapter.answer
     assert (chapter.question, chapter.answer) == ("How far may grid.scr go?", f"base: {limit.sentence}")
     assert "6.87" in chapter.answer
