@@ -145,6 +145,12 @@ def test_figures_that_moved_between_two_folders(folders, tmp_path):
     both = written([folders[1], new], tmp_path, against=folders[1])
     assert "not there" in both[both.index("Answers that differ") :]  # its twin is as it was
     assert "Which operating point and which outage is worst? (inner)" in both
+    written([new, folders[1]], tmp_path)
+    old = shutil.copy(tmp_path / "page.html", tmp_path / "old.html")
+    text = written([folders[1]], tmp_path, against=old)
+    changed = text[text.index("Answers that differ") : text.index("</section>")]
+    assert "not there any more" in changed
+    assert "+0.7" not in changed  # the other folder's answer is no earlier one of this
 
 
 def test_what_cannot_be_used_is_named(folders, tmp_path):
