@@ -1,7 +1,6 @@
 """Co-simulation of grid-forming converters: ``import orchestrator as gfor``.
 
-A name is imported where it is first used, so that ``import orchestrator`` takes no time; ``__init__.pyi`` says the
-same to type checkers.
+A name is imported where it is first used, so that ``import orchestrator`` takes no time; ``__init__.pyi`` lists them.
 
 Examples
 --------
@@ -10,18 +9,15 @@ Examples
 >>> axes = scenario.modes().plot()
 """
 
+import re
 from importlib import import_module
+from pathlib import Path
 
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {
-    "Case": "api.case", "CosimError": "errors", "LinearSystem": "api.linear", "Modes": "api.results",
-    "ParameterSweep": "sweep.view", "Run": "api.results", "Scenario": "api.scenario", "Screening": "screening.view",
-    "admittance": "api.admittance", "bind": "api.binding", "build": "api.models", "built_in_cases": "api.case",
-    "certify": "api.certification", "check": "api.acceptance", "compare": "api.comparison", "export": "api.export",
-    "export_comtrade": "api.comtrade", "identify": "api.identification", "info": "api.fmu", "load": "api.case",
-    "nyquist": "api.nyquist", "open": "api.saved", "open_fmu": "api.fmu", "read_linear_model": "api.linear",
-    "source": "api.source", "verify": "api.certification",
-}  # fmt: skip
-"""Name → module of this package that defines it."""
+    name: home for home, name in re.findall(r"^from orchestrator\.(\S+) import \S+ as (\S+)$", _STUB, re.MULTILINE)
+}
+"""Name → module of this package that defines it, as ``__init__.pyi`` has them."""
 
 __all__ = [*_HOMES]  # noqa: PLE0604 - names all the same
 

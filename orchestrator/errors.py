@@ -70,7 +70,7 @@ class CosimError(Exception):
         return make, (type(self), *self.args), self.__dict__
 
     def __str__(self) -> str:
-        return spelled(super().__str__())
+        return spelled(Exception.__str__(self))  # not that of another base, such as KeyError, which quotes
 
 
 class InputError(CosimError):

@@ -105,10 +105,12 @@ def certify(
     from orchestrator.certification.files import JSON, read_record, save  # noqa: PLC0415 - as above
     from orchestrator.certification.inside import check_target, put_inside  # noqa: PLC0415 - as above
     from orchestrator.certification.issue import NTS631, WITH_VERDICT, issue_of  # noqa: PLC0415 - as above
-    from orchestrator.certification.request import REACTANCES  # noqa: PLC0415 - as above
+    from orchestrator.certification.request import PODS, REACTANCES  # noqa: PLC0415 - as above
 
     if code not in WITH_VERDICT:
         raise InputError(f"code = {code!r}; choose from {', '.join(WITH_VERDICT)}")
+    if pod is not None and pod not in PODS:
+        raise InputError(f"pod = {pod!r}; choose from {', '.join(PODS)}")
     file, given = path_of(fmu, "fmu"), plain(values)
     target = None if into is None else path_of(into, "into")
     chosen = REACTANCES if reactances is None else tuple(reactances)

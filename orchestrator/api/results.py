@@ -170,8 +170,6 @@ class Modes:
 class NoSuchModeError(InputError, KeyError):
     """No mode of a scenario bears a name."""
 
-    __str__ = InputError.__str__  # KeyError shows the text in quotes
-
 
 class NamedModes(dict[str, Mode]):
     """The modes of a scenario by the names that its case gives.

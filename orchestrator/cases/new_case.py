@@ -135,9 +135,10 @@ def write_case(wanted: WantedCase) -> NewCase:
 
 def _switched(device: FmuDescription | None) -> dict[str, bool]:
     """The PODs, p or q, that a device has a switch for: ours where None; and whether it starts with them."""
-    starts = {x: "false" if device is None else str(v.start).lower() for x in "pq"
-              if device is None or (v := device.variables.get(f"pod_{x}.enabled"))}  # fmt: skip
-    return {x: start in ("true", "1", "1.0") for x, start in starts.items()}
+    if device is None:
+        return {"p": False, "q": False}
+    found = {x: device.variables.get(f"pod_{x}.enabled") for x in "pq"}
+    return {x: str(v.start).lower() in ("true", "1", "1.0") for x, v in found.items() if v is not None}
 
 
 def _described(path: Path, binding: Path | None, *, is_dll: bool) -> FmuDescription:

@@ -21,7 +21,7 @@ EXCEL = (".xlsx", ".xlsm")
 SUFFIXES = (".csv", ".tsv", *EXCEL)
 _HEADING = re.compile(r"\s*(.*?)\s*(?:[\[(]([^])]*)[])])?\s*")
 _SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0}
-_TIMES = ("time", "t", "timestamp", "datetime", "zeit", "temps", "tiempo")
+_TIMES = ("time", "t", "timestamp", "datetime", "utc", "soc", "epoch", "zeit", "temps", "tiempo")
 _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
 _TIME = re.compile(rf"\s*([-+]?\d*[.,]?\d+([eE][-+]?\d+)?|{_DATE.pattern})\s*")
@@ -119,8 +119,8 @@ def _parted(rows: Sequence[list[str]]) -> tuple[list[str], list[list[str]]]:
     if not begin:
         return (rows[0] if rows else []), []
     names, above = [cell.strip() for cell in rows[begin - 1]], rows[begin - 2] if begin > 1 else []
-    if above and len(above) == len(names) and names[0].strip("[]()") in (*_SECONDS, "UTC"):
-        units = [cell.strip("[]()") for cell in names]
+    if above and len(above) == len(names) and names[0].strip("[]()-") in (*_SECONDS, "UTC"):
+        units = [cell.strip("[]()-") for cell in names]
         names = [f"{name.strip()} [{unit}]" if unit else name.strip() for name, unit in zip(above, units, strict=True)]
     return names, rows[begin:]
 

@@ -10,7 +10,7 @@ from typing import Any, cast
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.asked import FILE, NAMES, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
+from orchestrator.asked import DAMPING, FILE, NAMES, OUTAGES, POSITIVE, RANKED, FieldKind, Names, asked, text_or_none
 from orchestrator.asked import positive as above_zero
 from orchestrator.cases.case import Case
 from orchestrator.cases.names import close_names
@@ -61,7 +61,7 @@ class SiteRequest(OfCase):
     _: KW_ONLY
     binding: str | Path | None = asked(FILE, None, "binding of the vendor's FMU")
     below: float = asked(
-        POSITIVE, 10.0, "damping of poorly damped modes (default: 10)", "PERCENT",
+        DAMPING, 0.1, "damping of poorly damped modes (default: 10)",
         python="damping [%] of the modes that are looked at; the least damped one where none is damped so little",
     )  # fmt: skip
     frequencies: tuple[float, float] = of_frequencies()
@@ -167,7 +167,7 @@ def find_sites(case: Case, request: SiteRequest, report: Callable[[int, int], No
         item = Item(0, k, {}, outage.elements, outage.elements)
         try:
             found = preparation.prepared(item).scenario if outage.elements else preparation.base
-            one = situation_of(found, outage.name, request.frequencies, request.below)
+            one = situation_of(found, outage.name, request.frequencies, 100 * request.below)
         except CosimError as error:
             if not outage.elements:
                 raise

@@ -4,8 +4,10 @@ import io
 import json
 import zipfile
 
+import pandas as pd
 import pytest
 
+import orchestrator as gfor_face
 from orchestrator.black_box.coupled_modes import linearize_with_box
 from orchestrator.cli import main
 from orchestrator.coupling.master import Master
@@ -54,6 +56,18 @@ def test_one_way_to_linearise_at_a_time(gfor):
 def test_where_nothing_hides_nothing_is_identified(gfor):
     shown = [gfor("modes", "two_area", "--scenario", "base", "--json", *more)[1] for more in ([], ["--black-box"])]
     assert shown[0] == shown[1]
+
+
+def test_runs_sweeps_and_linear_models_take_the_keyword():
+    case = gfor_face.load("infinite_bus")
+    scenario, values = case.scenario("dip"), {"gfor.droop.R_f": [0.02, 0.03]}
+    asked = ["gfor.droop.delta_P_ref"], ["gfor.p"]
+    for one in (
+        lambda **how: scenario.run(stop=1e-3, **how).modes.table(),
+        lambda **how: pd.DataFrame(scenario.linearize(*asked, **how).A),
+        lambda **how: case.sweep(values, scenarios="dip", workers=1, **how).table(),
+    ):
+        assert one(black_box=True).equals(one())
 
 
 @pytest.mark.slow

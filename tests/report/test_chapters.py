@@ -5,9 +5,10 @@ import re
 import shutil
 
 import pytest
+import xarray as xr
 
 from orchestrator.errors import InputError
-from orchestrator.report.html.chapters import chapters_of
+from orchestrator.report.html.chapters import chapters_of, of_sweep
 from orchestrator.report.html.page import write_report
 from orchestrator.sweep.limit import Ending, ParameterLimit, Until
 
@@ -144,6 +145,12 @@ def test_figures_that_moved_between_two_folders(folders, tmp_path):
     both = written([folders[1], new], tmp_path, against=folders[1])
     assert "not there" in both[both.index("Answers that differ") :]  # its twin is as it was
     assert "Which operating point and which outage is worst? (inner)" in both
+    written([new, folders[1]], tmp_path)
+    old = shutil.copy(tmp_path / "page.html", tmp_path / "old.html")
+    text = written([folders[1]], tmp_path, against=old)
+    changed = text[text.index("Answers that differ") : text.index("</section>")]
+    assert "not there any more" in changed
+    assert "+0.7" not in changed  # the other folder's answer is no earlier one of this
 
 
 def test_what_cannot_be_used_is_named(folders, tmp_path):
@@ -190,5 +197,7 @@ def test_the_answer_of_a_search_for_a_limit_is_on_the_page(tmp_path):
     )
     (tmp_path / "limits.json").write_text(json.dumps([limit.as_json()]), encoding="utf-8")
     (chapter,) = chapters_of(tmp_path)
+    swept = xr.Dataset({"damping": ("k", [3.0]), "named": ("k", [1])})
+    assert of_sweep(tmp_path, swept).answer == chapter.answer
     assert (chapter.question, chapter.answer) == ("How far may grid.scr go?", f"base: {limit.sentence}")
     assert "6.87" in chapter.answer

@@ -44,7 +44,8 @@ def test_the_modes_of_a_measured_table_are_found(tmp_path, heading, options):
      ("time,f", "12:00:00.{:03d}"), ("Zeit;f [Hz]", "31.05.2025 23:59:59,{:03d}"),
      ("UTC,f", "5/1/2025 11:59:59.{:03d} PM"), ("Date;Time;f", "2025-03-01;08:00:00,{:03d}"),
      ("PMU 7;NORTH\n\ntime;f\ns;Hz", "0,{:03d}"),
-     ("Time,f", "1700000000.{:03d}"),
+     ("Time,f", "1700000000.{:03d}"), ("SOC,f", "1700000000.{:03d}"),
+     ("PMU 7\nDatum;f\n-;Hz", "31.05.2025 23:59:59,{:03d}"),
      ("Uhrzeit (s);f", "0,{:03d}"), ("time,f", "2025-03-01T12:00:00.{:03d}+01:00"), ("time [ms],f", "{}"),
      ("t [s],f", "0.{:03d}"), ("time [msec],f", "{}.0")],
 )  # fmt: skip

@@ -177,7 +177,7 @@ def _coordinated(file: Path, c: Content) -> Chapter:
 
 
 def _certificate(file: Path, c: Content) -> Chapter:
-    open_ = [text if isinstance(text, str) else f"X_L = {text:g} pu" for text in (*c["missing"], *c["departures"])]
+    open_ = [text if isinstance(text, str) else f"X_L = {text:g} pu" for text in (*c["departures"], *c["missing"])]
     trusted = (c.get("acceptance") or {}).get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
     sure = f"judged: {c['judged']}" if c.get("judged") else f"{len(c['rows'])} tests" if "rows" in c else ""
@@ -360,7 +360,7 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     lost = 0 if stable is None else int((stable == 0).sum())
     unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
     if limits := limits_of(place):
-        said = "; ".join(f"{one['scenario']}: {one['reason']}" for one in limits)
+        said = "; ".join(f"{one['scenario']}: {one['sentence']}" for one in limits)
         holds = all(one["ends_with"] == "holds" for one in limits)
         return Chapter(
             place, f"How far may {limits[0]['parameter']} go?", said, holds or None,

@@ -110,15 +110,16 @@ def _answers(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
 
 
 def _by_name(answers: Sequence[dict[str, str]], others: Sequence[dict[str, str]]) -> dict[tuple[str, str, int], str]:
-    """Answers by question, file and place: those of folders that the others have as well have theirs."""
+    """Answers by question, file and place: first those of folders that the others have as well, at the same place."""
     found: dict[tuple[str, str, int], str] = {}
-    for one in answers:
-        alike = [x.get("folder") for x in others if (x["question"], x["source"]) == (one["question"], one["source"])]
-        wanted = one.get("folder")
-        place = alike.index(wanted) if wanted in alike else 0
-        while (key := (one["question"], one["source"], place)) in found:
+    known = [(x["question"], x["source"], x.get("folder")) for x in others]
+    named = [((x["question"], x["source"], x.get("folder")), x["answer"]) for x in answers]
+    for key, answer in sorted(named, key=lambda one: one[0] not in known):
+        alike = [x for x in known if x[:2] == key[:2]]
+        place = alike.index(key) if key in alike else 0
+        while (*key[:2], place) in found:
             place += 1
-        found[key] = one["answer"]
+        found[*key[:2], place] = answer
     return found
 
 
