@@ -18,7 +18,10 @@ _SHOWN = 5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.epilog = "A source is named only where the methods that apply agree; else it is said what each of them says."
+    parser.epilog = (
+        "A source is what drives alone, as only the units' own models tell; else a place that drives is named where the "
+        "methods that apply agree."
+    )
     parser.add_argument("run", type=Path, nargs="?", metavar="RUN",
                         help="folder of a scenario's results, its trajectory.nc, COMTRADE or CSV with columns NAME.vm, "
                         "NAME.va, NAME.p, NAME.q")  # fmt: skip

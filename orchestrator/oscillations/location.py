@@ -38,11 +38,12 @@ _SMALL = 0.02  # part of the largest mean power below which its sign says nothin
 @dataclass(frozen=True)
 class Opinion:
     method: str
-    place: str | None  # the place that it names, or None
+    place: str | None  # a place that drives, or None
     applies: bool  # whether it is known to hold for this oscillation
     reason: str
     # places with their part of what is fed, or of the participation, the largest first.
     ranking: tuple[tuple[str, float], ...]
+    alone: bool = False  # whether nothing else drives, which phasors alone never tell: what drives may take energy
 
 
 @dataclass(frozen=True)

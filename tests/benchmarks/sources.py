@@ -43,9 +43,9 @@ def tried(case, noise, half, own):
 def verdict(unit, one):
     if one is None:
         return "not found"
-    if one.source is None:
+    if one.drives is None:
         return "not known"
-    return "right" if unit in one.source.split(" or ") else "wrong"
+    return "right" if unit in one.drives.split(" or ") else "wrong"
 
 
 def first(unit, one, method):
