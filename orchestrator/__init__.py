@@ -15,7 +15,8 @@ from importlib import import_module
 _HOMES = {
     "Case": "api.case", "CosimError": "errors", "LinearSystem": "api.linear", "Modes": "api.results",
     "ParameterSweep": "sweep.view", "Run": "api.results", "Scenario": "api.scenario", "Screening": "screening.view",
-    "admittance": "api.admittance", "bind": "api.binding", "build": "api.models", "built_in_cases": "api.case",
+    "admittance": "api.admittance", "ambient": "api.identification", "bind": "api.binding", "build": "api.models",
+    "built_in_cases": "api.case",
     "certify": "api.certification", "check": "api.acceptance", "compare": "api.comparison", "export": "api.export",
     "export_comtrade": "api.comtrade", "identify": "api.identification", "info": "api.fmu", "load": "api.case",
     "nyquist": "api.nyquist", "open": "api.saved", "open_fmu": "api.fmu", "read_linear_model": "api.linear",

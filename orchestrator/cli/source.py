@@ -19,7 +19,7 @@ _SHOWN = 5
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = (
-        "A source is what drives alone, as only the units' own models tell; else a place that drives is named where the "
+        "A source drives alone, as only the units' own models tell; else a place that drives is named where the "
         "methods that apply agree."
     )
     parser.add_argument("run", type=Path, nargs="?", metavar="RUN",

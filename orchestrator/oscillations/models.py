@@ -118,7 +118,9 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
                f"{100 * (1 - rest):.0f} % of what the voltages do")  # fmt: skip
         also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
         sole = not also and left(beyond(effects[top])) < _UNEXPLAINED
-        return Opinion(OWN_MODEL, names[top], True, why + ("; less so " + ", ".join(also) if also else ""), ranking, sole)
+        return Opinion(
+            OWN_MODEL, names[top], True, why + ("; less so " + ", ".join(also) if also else ""), ranking, sole
+        )
     order = sorted(rivals, key=rivals.__getitem__)
     first, second, *_ = [*(rivals[name] for name in order), 1.0, 1.0]
     if first < min(_EXPLAINED, _CLEARER * second) and max(parts) < _CONTRARY:

@@ -93,5 +93,10 @@ def _advice(measured: Measurements, evidence: Evidence, drives: str | None, *, s
     if any(p.name == drives and p.kind == "branch" for p in measured.places):
         return f"measure beyond {drives}: it comes from there"
     held = f"hold the references of {drives}, or switch its controllers to manual"
-    return f"{held}: the oscillation has to end" if sole else (
-        f"{held}: if it does not end, something else drives it as well, which the units' models can show (--case)")
+    return (
+        f"{held}: the oscillation has to end"
+        if sole
+        else (
+            f"{held}: if it does not end, something else drives it as well, which the units' models can show (--case)"
+        )
+    )

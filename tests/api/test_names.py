@@ -16,7 +16,7 @@ NAMES = {
     *("Case", "CosimError", "Modes", "Run", "Scenario", "build", "built_in_cases", "check", "compare", "load"),
     *("admittance", "bind", "certify", "export", "verify"),
     *("LinearSystem", "ParameterSweep", "Screening", "open"),
-    *("export_comtrade", "identify", "info", "nyquist", "open_fmu", "read_linear_model", "source"),
+    *("ambient", "export_comtrade", "identify", "info", "nyquist", "open_fmu", "read_linear_model", "source"),
 }
 
 
