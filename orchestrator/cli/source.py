@@ -13,6 +13,7 @@ from orchestrator.cli.terminal import make_console, print_json, print_parts, say
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
 from orchestrator.oscillations.view import Sources, opinions_table, sources_table
+from orchestrator.safe_files import write_text
 
 _SHOWN = 5
 
@@ -32,6 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", metavar="NAME", help="of --case, where it has several")
     parser.add_argument("--start", type=seconds_or_none, metavar="T", help="begin of the part that is used [s]")
     parser.add_argument("--stop", type=seconds, metavar="T", help="its end [s]")
+    parser.add_argument(
+        "--html", type=Path, metavar="FILE", help="write a page: map of energy flows, timeline, spectrum"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     add_details_argument(parser)
 
@@ -48,6 +52,10 @@ def run(options: argparse.Namespace) -> int:
         else:
             scenario = load(options.case).scenario(options.scenario) if options.case else None
             found = [source(options.run, options.start, options.stop, scenario)]
+    if options.html:
+        if options.contest:
+            raise InputError("--html: it is the page of one record; give RUN in the place of --contest")
+        write_text(options.html, found[0].html())
     if options.json:
         records = [one.as_json() for one in found]
         print_json(records if options.contest else records[0])

@@ -65,7 +65,7 @@ class _Work:
             return Opinion(method, None, True, f"no place {verb} more than the noise explains", ranking)
         if share < _SHARE:
             both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3] if x > 0)
-            return Opinion(method, None, True, f"several places {verb} it: {both}", ranking)
+            return Opinion(method, None, True, f"several places {verb[:-1]} it: {both}", ranking)
         if fed < _BALANCE * taken:
             return Opinion(method, None, True, f"{name} {verb} only {100 * fed / taken:.0f} % of what is taken: "
                            "another place feeds, perhaps outside of what is observed", ranking)  # fmt: skip

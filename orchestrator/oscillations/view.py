@@ -38,7 +38,7 @@ class Sources:
 
     def __init__(self, measured: Measurements, oscillations: Sequence[Located]) -> None:
         self.label, self.remarks, self.oscillations = measured.label, measured.remarks, list(oscillations)
-        self.places = [place.name for place in measured.places]
+        self.places, self._measured = [place.name for place in measured.places], measured
 
     def __iter__(self) -> Iterator[Located]:
         return iter(self.oscillations)
@@ -55,6 +55,12 @@ class Sources:
         """One row for each oscillation: frequency [Hz], kind, source, what drives, begin [s] and the reason."""
         keys = ["frequency_hz", "kind", "source", "drives", "begin", "reason"]
         return pd.DataFrame([one.as_json() for one in self.oscillations], columns=keys)
+
+    def html(self) -> str:
+        """A page with the map of the energy flows, the amplitudes over the time, and the spectrum."""
+        from orchestrator.oscillations.page import source_page  # noqa: PLC0415 - only where it is asked for
+
+        return source_page(self._measured, self.oscillations)
 
     def __repr__(self) -> str:
         return f"<Sources in {self.label}: {len(self)} oscillations>"
