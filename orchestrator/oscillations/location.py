@@ -128,6 +128,16 @@ def block_phasors(places: Sequence[Site], times: Numbers, found: SpectralLine, o
     return np.asarray(blocks * np.exp(-1j * np.angle(shared))[:, None])
 
 
+def felt_beyond(measured: Measurements, found: SpectralLine, others: Sequence[float], name: str) -> bool:
+    """Whether a voltage at another bus than a place's own moves with it for sure: what drives a grid moves it."""
+    (home,) = {place.bus for place in measured.places if place.name == name}
+    away = [place for place in measured.places if place.bus != home]
+    if not away:
+        return False
+    whole, errors = jackknife(block_phasors([*away], measured.times, found, others), lambda mean: mean)
+    return bool((np.abs(whole) > 2 * _CERTAIN * errors).reshape(-1, 4)[:, 2:].any())
+
+
 def jackknife(blocks: Complex, figures: Callable[[Complex], Any]) -> tuple[Any, Numbers]:
     """Figures of the mean of all blocks, and their standard errors."""
     count = len(blocks)

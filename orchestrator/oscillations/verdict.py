@@ -6,7 +6,7 @@ from typing import Any
 
 from orchestrator.oscillations.detection import SpectralLine, find_oscillations, signals_of
 from orchestrator.oscillations.kind import Evidence, evidence_of
-from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, opinions
+from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, felt_beyond, opinions
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.models import OWN_MODEL, UnitModels, own_models
 
@@ -53,6 +53,11 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
                 evidence = replace(evidence, kind="forced", reasons=(own.reason,))
         drives, reason = _verdict(evidence, said)
         reason += f"; {OWN_MODEL}: {said[-1].reason}" if said[-1].method == OWN_MODEL else ""
+        if drives is not None and said[0].method != OWN_MODEL and not felt_beyond(measured, one, others, drives):
+            drives, reason = (
+                None,
+                f"no other bus moves with {drives}: its measuring may err, or nothing else is in view",
+            )
         sole = said[0].alone and drives is not None
         if drives is not None and not sole:
             reason += f"; whether {drives} does so alone is not known"

@@ -1,6 +1,7 @@
 """What would make a source wrong in silence: each ends in the right place or in none."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -139,6 +140,24 @@ def test_leakage_of_the_line_frequency():
     found = locate(record("two_area", {"sg1.governor.delta_P_ref": sine(TIMES, 0.8, 0.02)}, times=TIMES, change=change))
     assert at(found, 0.8).drives == "sg1"
     assert {x.drives for x in found} <= {None, "sg1"}
+
+
+@pytest.mark.parametrize("who", ["sg1", "all"])
+def test_leakage_that_looks_like_a_swing(who):
+    """A reporting rate of 30 Hz shows a hum at 60.4 Hz as 0.4 Hz, at one device or at all."""
+
+    def change(phase, places):
+        hum = [np.sin(2 * np.pi * 60.4 * TIMES + a) for a in phase]
+        return [
+            replace(x, p=x.p + 0.1 * hum[0], q=x.q + 0.02 * hum[1], v=x.v + 2e-3 * hum[2], angle=x.angle + 2e-3 * hum[3])
+            if who in ("all", x.name) else x for x in places
+        ]  # fmt: skip
+
+    for phase in ((0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 3.0, 2.5), (4.0, 0.5, 5.5, 2.0)):
+        measured = record("two_area", {}, times=TIMES, loads=5e-4, measuring=5e-5, change=partial(change, phase))
+        for models in (None, unit_models_of(model("two_area"))):
+            found = at(locate(measured, models), 0.4)
+            assert (found.drives, found.source) == (None, None)
 
 
 def test_angles_that_wrap_and_run_away():
