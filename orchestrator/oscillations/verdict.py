@@ -92,7 +92,7 @@ def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, s
 
 def _advice(measured: Measurements, evidence: Evidence, drives: str | None, *, sole: bool) -> str:
     if evidence.kind == "mode":
-        return "damp the mode: `gfor sensitivities` and `gfor design` say which controller moves it most"
+        return "damp the mode, which nothing drives: `gfor sensitivities CASE` ranks the POD and PSS that move it most"
     if drives is None:
         return "look at the places that lead the methods' rankings; a longer record, or more of the grid, may decide"
     if any(p.name == drives and p.kind == "branch" for p in measured.places):

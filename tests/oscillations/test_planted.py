@@ -149,7 +149,7 @@ def test_leakage_that_looks_like_a_swing(who):
     def change(phase, places):
         hum = [np.sin(2 * np.pi * 60.4 * TIMES + a) for a in phase]
         return [
-            replace(x, p=x.p + 0.1 * hum[0], q=x.q + 0.02 * hum[1], v=x.v + 2e-3 * hum[2], angle=x.angle + 2e-3 * hum[3])
+            replace(x, p=x.p + 0.1 * hum[0], q=x.q + 0.02 * hum[1], v=x.v + hum[2] / 500, angle=x.angle + hum[3] / 500)
             if who in ("all", x.name) else x for x in places
         ]  # fmt: skip
 
