@@ -93,7 +93,7 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
 
     def beyond(effect: Complex) -> Complex:
         rest = np.abs(voltages - effect) - _CERTAIN * errors[1].ravel()
-        return np.maximum(rest, 0.0).astype(np.complex128)
+        return np.asarray(np.maximum(rest, 0.0), dtype=np.complex128)
 
     amount = np.linalg.norm(extra, axis=1)
     ranking = tuple((names[k], float(amount[k] ** 2 / ((amount**2).sum() or 1.0))) for k in np.argsort(-amount))

@@ -45,7 +45,6 @@ PAIRS = [
     ("sg33.governor.delta_P_ref", "sg37.governor.delta_P_ref", 0.9, 0.9),
     ("sg39.exciter.delta_V_ref", "sg33.governor.delta_P_ref", 1.25, 1.25),  # without a case, one alone leads
     ("gfor37.droop.delta_U_ref", "sg33.governor.delta_P_ref", 0.722, 0.722),  # both at the mode of the areas
-    ("sg33.governor.delta_P_ref", "gfor37.droop.delta_P_ref", 0.5, 0.9),
     ("sg33.governor.delta_P_ref", "gfor37.droop.delta_P_ref", 0.722, 1.1),  # one at the mode
 ]
 
