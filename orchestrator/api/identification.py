@@ -60,7 +60,7 @@ def identify(
     curve = recorded(dataset, signal, label)
     begin, last = moment(start, "start"), float(curve["time"][-1])
     if begin >= last:
-        raise InputError(f"start = {start!r}: {label} ends at t = {last:g} s; give an earlier start")
+        raise InputError(f"start = {start!r}: the record of {label} ends at t = {last:g} s; give an earlier start")
     end = last if stop is None else moment(stop, "stop")
     if end <= begin:
         raise InputError(f"stop = {stop!r}: it must come after start = {start!r}; give a later stop")
