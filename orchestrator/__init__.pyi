@@ -16,6 +16,7 @@ from orchestrator.api.fmu import Fmu as Fmu
 from orchestrator.api.fmu import FmuInfo as FmuInfo
 from orchestrator.api.fmu import info as info
 from orchestrator.api.fmu import open_fmu as open_fmu
+from orchestrator.api.identification import ambient as ambient
 from orchestrator.api.identification import identify as identify
 from orchestrator.api.linear import LinearSystem as LinearSystem
 from orchestrator.api.linear import read_linear_model as read_linear_model

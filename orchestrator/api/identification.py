@@ -1,16 +1,22 @@
 """The modes in a recorded signal."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
+from orchestrator.analysis.ambient import ambient_modes
 from orchestrator.analysis.identification import sampling
 from orchestrator.analysis.mode_doubts import straight_line
 from orchestrator.api.results import Run
 from orchestrator.asked import text_or_none
 from orchestrator.cases.given import Time, moment
-from orchestrator.errors import InputError
+from orchestrator.errors import AnalysisError, InputError
+from orchestrator.oscillations.kind import forced_frequencies
 from orchestrator.results.recorded import warn_of_early_end
+from orchestrator.study.ambient import AmbientModes, AmbientWindow
 from orchestrator.study.comparison import open_trajectory, recorded, require_numbers, strongest_modes
 from orchestrator.study.signal_modes import SignalModes
 
@@ -54,7 +60,7 @@ def identify(
     curve = recorded(dataset, signal, label)
     begin, last = moment(start, "start"), float(curve["time"][-1])
     if begin >= last:
-        raise InputError(f"start = {start!r}: {label} ends at t = {last:g} s; give an earlier start")
+        raise InputError(f"start = {start!r}: the record of {label} ends at t = {last:g} s; give an earlier start")
     end = last if stop is None else moment(stop, "stop")
     if end <= begin:
         raise InputError(f"stop = {stop!r}: it must come after start = {start!r}; give a later stop")
@@ -64,6 +70,65 @@ def identify(
     times = window["time"].values
     line = straight_line(times, window.values)
     return SignalModes(signal, float(times[0]), float(times[-1]), modes, sampling(times), line)
+
+
+def ambient(
+    run: Run | xr.Dataset | str | Path, signals: str | Sequence[str], start: Time = 0.0, stop: Time | None = None, *,
+    window: Time | None = None, level: float = 3.0, highest_hz: float = 2.5,
+) -> AmbientModes:  # fmt: skip
+    """Find the modes in signals that noise shakes, by covariance-driven stochastic subspace identification.
+
+    Parameters
+    ----------
+    run
+        A run, its dataset, the folder of a scenario's results, or a measured recording.
+    signals
+        One or several of ``"a.b"`` or ``"a.b - c.d"``; shapes are between them.
+    start, stop
+        The part of the record that is used [s]; by default all of it.
+    window
+        Length of the parts, each half a length after the one before [s]; by default one part.
+    level
+        Damping below which it is an alarm [%].
+    highest_hz
+        Of the modes that are looked for [Hz].
+
+    Raises
+    ------
+    InputError
+        If there is no such run, or it lacks a signal, or numbers of it.
+    AnalysisError
+        If no part is long and even enough.
+    """
+    dataset, label = opened(run, "run")
+    names = [signals] if isinstance(signals, str) else list(signals)
+    if not names:
+        raise InputError(f"signals = {signals!r}; {_ONE_SIGNAL}, or several")
+    begin = moment(start, "start")
+    end = float(dataset["time"][-1]) if stop is None else moment(stop, "stop")
+    length = end - begin if window is None else moment(window, "window")
+    curves = [recorded(dataset, name, label).sel(time=slice(begin, end)) for name in names]
+    for name, curve in zip(names, curves, strict=True):
+        require_numbers(curve, name, label)
+    times, values = curves[0]["time"].values, np.column_stack([curve.values for curve in curves])
+    if not 0 < length <= end - begin + 1e-9:
+        raise InputError(f"window = {window!r}: the record is used from {begin:g} to {end:g} s; give a shorter window")
+    found = []
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    for k in range(int(2 * (end - begin - length + step) / length + 1e-6) + 1):
+        first = begin + 0.5 * k * length
+        part = (times >= first - 1e-9) & (times <= first + length + 1e-9)
+        try:
+            modes = ambient_modes(times[part], values[part], highest_hz)
+            steady = forced_frequencies(times[part], names, values[part]) if modes else []
+            near = 2 / length
+            told = [replace(m, forced=any(abs(m.frequency_hz - f) < near for f in steady)) for m in modes]
+            found.append(AmbientWindow(first, first + length, told))
+        except AnalysisError as error:
+            found.append(AmbientWindow(first, first + length, (), str(error)))
+    if all(one.failure for one in found):
+        raise AnalysisError(f"{label}: {found[0].failure}")
+    return AmbientModes(label, names, found, level)
 
 
 def opened(run: Run | xr.Dataset | str | Path, otherwise: str) -> tuple[xr.Dataset, str]:

@@ -43,7 +43,7 @@ COMMANDS = {
     "fmu build": "build FMUs of the catalogue's models",
     "fmu admittance": "measure a device's admittance, and fit a model to it",
     "fmu nyquist": "whether a device is stable at a network, from scans, FMUs and cases",
-    "signal identify": "the modes in a recorded signal (matrix pencil)",
+    "signal identify": "the modes in a recorded signal (matrix pencil; in noise: stochastic subspace)",
     "signal compare": "two recorded runs: differences, and what each rings with",
     "signal source": "where the oscillations of a run or recording come from: which unit drives them",
     "export linear": "write a scenario's linear model A, B, C, D for other tools",

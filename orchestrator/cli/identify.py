@@ -5,9 +5,10 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.api.identification import identify
-from orchestrator.cli.arguments import add_kept_argument, option, seconds, seconds_or_none, switch
+from orchestrator.api.identification import ambient, identify
+from orchestrator.cli.arguments import add_kept_argument, option, quantity, seconds, seconds_or_none, switch
 from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, saying_warnings
+from orchestrator.errors import InputError
 from orchestrator.report.tables import eigenvalue_text, make_table
 
 
@@ -18,16 +19,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("run", type=Path, metavar="RUN",
                         help="folder of a scenario's results, its trajectory.nc, COMTRADE, CSV or Excel")  # fmt: skip
-    parser.add_argument("signal", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'")
-    option(parser, "--start", "T", "beginning of the free response [s] (2)", read=seconds_or_none, default=2.0)
+    parser.add_argument("signal", nargs="+", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'; several with --ambient")
+    option(parser, "--start", "T", "beginning of the free response [s] (2; with --ambient 0)", read=seconds_or_none)
     option(parser, "--stop", "T", "its end [s] (default: the run's)", read=seconds)
+    switch(parser, "--ambient", "the signals are noise, not a free response: stochastic subspace")
+    option(parser, "--window", "T", "of --ambient: length of the parts (all)", read=seconds)
+    option(parser, "--alarm", "PERCENT", "of --ambient: damping below which it is one (3 %%)", read=quantity("%"))
     switch(parser, "--json", "print JSON")
     add_kept_argument(parser, "ringing")
 
 
 def run(options: argparse.Namespace) -> int:
+    if options.ambient:
+        return _ambient(options)
+    if options.window or options.alarm is not None:
+        raise InputError("--window and --alarm belong to --ambient, which is not given; add it, or leave them out")
+    if len(options.signal) > 1:
+        raise InputError(f"{len(options.signal)} signals: a free response is identified in one; give one, or --ambient")
     with saying_warnings():
-        found = identify(options.run, options.signal, options.start, options.stop)
+        start = 2.0 if options.start is None else options.start
+        found = identify(options.run, options.signal[0], start, options.stop)
     keep_json(found.as_json(), options.out, "ringing")
     if options.json:
         print_json(found.as_json())
@@ -45,4 +56,25 @@ def run(options: argparse.Namespace) -> int:
     console.print(table)
     for text in found.remarks:
         console.print(escape(text), soft_wrap=True, highlight=False)
+    return 0
+
+
+def _ambient(options: argparse.Namespace) -> int:
+    level = 3.0 if options.alarm is None else options.alarm
+    with saying_warnings():
+        found = ambient(
+            options.run, options.signal, options.start or 0.0, options.stop, window=options.window, level=level
+        )
+    if options.out:
+        found.save(options.out)
+    if options.json:
+        print_json(found.as_json())
+        return 0
+    rows = [(f"{r.start:g}–{r.stop:g}", f"{r.frequency_hz:.3f} ± {r.frequency_error_hz:.3f}",
+             f"{r.damping_percent:.1f} ± {r.damping_error_percent:.1f}", f"{100 * r.share:.0f} %", r.alarm)
+            for r in found.table().itertuples()]  # fmt: skip
+    columns = ("Window [s]", "f [Hz]", "Damping [%]", "Of variance", "Alarm")
+    console = make_console()
+    console.print(make_table(f"{found.label} in noise (stochastic subspace, 95 % intervals)", *columns, rows=rows))
+    console.print(escape(found.sentence), soft_wrap=True, highlight=False)
     return 0

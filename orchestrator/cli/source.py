@@ -13,12 +13,16 @@ from orchestrator.cli.terminal import keep_json, make_console, print_json, print
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
 from orchestrator.oscillations.view import Sources, opinions_table, sources_table
+from orchestrator.safe_files import write_text
 
 _SHOWN = 5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.epilog = "A source is named only where the methods that apply agree; else it is said what each of them says."
+    parser.epilog = (
+        "A source drives alone, as only the units' own models tell; else a place that drives is named where the "
+        "methods that apply agree."
+    )
     parser.add_argument("run", type=Path, nargs="?", metavar="RUN",
                         help="folder of a scenario's results, its trajectory.nc, COMTRADE or CSV with columns NAME.vm, "
                         "NAME.va, NAME.p, NAME.q")  # fmt: skip
@@ -29,6 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", metavar="NAME", help="of --case, where it has several")
     parser.add_argument("--start", type=seconds_or_none, metavar="T", help="begin of the part that is used [s]")
     parser.add_argument("--stop", type=seconds, metavar="T", help="its end [s]")
+    parser.add_argument(
+        "--html", type=Path, metavar="FILE", help="write a page: map of energy flows, timeline, spectrum"
+    )
     add_json_argument(parser)
     add_kept_argument(parser, "source")
     add_details_argument(parser)
@@ -48,6 +55,10 @@ def run(options: argparse.Namespace) -> int:
             found = [source(options.run, options.start, options.stop, scenario)]
     records = [one.as_json() for one in found]
     keep_json(records, options.out, "source")
+    if options.html:
+        if options.contest:
+            raise InputError("--html: it is the page of one record; give RUN in the place of --contest")
+        write_text(options.html, found[0].html())
     if options.json:
         print_json(records if options.contest else records[0])
         return 0

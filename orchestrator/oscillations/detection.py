@@ -57,7 +57,7 @@ def find_oscillations(signals: Signals) -> list[SpectralLine]:
     """Lines of the spectrum, the strongest first; multiples of one belong to it."""
     n, step = len(signals.times), float(signals.times[1] - signals.times[0])
     length = n * step
-    grid, power = _spectrum(signals.values, step)
+    grid, power = spectrum(signals.values, step)
     low, high = max(LOWEST_HZ, _PERIODS / length), min(HIGHEST_HZ, 0.4 / step)
     inside = np.flatnonzero((grid >= low) & (grid <= high))
     lines: list[tuple[float, float]] = []
@@ -81,7 +81,7 @@ def find_oscillations(signals: Signals) -> list[SpectralLine]:
     return found
 
 
-def _spectrum(values: Numbers, step: float) -> tuple[Numbers, Numbers]:
+def spectrum(values: Numbers, step: float) -> tuple[Numbers, Numbers]:
     """Frequencies [Hz] and the mean power of all signals, each as a part of its own."""
     window = np.hanning(len(values))[:, None]
     power = np.abs(np.fft.rfft(values * window, 4 * len(values), axis=0)) ** 2

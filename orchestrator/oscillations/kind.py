@@ -1,12 +1,13 @@
 """Whether an oscillation is forced or a poorly damped mode of the system, with the evidence."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.oscillations.detection import Signals, SpectralLine, envelope, phasors
+from orchestrator.oscillations.detection import Signals, SpectralLine, envelope, find_oscillations, phasors
 
 OscillationKind = Literal["forced", "mode", "not known"]
 
@@ -73,6 +74,12 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     figures = Evidence("not known", damping, spread, kurtosis, coherence, skirt, periods, disturbed, ())
     kind, reasons = _judged(figures, change, found)
     return replace(figures, kind=kind, reasons=tuple(reasons))
+
+
+def forced_frequencies(times: Numbers, names: Sequence[str], values: Numbers) -> list[float]:
+    """Of the oscillations in signals, shape (n, m), that are forced."""
+    signals = Signals(times, tuple(names), values - values.mean(axis=0))
+    return [one.frequency for one in find_oscillations(signals) if evidence_of(signals, one).kind == "forced"]
 
 
 def _judged(seen: Evidence, change: float, found: SpectralLine) -> tuple[OscillationKind, list[str]]:

@@ -38,11 +38,12 @@ _SMALL = 0.02  # part of the largest mean power below which its sign says nothin
 @dataclass(frozen=True)
 class Opinion:
     method: str
-    place: str | None  # the place that it names, or None
+    place: str | None  # a place that drives, or None
     applies: bool  # whether it is known to hold for this oscillation
     reason: str
     # places with their part of what is fed, or of the participation, the largest first.
     ranking: tuple[tuple[str, float], ...]
+    alone: bool = False  # whether nothing else drives, which phasors alone never tell: what drives may take energy
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class _Work:
             return Opinion(method, None, True, f"no place {verb} more than the noise explains", ranking)
         if share < _SHARE:
             both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3] if x > 0)
-            return Opinion(method, None, True, f"several places {verb} it: {both}", ranking)
+            return Opinion(method, None, True, f"several places {verb[:-1]} it: {both}", ranking)
         if fed < _BALANCE * taken:
             return Opinion(method, None, True, f"{name} {verb} only {100 * fed / taken:.0f} % of what is taken: "
                            "another place feeds, perhaps outside of what is observed", ranking)  # fmt: skip
@@ -125,6 +126,16 @@ def block_phasors(places: Sequence[Site], times: Numbers, found: SpectralLine, o
     blocks = np.array([phasors(times[block], signals[block], beside) for block in np.array_split(used, count)])
     shared = np.linalg.svd(blocks / np.maximum(np.abs(blocks).mean(axis=0), 1e-300), full_matrices=False)[0][:, 0]
     return np.asarray(blocks * np.exp(-1j * np.angle(shared))[:, None])
+
+
+def felt_beyond(measured: Measurements, found: SpectralLine, others: Sequence[float], name: str) -> bool:
+    """Whether a voltage at another bus than a place's own moves with it for sure: what drives a grid moves it."""
+    (home,) = {place.bus for place in measured.places if place.name == name}
+    away = [place for place in measured.places if place.bus != home]
+    if not away:
+        return False
+    whole, errors = jackknife(block_phasors([*away], measured.times, found, others), lambda mean: mean)
+    return bool((np.abs(whole) > 2 * _CERTAIN * errors).reshape(-1, 4)[:, 2:].any())
 
 
 def jackknife(blocks: Complex, figures: Callable[[Complex], Any]) -> tuple[Any, Numbers]:

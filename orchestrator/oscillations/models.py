@@ -21,7 +21,8 @@ _CERTAIN = 3.0  # standard errors by which a deviation must exceed zero
 _EXPLAINED = 0.4  # part of all voltages' swing that a place may leave unexplained
 _SHARE = 0.8  # of the squares of all unexplained currents that one unit must have
 _CONTRARY = 0.2  # what the deviation of another unit does, from which on no single place is named
-_NOTED = 0.05  # the same, from which on it is told
+_NOTED = 0.05  # the same, from which on the unit is not alone
+_UNEXPLAINED = 0.15  # part of the voltages' swing beyond its errors from which on something else drives as well
 _CLEARER = 0.6  # what the best place leaves beside what the second best does
 
 
@@ -90,14 +91,21 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
     def left(rest: Complex) -> float:
         return float(np.linalg.norm(rest) / (np.linalg.norm(voltages) or 1.0))
 
+    def beyond(effect: Complex) -> Complex:
+        rest = np.abs(voltages - effect) - _CERTAIN * errors[1].ravel()
+        return np.asarray(np.maximum(rest, 0.0), dtype=np.complex128)
+
     amount = np.linalg.norm(extra, axis=1)
     ranking = tuple((names[k], float(amount[k] ** 2 / ((amount**2).sum() or 1.0))) for k in np.argsort(-amount))
     sure = np.where(amount > _CERTAIN * np.linalg.norm(errors[0], axis=1), amount, 0.0)
     effects = [reach(unit.reach, unit.voltage) @ extra[k] * (sure[k] > 0) for k, unit in enumerate(known)]
     top = int(sure.argmax())
 
+    def fitted(there: Complex) -> Complex:
+        return np.asarray(there @ np.linalg.lstsq(there, voltages, rcond=None)[0])
+
     def best(there: Complex) -> float:
-        return left(voltages - there @ np.linalg.lstsq(there, voltages, rcond=None)[0])
+        return left(voltages - fitted(there))
 
     unseen = {n: u for n, u in models.units.items() if n.casefold() not in {name.casefold() for name in names}}
     further = {**{u.bus: u.reach for u in unseen.values()}, **models.loads} if len(set(rows)) > 1 else {}
@@ -109,14 +117,18 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
         why = (f"{names[top]} gives a current that its own linear model does not, and that explains "
                f"{100 * (1 - rest):.0f} % of what the voltages do")  # fmt: skip
         also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
-        return Opinion(OWN_MODEL, names[top], True, why + ("; less so " + ", ".join(also) if also else ""), ranking)
+        sole = not also and left(beyond(effects[top])) < _UNEXPLAINED
+        return Opinion(
+            OWN_MODEL, names[top], True, why + ("; less so " + ", ".join(also) if also else ""), ranking, sole
+        )
     order = sorted(rivals, key=rivals.__getitem__)
     first, second, *_ = [*(rivals[name] for name in order), 1.0, 1.0]
     if first < min(_EXPLAINED, _CLEARER * second) and max(parts) < _CONTRARY:
         name = " or ".join(n for n, u in unseen.items() if u.bus == order[0]) or order[0]
         why = (f"the units that are observed do as their models, and a current of {name} explains "
                f"{100 * (1 - first):.0f} % of what the voltages do")  # fmt: skip
-        return Opinion(OWN_MODEL, name, True, why, ranking)
+        sole = max(parts) < _NOTED and left(beyond(fitted(reach(further[order[0]])))) < _UNEXPLAINED
+        return Opinion(OWN_MODEL, name, True, why, ranking, sole)
     both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3])
     why = f"no place alone deviates from its model and explains the voltages (deviations: {both})"
     return Opinion(OWN_MODEL, None, True, why, ranking)

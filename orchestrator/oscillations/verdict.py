@@ -6,7 +6,7 @@ from typing import Any
 
 from orchestrator.oscillations.detection import SpectralLine, find_oscillations, signals_of
 from orchestrator.oscillations.kind import Evidence, evidence_of
-from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, opinions
+from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, felt_beyond, opinions
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.models import OWN_MODEL, UnitModels, own_models
 
@@ -21,14 +21,15 @@ class Located:
     found: SpectralLine
     evidence: Evidence
     opinions: tuple[Opinion, ...]
-    source: str | None  # the place that feeds it; None where that is not known, or nothing forces it
+    drives: str | None  # a place that drives it, perhaps not alone; None where that is not known, or nothing forces it
+    source: str | None  # the same, where it is known that nothing else drives
     reason: str  # why it is named, or why not
     advice: str  # what would confirm the answer, or what helps
 
     def as_json(self) -> dict[str, Any]:
         return {
             "frequency_hz": self.found.frequency, "kind": self.evidence.kind, "source": self.source,
-            "reason": self.reason, "advice": self.advice, "begin": self.found.begin,
+            "drives": self.drives, "reason": self.reason, "advice": self.advice, "begin": self.found.begin,
             "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
             "evidence": asdict(self.evidence),
             "methods": [asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions],
@@ -50,14 +51,23 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
             said = [own, *said] if own.applies else [*said, own]
             if own.place is not None and evidence.kind == "not known":
                 evidence = replace(evidence, kind="forced", reasons=(own.reason,))
-        source, reason = _verdict(evidence, said)
+        drives, reason = _verdict(evidence, said)
         reason += f"; {OWN_MODEL}: {said[-1].reason}" if said[-1].method == OWN_MODEL else ""
-        answers.append(Located(one, evidence, tuple(said), source, reason, _advice(measured, evidence, source)))
+        if drives is not None and said[0].method != OWN_MODEL and not felt_beyond(measured, one, others, drives):
+            drives, reason = (
+                None,
+                f"no other bus moves with {drives}: its measuring may err, or nothing else is in view",
+            )
+        sole = said[0].alone and drives is not None
+        if drives is not None and not sole:
+            reason += f"; whether {drives} does so alone is not known"
+        advice = _advice(measured, evidence, drives, sole=sole)
+        answers.append(Located(one, evidence, tuple(said), drives, drives if sole else None, reason, advice))
     return answers
 
 
 def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, str]:
-    """A source where the methods agree or one is known not to apply."""
+    """What drives it, where the methods agree or one is known not to apply."""
     if evidence.kind != "forced":
         what = (
             "a mode of the system has no source" if evidence.kind == "mode" else "it is not known whether it is forced"
@@ -80,11 +90,18 @@ def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, s
     return agree[0].place, "; ".join(f"{o.method}: {o.reason}" for o in [*agree, *quiet])
 
 
-def _advice(measured: Measurements, evidence: Evidence, source: str | None) -> str:
+def _advice(measured: Measurements, evidence: Evidence, drives: str | None, *, sole: bool) -> str:
     if evidence.kind == "mode":
-        return "damp the mode: `gfor sensitivities` and `gfor design` say which controller moves it most"
-    if source is None:
+        return "damp the mode, which nothing drives: `gfor sensitivities CASE` ranks the POD and PSS that move it most"
+    if drives is None:
         return "look at the places that lead the methods' rankings; a longer record, or more of the grid, may decide"
-    if any(p.name == source and p.kind == "branch" for p in measured.places):
-        return f"measure beyond {source}: it comes from there"
-    return f"hold the references of {source}, or switch its controllers to manual: the oscillation has to end"
+    if any(p.name == drives and p.kind == "branch" for p in measured.places):
+        return f"measure beyond {drives}: it comes from there"
+    held = f"hold the references of {drives}, or switch its controllers to manual"
+    return (
+        f"{held}: the oscillation has to end"
+        if sole
+        else (
+            f"{held}: if it does not end, something else drives it as well, which the units' models can show (--case)"
+        )
+    )

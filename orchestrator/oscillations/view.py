@@ -29,7 +29,7 @@ class Sources:
     label
         Name of the record.
     oscillations
-        Frequency, kind, evidence, what each method says, and the source or None.
+        Frequency, kind, evidence, what each method says, what drives it, and whether alone.
     remarks
         What was done to the record before.
     places
@@ -38,7 +38,7 @@ class Sources:
 
     def __init__(self, measured: Measurements, oscillations: Sequence[Located]) -> None:
         self.label, self.remarks, self.oscillations = measured.label, measured.remarks, list(oscillations)
-        self.places = [place.name for place in measured.places]
+        self.places, self._measured = [place.name for place in measured.places], measured
 
     def __iter__(self) -> Iterator[Located]:
         return iter(self.oscillations)
@@ -52,9 +52,15 @@ class Sources:
         return {"record": self.label, "places": self.places, "remarks": list(self.remarks), "oscillations": found}
 
     def table(self) -> pd.DataFrame:
-        """One row for each oscillation: frequency [Hz], kind, source, begin [s] and the reason."""
-        keys = ["frequency_hz", "kind", "source", "begin", "reason"]
+        """One row for each oscillation: frequency [Hz], kind, source, what drives, begin [s] and the reason."""
+        keys = ["frequency_hz", "kind", "source", "drives", "begin", "reason"]
         return pd.DataFrame([one.as_json() for one in self.oscillations], columns=keys)
+
+    def html(self) -> str:
+        """A page with the map of the energy flows, the amplitudes over the time, and the spectrum."""
+        from orchestrator.oscillations.page import source_page  # noqa: PLC0415 - only where it is asked for
+
+        return source_page(self._measured, self.oscillations)
 
     def __repr__(self) -> str:
         return f"<Sources in {self.label}: {len(self)} oscillations>"
@@ -92,7 +98,8 @@ def _rows(one: Sources) -> Iterator[Sequence[str]]:
     for x in one:
         begin = "before" if x.found.begin is None else f"{x.found.begin:.1f}"
         multiples = ", ".join(str(order) for order in x.found.harmonics)
-        yield one.label, f"{x.found.frequency:.4f}", str(x.evidence.kind), x.source or "not known", begin, multiples
+        source = x.source or (f"{x.drives}, perhaps others" if x.drives else "not known")
+        yield one.label, f"{x.found.frequency:.4f}", str(x.evidence.kind), source, begin, multiples
     if not len(one):
         yield one.label, "–", "no oscillation", "–", "–", ""
 

@@ -19,7 +19,7 @@ NAMES = {
     *("Acceptance", "Admittance", "ControllerDesign", "CoordinatedDesign", "Fmu", "FmuInfo", "Interactions"),
     *("IssuedCertificate", "Nyquist", "RunComparison", "Saved", "Sensitivities", "SignalModes", "Siting", "Sources"),
     *("StepChoice", "Verification"),
-    *("export_comtrade", "identify", "info", "nyquist", "open_fmu", "read_linear_model", "source"),
+    *("ambient", "export_comtrade", "identify", "info", "nyquist", "open_fmu", "read_linear_model", "source"),
 }
 
 

@@ -1,12 +1,17 @@
 """Runs, tables of phasors and the contest's folders, with what is wrong in them."""
 
 import json
+from dataclasses import replace
+from html import escape
 
 import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
+from orchestrator.oscillations.measurements import Site
 from orchestrator.oscillations.reading import contest_cases, read_contest
+from orchestrator.oscillations.verdict import locate
+from orchestrator.oscillations.view import Sources
 from tests.support.forced_records import record, sine, times_of
 
 TIMES = times_of(40.0)
@@ -32,12 +37,26 @@ def test_phasors_in_csv(gfor, tmp_path, measured):
     found = json.loads(out)
     assert code == 0
     (one,) = found["oscillations"]
-    assert one["source"] == "sg1"
+    assert (one["drives"], one["source"]) == ("sg1", None)  # without a case it may not be alone
     assert one["kind"] == "forced"
     assert one["frequency_hz"] == pytest.approx(0.8, abs=2e-3)
     assert {m["method"] for m in one["methods"]} == {
         "dissipating energy flow", "dynamic-mode participation", "Q-V phase"
     }  # fmt: skip
+
+
+def test_the_page_shows_where_energy_flows(gfor, tmp_path, measured):
+    """A line is an arrow from the bus that feeds to the one beyond, whichever way it was measured."""
+    fed = next(x for x in measured.places if x.name == "sg1")
+    for sign in (1, -1):  # all that sg1 feeds leaves its bus; the other way round, all comes from beyond
+        away = Site("line", "branch", fed.bus, fed.v, fed.angle, -sign * fed.p, -sign * fed.q, "<beyond>")
+        page = Sources(replaced := replace(measured, places=(*measured.places, away)), locate(replaced)).html()
+        arrow = f"{fed.bus} → <beyond>" if sign > 0 else f"<beyond> → {fed.bus}"
+        assert escape(f"{arrow}: 100%") in page
+    code, _, _ = gfor("signal", "source", csv(tmp_path / "pmu.csv", measured), "--html", tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text()
+    assert code == 0
+    assert all(part in text for part in ("map of energy flows", "Amplitude over the time", "Mean power of all signals"))
 
 
 def test_the_first_screen_is_the_answer(gfor, tmp_path, measured):
@@ -101,7 +120,7 @@ def test_a_folder_of_the_contest(gfor, tmp_path, measured):
     assert [one["record"] for one in found] == ["Case1", "Case2", "Case10"]
     for one in found:
         assert "written twice" in one["remarks"][0]
-        assert one["oscillations"][0]["source"] == "100|SG1 20.0"
+        assert one["oscillations"][0]["drives"] == "100|SG1 20.0"
 
 
 def test_what_is_no_case_of_the_contest(tmp_path, measured):

@@ -64,9 +64,9 @@ class Model:
         return np.real(states @ self.C.T) + inputs @ self.D.T
 
 
-def make_model(case, scenario):
+def make_model(case, scenario, values=None):
     """Linearise a case and keep what is slow."""
-    ready = gfor.load(case).scenario(scenario)
+    ready = gfor.load(case).scenario(scenario, values or {})
     plans, flow = ready.prepared.system.components, ready.prepared.power_flow
     ports = {
         c.target.component: c.source.variable.removesuffix(".v_re")
