@@ -26,8 +26,7 @@ def test_the_verdict_at_a_cut_is_that_of_the_modes(scenario, names, stable):
 
 
 def test_a_disagreement_with_the_modes_is_no_verdict(monkeypatch):
-    monkeypatch.setattr("orchestrator.immittance.judgement._by_determinant", lambda path, loop: 2)
-    monkeypatch.setattr("orchestrator.immittance.judgement._by_crossings", lambda path, loop: 2)
+    monkeypatch.setattr("orchestrator.immittance.judgement._count", lambda path, turns, exact: 2)
     found = gfor.nyquist("two_area", scenario="gfor", components=["gfor"])
     assert found.verdict == "not known"
     assert "eigenvalues of the closed system say stable" in found.reasons[0]
