@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+import scipy.sparse.csgraph
 
 from orchestrator.analysis.device_start import misfits_of, sentences
 from orchestrator.analysis.linear_model import LinearModel
@@ -20,7 +22,6 @@ from orchestrator.immittance.together import Behind, Rows, SideBySide, Unit
 from orchestrator.study.modes import running
 
 _PORT = ("v_re", "v_im"), ("i_re", "i_im")
-_NOTHING = 1e-9  # size of a coupling that is none
 _ALIKE = 1e-6  # relative difference between two devices' currents for the network, which are perturbed one by one
 
 
@@ -101,151 +102,105 @@ def _devices(homes: dict[str, str], bus: str | None, names: tuple[str, ...]) -> 
 
 
 class _Opened:
-    """The closed model, to be opened between devices and all else.
-
-    With the devices' currents given, the network stands alone; with their voltages given, the devices do."""
+    """The closed model with all devices' voltages and currents given: it falls apart into the network and the units."""
 
     def __init__(self, blocks: Blocks, model: LinearModel, devices: tuple[str, ...]) -> None:
-        self._names = {full: k for k, full in enumerate(blocks.output_names)}
+        place = {full: k for k, full in enumerate(blocks.output_names)}
         self._matrices = [M.toarray() for M in (model.F, model.G, model.H, model.K)]
-        self._read = {
-            d: np.array([int(blocks.sources[d][blocks.components[d].inputs.index(v)]) for v in _PORT[0]])
-            for d in devices
-        }
-        self._given = {d: np.array([self._names[f"{d}.{i}"] for i in _PORT[1]]) for d in devices}
-        self._clusters = _clusters(blocks, self._read)
-        windows = blocks.state_windows()
-        states = np.arange(len(model.names))
-        self._states = {
-            cluster: np.concatenate([states[windows[name]] for name in cluster]) for cluster in self._clusters
-        }
+        inputs = {d: [blocks.components[d].inputs.index(v) for v in _PORT[0]] for d in devices}
+        read = [int(blocks.sources[d][k]) for d in devices for k in inputs[d]]
+        self._given = [place[f"{d}.{i}"] for d in devices for i in _PORT[1]]
+        self._devices, self._read = devices, read
+        self.A, self.B, self.C, self.D = self._open([*read, *self._given])
+        self._v = {d: 2 * k + np.arange(2) for k, d in enumerate(devices)}
+        self._i = {d: rows + len(read) for d, rows in self._v.items()}
+        self._ports: list[list[str]] = []
+        for d in devices:
+            at = next((at for at in self._ports if self._is_alike(d, at[0])), None)
+            self._ports.append([d]) if at is None else at.append(d)
+        self._units = self._separate()
 
-    def sides(
-        self, devices: tuple[str, ...]
-    ) -> tuple[Exact | SideBySide, Exact | Behind, tuple[Unit, ...], list[tuple[str, ...]]]:
-        """Those of a cut at some devices, the units at it, and the devices at each port."""
-        self._check(devices)
-        ports = self._ports()
-        mine = [k for k, at in enumerate(ports) if set(at) & set(devices)]
-        net, alone = self._network(ports)
-        own = [c for c in self._clusters if set(c) & set(devices)]
-        chosen = tuple(self._unit(cluster, [ports[k] for k in mine], net) for cluster in own)
-        at = [tuple(d for d in ports[k] if d in devices) for k in mine]
-        together = SideBySide(", ".join(devices), chosen, 2 * len(mine))
-        one = chosen[0].side if len(chosen) == 1 else together
-        device = one if isinstance(one, Exact) and len(mine) == 1 else together
-        rest = tuple(self._unit(c, ports, net) for c in self._clusters if c not in own)
-        if not rest:
-            return device, alone, chosen, at
-        rows = _rows(mine)
-        poles = np.linalg.eigvals(self._rest(devices, own))
-        others = SideBySide("the others", rest, 2 * len(ports))
-        return device, Behind("the network", alone, others, rows, poles), chosen, at
-
-    def _check(self, devices: tuple[str, ...]) -> None:
-        for cluster in self._clusters:
-            inside = [d for d in cluster if d in self._given]
-            if (left := [d for d in inside if d not in devices]) and len(left) < len(inside):
-                raise InputError(
-                    f"{', '.join(d for d in inside if d in devices)} and {', '.join(left)} are connected by other "
-                    "signals than the network's voltages and currents; cut at all of them"
-                )
-
-    def _ports(self) -> list[tuple[str, ...]]:
-        """Devices that see one voltage, and whose currents the network takes alike."""
-        found: list[list[str]] = []
-        _, G, _, K = self._matrices
-        taken = {d: np.concatenate([G[:, given], K[:, given]]) for d, given in self._given.items()}
-        for d, read in self._read.items():
-            for at in found:
-                apart = np.abs(taken[d] - taken[at[0]]).max()
-                if (read == self._read[at[0]]).all() and apart <= _ALIKE * np.abs(taken[d]).max():
-                    at.append(d)
-                    break
-            else:
-                found.append([d])
-        return [tuple(at) for at in found]
-
-    def _opened(self, rows: Sequence[int]) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-        """A, and B, C, D of all outputs, where some of them are given instead of computed."""
+    def _open(self, rows: list[int]) -> list[Matrix]:
+        """A, B, C and D from some outputs that are given to those that are computed in their place."""
         F, G, H, K = self._matrices
-        H, K = H.copy(), K.copy()
-        H[rows], K[rows] = 0.0, 0.0
-        whole = np.linalg.inv(np.eye(len(K)) - K)
-        return F + G @ whole @ H, G @ whole, whole @ H, whole
+        H_0, K_0 = H.copy(), K.copy()
+        H_0[rows], K_0[rows] = 0.0, 0.0
+        whole = np.linalg.inv(np.eye(len(K)) - K_0)
+        through = K[rows] @ whole
+        return [F + G @ whole @ H_0, (G @ whole)[:, rows], H[rows] + through @ H_0, through[:, rows]]
 
-    def _network(self, ports: list[tuple[str, ...]]) -> tuple[Matrix, Exact]:
-        """States of the network, and its impedance at all ports."""
-        A, B, C, D = self._opened(np.concatenate(list(self._given.values())).tolist())
-        of_units = np.concatenate(list(self._states.values()))
-        net = np.setdiff1d(np.arange(len(A)), of_units)
-        given = np.concatenate([self._given[at[0]] for at in ports])
-        read = np.concatenate([self._read[at[0]] for at in ports])
-        _check_alone("the network", "a device", A[np.ix_(net, of_units)], C[np.ix_(read, of_units)])
-        return net, _settled("the network", A, B[:, given], C[read], D[np.ix_(read, given)], net)
+    def _is_alike(self, one: str, other: str) -> bool:
+        """Whether two devices see one voltage, and the network takes their currents alike."""
+        a, b = (np.concatenate([self.B[:, self._i[d]], self.D[:, self._i[d]]]) for d in (one, other))
+        seen = [[self._read[k] for k in self._v[d]] for d in (one, other)]
+        return seen[0] == seen[1] and bool(np.abs(a - b).max() <= _ALIKE * np.abs(a).max())
 
-    def _unit(self, cluster: tuple[str, ...], ports: list[tuple[str, ...]], net: Matrix) -> Unit:
-        """A cluster's devices with their voltages given; its currents count into it."""
-        inside = tuple(d for d in cluster if d in self._given)
-        A, B, C, D = self._closed_units
-        mine = [k for k, at in enumerate(ports) if set(at) & set(inside)]
-        read = np.concatenate([self._read[ports[k][0]] for k in mine])
-        adds = [[self._given[d] for d in inside if d in ports[k]] for k in mine]
-        rows = self._states[cluster]
-        currents = np.concatenate([sum(C[given] for given in at) for at in adds])
-        through = np.concatenate([sum(D[given] for given in at) for at in adds])
-        _check_alone(", ".join(cluster), "the network", A[np.ix_(rows, net)], currents[:, net])
-        side = _settled(", ".join(inside), A, B[:, read], currents, through[:, read], rows)
+    def _separate(self) -> list[tuple[tuple[str, ...], Rows]]:
+        """Devices and states of each unit: what hangs together without the voltages and currents at the buses."""
+        n, p = self.B.shape
+        half = p // 2  # voltages come first; what they reach is joined by the currents that it gives
+        joined = np.zeros((n + 2 * p, n + 2 * p), dtype=bool)  # states, what is given, what is computed in its place
+        joined[:n, :n], joined[:n, n + half : n + p] = self.A != 0, self.B[:, half:] != 0
+        joined[n + p :, :n], joined[n + p :, n + half : n + p] = self.C != 0, self.D[:, half:] != 0
+        for d in self._devices:
+            joined[np.ix_(n + p + self._i[d], n + p + self._i[d])] = True
+        _, label = scipy.sparse.csgraph.connected_components(joined, directed=False)
+        network = set(label[n + half : n + p].tolist()) | set(label[n + p : n + p + half].tolist())
+        found: dict[int, list[str]] = {}
+        for d in self._devices:
+            found.setdefault(int(label[n + p + self._i[d][0]]), []).append(d)
+        units = [(one, tuple(ds), np.flatnonzero(label[:n] == one)) for one, ds in found.items()]
+        for one, ds, states in units:
+            own = {self._read[k] for d in ds for k in self._v[d]}
+            others = np.array([k for k in range(half) if self._read[k] not in own], dtype=np.int64)
+            currents = np.concatenate([self._i[d] for d in ds])
+            if one in network or self.B[np.ix_(states, others)].any() or self.D[np.ix_(currents, others)].any():
+                raise InputError(
+                    f"no cut separates {', '.join(ds)} from the network: other signals than voltage and current "
+                    "at its bus connect them, such as a remote measurement; `gfor modes` judges such a case"
+                )
+        return [(ds, states) for _, ds, states in units]
+
+    def sides(self, devices: tuple[str, ...]) -> tuple[Any, Any, tuple[Unit, ...], list[tuple[str, ...]]]:
+        """Those of a cut at some devices, the units at it, and the devices at each port."""
+        own = [unit for unit in self._units if set(unit[0]) & set(devices)]
+        if left := [d for unit in own for d in unit[0] if d not in devices]:
+            raise InputError(f"{', '.join(left)}: other signals connect it to what is cut; cut there, too")
+        mine = [k for k, at in enumerate(self._ports) if set(at) & set(devices)]
+        states = np.concatenate([kept for _, kept in self._units])
+        net = np.setdiff1d(np.arange(len(self.A)), states)
+        v, i = (np.concatenate([x[at[0]] for at in self._ports]) for x in (self._v, self._i))
+        alone = self._settled("the network", net, i, self.C[v], self.D[v])
+        units = tuple(self._unit(*unit, mine) for unit in own)
+        together = SideBySide(", ".join(devices), units, 2 * len(mine))
+        at = [tuple(d for d in self._ports[k] if d in devices) for k in mine]
+        device = units[0].side if len(units) == len(mine) == 1 else together
+        every = list(range(len(self._ports)))
+        rest = tuple(self._unit(*unit, every) for unit in self._units if not set(unit[0]) & set(devices))
+        if not rest:
+            return device, alone, units, at
+        closed = self._open([self._given[k] for d in devices for k in self._v[d]])[0]
+        kept = np.setdiff1d(np.arange(len(closed)), np.concatenate([states for _, states in own]))
+        others = SideBySide("the others", rest, 2 * len(every))
+        poles = np.linalg.eigvals(closed[np.ix_(kept, kept)]).astype(complex)
+        return device, Behind("the network", alone, others, _rows(mine), poles), units, at
+
+    def _unit(self, inside: tuple[str, ...], states: Rows, ports: list[int]) -> Unit:
+        """Its currents count into it."""
+        mine = [k for k, port in enumerate(ports) if set(self._ports[port]) & set(inside)]
+        at = [[d for d in self._ports[ports[k]] if d in inside] for k in mine]
+        C, D = (np.concatenate([sum(M[self._i[d]] for d in ds) for ds in at]) for M in (self.C, self.D))
+        v = np.concatenate([self._v[ds[0]] for ds in at])
+        B, D = self.B[np.ix_(states, v)], D[:, v]
+        side = Exact(", ".join(inside), self.A[np.ix_(states, states)], B, C[:, states], D)
         return Unit(inside, _rows(mine), side.negated())
 
-    @property
-    def _closed_units(self) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-        if not hasattr(self, "_of_units"):
-            self._of_units = self._opened(np.unique(np.concatenate(list(self._read.values()))).tolist())
-        return self._of_units
-
-    def _rest(self, devices: tuple[str, ...], own: list[tuple[str, ...]]) -> Matrix:
-        """A of all that is left, with the others connected."""
-        A = self._opened(np.concatenate([self._given[d] for d in devices]).tolist())[0]
-        kept = np.setdiff1d(np.arange(len(A)), np.concatenate([self._states[c] for c in own]))
-        return A[np.ix_(kept, kept)]
+    def _settled(self, name: str, kept: Rows, given: Rows, C: Matrix, D: Matrix) -> Exact:
+        """Some of the states; clocks among them say nothing."""
+        A, B = self.A[np.ix_(kept, kept)], self.B[np.ix_(kept, given)]
+        told = (np.abs(A).sum(axis=1) + np.abs(B).sum(axis=1) > 0) | (np.abs(A).sum(axis=0) > 0)
+        return Exact(name, A[np.ix_(told, told)], B[told], C[:, kept[told]], D[:, given])
 
 
 def _rows(ports: Sequence[int]) -> Rows:
     return (2 * np.array(ports, dtype=np.int64)[:, None] + np.arange(2)).ravel()
-
-
-def _settled(name: str, A: Matrix, B: Matrix, C: Matrix, D: Matrix, kept: Rows) -> Exact:
-    """Some of the states; clocks among them say nothing."""
-    moved = np.abs(A[np.ix_(kept, kept)]).sum(axis=1) + np.abs(B[kept]).sum(axis=1) > 0
-    kept = kept[moved | (np.abs(A[np.ix_(kept, kept)]).sum(axis=0) > 0)]
-    return Exact(name, A[np.ix_(kept, kept)], B[kept], C[:, kept], D)
-
-
-def _check_alone(what: str, other: str, *couplings: Matrix) -> None:
-    if any(np.abs(M).max(initial=0.0) > _NOTHING for M in couplings):
-        raise InputError(
-            f"the cut does not separate {what} from {other}: they are connected by other signals than the voltage and "
-            "the current at a bus, such as a remote measurement; `gfor modes` judges such a case"
-        )
-
-
-def _clusters(blocks: Blocks, read: dict[str, Rows]) -> list[tuple[str, ...]]:
-    """Devices with what is connected to them otherwise than by the components that give their voltages."""
-    owner = {i: name for name in blocks.components for i in range(len(blocks.output_names))[blocks.window[name]]}
-    networks = {owner[int(i)] for rows in read.values() for i in rows}
-    home = {name: name for name in blocks.components if name not in networks}
-
-    def root(name: str) -> str:
-        while home[name] != name:
-            name = home[name]
-        return name
-
-    for name in home:
-        for source in blocks.sources[name].tolist():
-            if (other := owner.get(source)) in home:
-                home[root(other)] = root(name)
-    found: dict[str, list[str]] = {}
-    for name in home:
-        found.setdefault(root(name), []).append(name)
-    return [tuple(names) for names in found.values() if set(names) & set(read)]

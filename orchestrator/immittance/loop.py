@@ -8,13 +8,14 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from orchestrator.arrays import Complex, Numbers, Vector
-from orchestrator.immittance.sides import Known, Side
+from orchestrator.immittance.sides import ON_AXIS, Known, Side
 from orchestrator.immittance.together import SideBySide, Unit
 
 _STEP = np.deg2rad(25.0)  # largest turn of det(1 + L) from one point of the path to the next
 _AT_A_BUS = np.deg2rad(60.0)  # the same of the loop at one bus of several
 _ALIKE = 0.1  # turns of the determinant and of the loci, added up, differ by less [rad] where loci are followed rightly
 _ROUNDS, _MOST, _AT_ONCE = 14, 60_000, 500
+_ROUND = 1e-6  # radius of the way round an undamped pole of a model, relative to it
 _NARROW = 0.5  # poles damped by less than this part have points of their own
 _WITHIN, _ENOUGH = 6, 1000  # points between two frequencies at first, unless there are enough of them
 _ARC = 1e-4  # radius of the way round a pole on the axis, relative to the pole
@@ -81,7 +82,7 @@ class LoopPath:
     def at_bus(self, k: int) -> "LoopPath":
         """The loop of the devices at one bus of several against all else: 1 + L there is S⁻¹, S that block of
         (1 + L)⁻¹."""
-        L = np.linalg.inv(self._blocks[:, k]) - np.eye(2)
+        L = np.asarray(np.linalg.inv(self._blocks[:, k]) - np.eye(2), dtype=complex)
         return LoopPath(self.s, L, followed(np.linalg.eigvals(L)))
 
     @cached_property
@@ -141,6 +142,13 @@ class CutLoop:
         s = self._round_the_pole(1j * w)
         if self.is_exact:
             s = np.concatenate([w[0] * np.exp(1j * np.linspace(0, np.pi / 2, 17))[:-1], s])
+            for pole in self._on_axis(w[0], w[-1]).tolist():
+                far = 1j * _ROUND * pole * np.geomspace(1, 1e4, 30)
+                arc = _ROUND * pole * np.exp(1j * np.linspace(-np.pi / 2, np.pi / 2, 31))[1:-1]
+                s = np.concatenate(
+                    [s[np.abs(s.imag - pole) > 3 * _ROUND * pole], *(1j * pole + x for x in (far, -far, arc))]
+                )
+                s = s[np.argsort(s.imag)]
         L = self.values(s)
         marks = self._marks(L)
         most = [_STEP, *[_AT_A_BUS] * (marks.shape[1] - 1)]
@@ -156,6 +164,12 @@ class CutLoop:
             s = np.insert(s, places + 1, middle)
             L, marks = (np.insert(a, places + 1, b, axis=0) for a, b in ((L, more), (marks, self._marks(more))))
         return path if path and len(path.s) == len(s) else LoopPath(s, L, followed(np.linalg.eigvals(L)))
+
+    def _on_axis(self, low: float, high: float) -> Numbers:
+        """Undamped poles of the exact sides [rad/s], those of one place once."""
+        poles = np.concatenate([NO_MODES, *(x.poles for x in (self.device, self.network) if isinstance(x, Known))])
+        w = np.sort(poles.imag[(np.abs(poles.real) <= ON_AXIS * poles.imag) & (poles.imag > low) & (poles.imag < high)])
+        return np.asarray(w[np.diff(w, prepend=0.0) > 0.3 * _ROUND * w])
 
     def _marks(self, L: Complex) -> Complex:
         """What must turn little from point to point: det(1 + L), and the same of the loop at each of several buses."""

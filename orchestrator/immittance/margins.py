@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 from orchestrator.immittance.loop import LoopPath
@@ -96,7 +97,7 @@ def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
     counted = told(path)
     one, disk = np.eye(path.L.shape[-1]), np.full(len(path.s), np.inf)
     disk[counted & (path.distance <= _TOUCHES)] = 0.0
-    counted &= path.distance > _TOUCHES
+    counted = counted & (path.distance > _TOUCHES)
     disk[counted] = 1 / np.linalg.norm(np.linalg.inv(one + path.L[counted]) - one / 2, ord=2, axis=(1, 2))
     return NyquistMargins(
         up, down, _least(turned), _least(delayed), _where_least(path, path.distance), _where_least(path, disk)
@@ -113,7 +114,7 @@ def _least(margins: list[Margin]) -> Margin | None:
     return min(margins, key=lambda m: m.value, default=None)
 
 
-def told(path: LoopPath) -> Numbers:
+def told(path: LoopPath) -> NDArray[np.bool_]:
     """Where a distance counts: from the slowest frequency on, and where a free angle's locus still comes away from −1,
     from there on where it no longer does."""
     counted = path.on_axis & (path.hertz >= min(_SLOWEST, path.hertz[-1]))

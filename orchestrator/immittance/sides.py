@@ -12,6 +12,10 @@ from orchestrator.immittance.poles import unstable_poles
 NEAR_ZERO = 1e-3
 """Poles of models this near to 0 [rad/s] are the free angle's and clocks'; the path goes round them to the right."""
 
+ON_AXIS = 1e-7
+"""Poles of models whose damping is less than this are on the axis, as of coils and capacitors without losses; the path
+goes round them to the right, too."""
+
 _RESOLVED, _SHARE, _NOISE, _UNRESOLVED = 0.3, 0.5, 1e-3, 6.0
 """Where a cubic through its neighbours predicts a left-out value by 0.3 times the error of a straight line or better,
 half of its error is the interpolation's with room to spare. Elsewhere what is seen is noise up to 1e-3 of the value;
@@ -109,7 +113,7 @@ class Known:
 
     @property
     def unstable(self) -> tuple[complex, ...]:
-        return tuple(p for p in self.poles.tolist() if p.real > 0 and abs(p) > NEAR_ZERO)
+        return tuple(p for p in self.poles.tolist() if p.real > ON_AXIS * abs(p) and abs(p) > NEAR_ZERO)
 
     def error(self, s: Vector) -> Numbers:
         return np.zeros(len(s))

@@ -28,6 +28,7 @@ from orchestrator.immittance.sides import NEAR_ZERO, Sampled, Side
 from orchestrator.immittance.strength import SourceBehind, converters_scr, short_circuit_mva
 
 _FEW = 4  # devices that are named one by one
+_COMPARED, _SAME = (0.05, 1000.0), 0.01  # frequencies [Hz] of a comparison with the eigenvalues, and its tolerance
 _GROWS = 1e-6  # real part of an eigenvalue that grows [1/s], as in `orchestrator.analysis.stability`
 
 
@@ -117,7 +118,7 @@ class CutResult:
     def difference(self) -> dict[str, float] | None:
         """Largest difference of a scan from the case's own device in its place, relative, where there is one."""
         device = self.loop.device
-        if self.cut is None or not isinstance(device, Sampled) or device.values.shape[1:] != self.cut.device.D.shape:
+        if self.cut is None or not isinstance(device, Sampled) or device.values.shape[1] != 2 * len(self.cut.ports):
             return None
         own = self.cut.device.at(2j * np.pi * device.frequencies)
         apart = np.linalg.norm(device.values - own, ord=2, axis=(1, 2)) / np.linalg.norm(own, ord=2, axis=(1, 2))
@@ -319,12 +320,24 @@ def _beside_modes(judgement: CutJudgement, cut: Cut) -> CutJudgement:
     said = {True: NyquistVerdict.STABLE, False: NyquistVerdict.UNSTABLE, None: NyquistVerdict.NOT_KNOWN}
     values = cut.eigenvalues
     growing = int(((values.real > np.maximum(_GROWS, 1e-8 * np.abs(values))) & (np.abs(values) > NEAR_ZERO)).sum())
-    if judgement.reasons or (
-        said[cut.modes_stable] is judgement.verdict and (not len(values) or growing == judgement.growing)
-    ):
+    alike = not len(values) or growing == judgement.growing
+    if judgement.reasons or (said[cut.modes_stable] is judgement.verdict and alike and _is_of(judgement, cut)):
         return judgement
     reason = (
         f"the eigenvalues of the closed system say {said[cut.modes_stable]} ({growing} grow), the encirclements "
-        f"{judgement.verdict} ({judgement.growing})"
+        f"{judgement.verdict} ({judgement.growing}); or det(1 + L) is not that of the eigenvalues and poles"
     )
     return replace(judgement, verdict=NyquistVerdict.NOT_KNOWN, reasons=(reason,), growing=None)
+
+
+def _is_of(judgement: CutJudgement, cut: Cut) -> bool:
+    """Whether det(1 + L) is ∏(s − eigenvalues)/∏(s − poles) but for a constant; clocks are eigenvalues alone."""
+    path = judgement.path
+    k = np.flatnonzero((path.s.real == 0) & (path.hertz > _COMPARED[0]) & (path.hertz < _COMPARED[1]))[
+        :: len(path.s) // 20
+    ]
+    s, poles = path.s[k][:, None], np.concatenate([cut.device.poles, cut.network.poles])
+    clocks = len(cut.eigenvalues) - len(poles)
+    said = np.log(s - cut.eigenvalues).sum(axis=1) - np.log(s - poles).sum(axis=1) - clocks * np.log(s[:, 0])
+    apart = np.exp(said - np.log(path.det[k]) - (said - np.log(path.det[k]))[0])
+    return not len(cut.eigenvalues) or bool(np.abs(apart - 1).max() < _SAME)

@@ -38,7 +38,7 @@ class SideBySide(Known):
     def at(self, s: Vector) -> Complex:
         found = np.zeros((len(s), self.size, self.size), dtype=complex)
         for unit in self.units:
-            found[np.ix_(range(len(s)), unit.rows, unit.rows)] += unit.side.at(s)
+            found[:, unit.rows[:, None], unit.rows] += unit.side.at(s)
         return found
 
 
