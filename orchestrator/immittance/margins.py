@@ -1,6 +1,7 @@
 """Margins of a loop: changes of gain, phase and delay in all its entries that bring an eigenvalue to −1; the disk's."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,3 +130,9 @@ def told(path: LoopPath) -> NDArray[np.bool_]:
 def _where_least(path: LoopPath, values: Numbers) -> Margin:
     k = int(np.argmin(np.where(told(path), values, np.inf)))
     return Margin(float(values[k]), float(path.hertz[k]))
+
+
+def margins_json(m: NyquistMargins | None) -> dict[str, Any]:
+    keys = ("gain", "gain_up", "gain_down", "phase_deg", "delay_s", "distance", "disk")
+    found = {key: None if m is None else getattr(m, key) for key in keys}
+    return {key: None if one is None else vars(one) for key, one in found.items()}

@@ -15,21 +15,17 @@ from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.black_box.port import start_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
-from orchestrator.immittance.belonging import check_pair, check_place, check_size
+from orchestrator.immittance.belonging import beside_modes, check_pair, check_place, check_size
 from orchestrator.immittance.cut import Cut, cut_of
 from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judge_loop
 from orchestrator.immittance.loop import NO_MODES, CutLoop, SeriesCapacitors, common_range
-from orchestrator.immittance.margins import NyquistMargins
+from orchestrator.immittance.margins import NyquistMargins, margins_json
 from orchestrator.immittance.measured import scan_fmu
 from orchestrator.immittance.participation import Critical, critical
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
-from orchestrator.immittance.sides import NEAR_ZERO, Sampled, Side
+from orchestrator.immittance.sides import Sampled, Side
 from orchestrator.immittance.strength import SourceBehind, converters_scr, short_circuit_mva
-
-_FEW = 4  # devices that are named one by one
-_COMPARED, _SAME = (0.05, 1000.0), 0.01  # frequencies [Hz] of a comparison with the eigenvalues, and its tolerance
-_GROWS = 1e-6  # real part of an eigenvalue that grows [1/s], as in `orchestrator.analysis.stability`
 
 
 @dataclass(frozen=True)
@@ -142,7 +138,7 @@ class CutResult:
             "open_loop_unstable_poles": [{"real": p.real, "imag": p.imag} for p in j.open_loop],
             "modes_stable": None if self.cut is None or self.request.device else self.cut.modes_stable,
             "crossings": [{"real": c.real, "frequency_hz": c.frequency_hz} for c in j.crossings],
-            "margins": _margins_json(self.margins),
+            "margins": margins_json(self.margins),
             "buses": self._buses_json(),
             "critical": [vars(one) for one in self.critical],
             "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit},
@@ -163,22 +159,10 @@ class CutResult:
             found.append({
                 "bus": bus, "devices": list(devices), "verdict": str(self.verdict),
                 "encirclements": {"determinant": one.encirclements, "eigenloci": one.by_loci},
-                "growing_modes_without": one.without, "margins": _margins_json(one.margins),
+                "growing_modes_without": one.without, "margins": margins_json(one.margins),
                 "scr": self.ratios.get(bus.rpartition(".")[2]),
             })  # fmt: skip
         return found
-
-
-def named(devices: str) -> str:
-    """A side's name for a line: many devices are counted."""
-    count = devices.count(",") + 1
-    return devices if count <= _FEW else f"{devices.partition(',')[0]} and {count - 1} more"
-
-
-def _margins_json(m: NyquistMargins | None) -> dict[str, Any]:
-    keys = ("gain", "gain_up", "gain_down", "phase_deg", "delay_s", "distance", "disk")
-    found = {key: None if m is None else getattr(m, key) for key in keys}
-    return {key: None if one is None else vars(one) for key, one in found.items()}
 
 
 def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) -> CutResult:
@@ -222,7 +206,7 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     closed = cut if request.device is None and not request.compensation and request.scr is None else None
     judgement = judge_loop(loop, frames_known=known, modes=closed.eigenvalues if closed else NO_MODES)
     if cut is not None and closed:
-        judgement = _beside_modes(judgement, cut)
+        judgement = beside_modes(judgement, cut)
     prepared = request.network if isinstance(request.network, PreparedScenario) and request.scr is None else None
     short = short_circuit_mva(network, request.frequency, base, prepared, cut.bus if cut else "")
     ratios = converters_scr(prepared) if judgement.buses else {}
@@ -313,31 +297,3 @@ def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:
             f"--compensation: {loop.network.name} has no inductive reactance at one port to be compensated"
         )
     return SeriesCapacitors(request.compensation * X, 2 * np.pi * request.frequency)
-
-
-def _beside_modes(judgement: CutJudgement, cut: Cut) -> CutJudgement:
-    """Where the modes of the closed system say otherwise, nothing is known."""
-    said = {True: NyquistVerdict.STABLE, False: NyquistVerdict.UNSTABLE, None: NyquistVerdict.NOT_KNOWN}
-    values = cut.eigenvalues
-    growing = int(((values.real > np.maximum(_GROWS, 1e-8 * np.abs(values))) & (np.abs(values) > NEAR_ZERO)).sum())
-    alike = not len(values) or growing == judgement.growing
-    if judgement.reasons or (said[cut.modes_stable] is judgement.verdict and alike and _is_of(judgement, cut)):
-        return judgement
-    reason = (
-        f"the eigenvalues of the closed system say {said[cut.modes_stable]} ({growing} grow), the encirclements "
-        f"{judgement.verdict} ({judgement.growing}); or det(1 + L) is not that of the eigenvalues and poles"
-    )
-    return replace(judgement, verdict=NyquistVerdict.NOT_KNOWN, reasons=(reason,), growing=None)
-
-
-def _is_of(judgement: CutJudgement, cut: Cut) -> bool:
-    """Whether det(1 + L) is ∏(s − eigenvalues)/∏(s − poles) but for a constant; clocks are eigenvalues alone."""
-    path = judgement.path
-    k = np.flatnonzero((path.s.real == 0) & (path.hertz > _COMPARED[0]) & (path.hertz < _COMPARED[1]))[
-        :: len(path.s) // 20
-    ]
-    s, poles = path.s[k][:, None], np.concatenate([cut.device.poles, cut.network.poles])
-    clocks = len(cut.eigenvalues) - len(poles)
-    said = np.log(s - cut.eigenvalues).sum(axis=1) - np.log(s - poles).sum(axis=1) - clocks * np.log(s[:, 0])
-    apart = np.exp(said - np.log(path.det[k]) - (said - np.log(path.det[k]))[0])
-    return not len(cut.eigenvalues) or bool(np.abs(apart - 1).max() < _SAME)

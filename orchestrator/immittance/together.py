@@ -11,6 +11,8 @@ from orchestrator.immittance.sides import Exact, Known
 
 _AT_ONCE = 250  # points for which the matrices of a large network are held at a time
 
+_FEW = 4  # devices that are named one by one
+
 Rows = NDArray[np.int64]
 
 
@@ -59,3 +61,9 @@ class Behind(Known):
         Z = self.alone.at(s)
         closed = np.linalg.solve(np.eye(Z.shape[-1]) + Z @ self.others.at(s), Z[:, :, self.rows])
         return np.asarray(closed[:, self.rows])
+
+
+def named(devices: str) -> str:
+    """A side's name for a line: many devices are counted."""
+    count = devices.count(",") + 1
+    return devices if count <= _FEW else f"{devices.partition(',')[0]} and {count - 1} more"

@@ -10,7 +10,8 @@ from rich.markup import escape
 from orchestrator.immittance.margins import Margin
 from orchestrator.immittance.retune import Retuned, Study, Tunable, retune
 from orchestrator.immittance.retune_view import retuned_json, retuned_table
-from orchestrator.immittance.study import CutResult, named
+from orchestrator.immittance.study import CutResult
+from orchestrator.immittance.together import named
 from orchestrator.report.tables import make_table
 from orchestrator.report.verdict import VerdictSentence
 from orchestrator.results.storage import save_json
