@@ -1,12 +1,16 @@
 """Whether two sides belong together, or a scan to its place in a case."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.errors import InputError
 from orchestrator.immittance.cut import Cut
+from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict
 from orchestrator.immittance.loop import CutLoop
 from orchestrator.immittance.scan import PortPoint, Scan
+from orchestrator.immittance.sides import NEAR_ZERO
 
 _UNLIKE = (0.003, 30.0)
 """Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
@@ -14,6 +18,9 @@ _UNLIKE = (0.003, 30.0)
 _OTHER_POINT = 0.01
 """Relative difference of the voltage, and of the power over the larger one, from which on an operating point is another
 one."""
+
+_COMPARED, _SAME = (0.05, 1000.0), 0.01  # frequencies [Hz] of a comparison with the eigenvalues, and its tolerance
+_GROWS = 1e-6  # real part of an eigenvalue that grows [1/s], as in `orchestrator.analysis.stability`
 
 
 def check_size(loop: CutLoop, low: float, high: float) -> None:
@@ -62,3 +69,31 @@ def check_place(scan: Scan, cut: Cut, kilovolt: float | None) -> None:
     here = PortPoint(abs(cut.voltages[name]) * kilovolt if kilovolt else None, power.real, power.imag)
     for point in scan.points.values():
         _check_point(scan.source, point, f"{name} in the case", here)
+
+
+def beside_modes(judgement: CutJudgement, cut: Cut) -> CutJudgement:
+    """Where the modes of the closed system say otherwise, nothing is known."""
+    said = {True: NyquistVerdict.STABLE, False: NyquistVerdict.UNSTABLE, None: NyquistVerdict.NOT_KNOWN}
+    values = cut.eigenvalues
+    growing = int(((values.real > np.maximum(_GROWS, 1e-8 * np.abs(values))) & (np.abs(values) > NEAR_ZERO)).sum())
+    alike = not len(values) or growing == judgement.growing
+    if judgement.reasons or (said[cut.modes_stable] is judgement.verdict and alike and _is_of(judgement, cut)):
+        return judgement
+    reason = (
+        f"the eigenvalues of the closed system say {said[cut.modes_stable]} ({growing} grow), the encirclements "
+        f"{judgement.verdict} ({judgement.growing}); or det(1 + L) is not that of the eigenvalues and poles"
+    )
+    return replace(judgement, verdict=NyquistVerdict.NOT_KNOWN, reasons=(reason,), growing=None)
+
+
+def _is_of(judgement: CutJudgement, cut: Cut) -> bool:
+    """Whether det(1 + L) is ∏(s − eigenvalues)/∏(s − poles) but for a constant; clocks are eigenvalues alone."""
+    path = judgement.path
+    k = np.flatnonzero((path.s.real == 0) & (path.hertz > _COMPARED[0]) & (path.hertz < _COMPARED[1]))[
+        :: len(path.s) // 20
+    ]
+    s, poles = path.s[k][:, None], np.concatenate([cut.device.poles, cut.network.poles])
+    clocks = len(cut.eigenvalues) - len(poles)
+    said = np.log(s - cut.eigenvalues).sum(axis=1) - np.log(s - poles).sum(axis=1) - clocks * np.log(s[:, 0])
+    apart = np.exp(said - np.log(path.det[k]) - (said - np.log(path.det[k]))[0])
+    return not len(cut.eigenvalues) or bool(np.abs(apart - 1).max() < _SAME)

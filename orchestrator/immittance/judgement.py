@@ -5,13 +5,16 @@ from enum import StrEnum
 
 import numpy as np
 
-from orchestrator.arrays import Numbers, Vector
-from orchestrator.immittance.loop import CutLoop, LoopPath, common_range, nodes_of
+from orchestrator.arrays import Complex, Numbers, Vector
+from orchestrator.immittance.loop import NO_MODES, CutLoop, LoopPath, common_range, nodes_of
 from orchestrator.immittance.margins import Crossing, NyquistMargins, crossings_of, margins_of
 from orchestrator.immittance.scan import block_rotation
 from orchestrator.immittance.sides import NEAR_ZERO, Sampled, Side
 
-EXACT_RANGE = (NEAR_ZERO / (2 * np.pi), 20e3)  # in which two linear models are followed [Hz]
+EXACT_RANGE = (NEAR_ZERO / (2 * np.pi), 20e3)
+"""In which two linear models are followed at least [Hz]; beyond, so far as `_BEYOND` times the size of their poles."""
+
+_BEYOND = 30.0
 _END, _SMALL = 1.5, 0.95
 """Part of the range's end over which both sides must be passive, or the loci smaller than the second figure."""
 
@@ -26,6 +29,21 @@ class NyquistVerdict(StrEnum):
     STABLE = "stable"
     UNSTABLE = "unstable"
     NOT_KNOWN = "not known"
+
+
+@dataclass(frozen=True)
+class BusJudgement:
+    """The same closed system, judged at one bus of several: its devices against all else.
+
+    ``encirclements``, ``by_loci``: As of `CutJudgement`.
+    ``without``: Growing modes that are left with these devices away."""
+
+    port: int
+    encirclements: int
+    by_loci: int
+    without: int
+    crossings: tuple[Crossing, ...]
+    margins: NyquistMargins
 
 
 @dataclass(frozen=True)
@@ -44,14 +62,19 @@ class CutJudgement:
     # bands in which the device, the network and neither side can feed an oscillation [Hz].
     active: dict[str, list[tuple[float, float]]]
     small_gain: list[tuple[float, float]]
+    buses: tuple[BusJudgement, ...] = ()  # of an exact cut at several
 
 
 def judge_loop(
-    loop: CutLoop, *, frames_known: bool = True, range_hz: tuple[float, float] | None = None
+    loop: CutLoop, *, frames_known: bool = True, range_hz: tuple[float, float] | None = None, modes: Complex = NO_MODES
 ) -> CutJudgement:
-    """Count the encirclements, and ask all that could make the count wrong."""
+    """Count the encirclements, and ask all that could make the count wrong.
+
+    ``modes``: Where the closed system's are known [rad/s], points lie dense around them, too."""
     low, high = range_hz or common_range(loop.device, loop.network, EXACT_RANGE)
-    nodes = nodes_of(loop.device, loop.network, low, high)
+    if loop.is_exact and range_hz is None:
+        high = max(high, _BEYOND * loop.fastest / (2 * np.pi))
+    nodes = nodes_of(loop.device, loop.network, low, high, modes)
     path = loop.path(nodes)
     crossings = crossings_of(path)
     count, by_loci = encirclements(path, exact=loop.is_exact)
@@ -68,6 +91,8 @@ def judge_loop(
             f"the loop goes round −1 {-count} times against the clock, and its sides show {len(poles)} unstable poles: "
             "one side is unstable by itself, or a scan is not of this system"
         )
+    buses = _at_buses(loop, path, growing) if loop.is_exact and path.buses > 1 else ()
+    reasons += [reason for bus in buses if (reason := _doubt(loop, bus))]
     if not frames_known and not reasons:
         reasons += _frames(loop, nodes, count)
     verdict = NyquistVerdict.NOT_KNOWN if reasons else NyquistVerdict.UNSTABLE if growing else NyquistVerdict.STABLE
@@ -75,7 +100,29 @@ def judge_loop(
     active = {"device": _bands(*_active(loop.device)), "network": _bands(*_active(loop.network))}
     small = _bands(path.hertz, np.linalg.norm(path.L, ord=2, axis=(1, 2)) < 1)
     return CutJudgement(verdict, tuple(reasons), None if reasons else growing, count, by_loci, poles, tuple(crossings),
-                     margins, path, (low, high), active, small)  # fmt: skip
+                     margins, path, (low, high), active, small, buses)  # fmt: skip
+
+
+def _at_buses(loop: CutLoop, path: LoopPath, growing: int) -> tuple[BusJudgement, ...]:
+    """The loop at each bus, of which det(1 + L) of the whole is a factor: what is left over are the growing modes
+    without the bus."""
+    found = []
+    for k in range(path.buses):
+        here = path.at_bus(k)
+        count, by_loci = encirclements(here, exact=True)
+        own = sum(len(unit.side.unstable) for unit in loop.units if set(unit.rows.tolist()) == {2 * k, 2 * k + 1})
+        crossings = crossings_of(here)
+        found.append(
+            BusJudgement(k, count, by_loci, growing - count - own, tuple(crossings), margins_of(here, crossings))
+        )
+    return tuple(found)
+
+
+def _doubt(loop: CutLoop, bus: BusJudgement) -> str:
+    if bus.encirclements != bus.by_loci:
+        return (f"at port {bus.port + 1} the determinant goes round {bus.encirclements} times and the eigenloci "
+                f"{bus.by_loci} times")  # fmt: skip
+    return f"at port {bus.port + 1} fewer than no modes would grow without its devices" if bus.without < 0 else ""
 
 
 def _principal(path: LoopPath, k: int) -> float:
@@ -84,35 +131,15 @@ def _principal(path: LoopPath, k: int) -> float:
 
 def encirclements(path: LoopPath, *, exact: bool) -> tuple[int, int]:
     """Of −1, clockwise, by the determinant and by the eigenloci; ``exact`` where the path goes on to infinity."""
-    return _by_determinant(path, exact), _by_crossings(path, exact)
+    return _count(path, path.turns, exact), _count(path, path.loci_turns, exact)
 
 
-def _by_determinant(path: LoopPath, exact: bool) -> int:
-    """Clockwise encirclements of the whole axis, of which the path is the upper half."""
+def _count(path: LoopPath, turns: Numbers, exact: bool) -> int:
+    """Clockwise encirclements of the whole axis, of which the path is the upper half, from all turns on it."""
     first, last = _principal(path, 0), _principal(path, -1)
     begin = np.pi * round(first / np.pi)
     end = np.pi * round(last / np.pi) if exact else 0.0
-    around = float(first - begin + path.turns.sum() - (last - end))
-    return -round(around / np.pi)
-
-
-def _by_crossings(path: LoopPath, exact: bool) -> int:
-    """The same, by crossings of the ray from −1 to −∞."""
-    found: int = 0
-    for locus in path.loci.T:
-        i = np.flatnonzero((locus.imag[:-1] < 0) != (locus.imag[1:] < 0))
-        t = locus.imag[i] / (locus.imag[i] - locus.imag[i + 1])
-        beyond = locus.real[i] + t * (locus.real[i + 1] - locus.real[i]) < -1
-        found += 2 * int(np.where(locus.imag[i + 1] > locus.imag[i], 1, -1)[beyond].sum())
-        found += _on_the_ray(locus[0])
-        found -= _on_the_ray(locus[-1]) if exact else 0
-    return found
-
-
-def _on_the_ray(value: complex) -> int:
-    """Where a locus begins or ends on the ray, its mirror image goes on from there: one crossing for both."""
-    beyond = abs(np.angle(1 + value)) >= np.pi / 2
-    return int(np.sign(value.imag)) if beyond else 0
+    return -round(float(first - begin + turns.sum() - (last - end)) / np.pi)
 
 
 def _open_loop(loop: CutLoop) -> list[str]:
@@ -151,6 +178,9 @@ def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
     if abs(first - np.pi * round(first / np.pi)) > _BEGIN:
         reasons.append(f"at {path.hertz[0]:g} Hz the loop is not yet where it begins: scan lower frequencies")
     if loop.is_exact:
+        last = _principal(path, -1)
+        if abs(last - np.pi * round(last / np.pi)) > _BEGIN:
+            reasons.append(f"at {path.hertz[-1]:g} Hz the loop is not yet where it ends")
         return reasons
     top = path.hertz >= path.hertz[-1] / _END
     size = np.abs(path.loci[top]).max(axis=1)
@@ -187,7 +217,7 @@ def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:
     for angle in np.linspace(0, np.pi, _FRAMES, endpoint=False)[1:]:  # half a turn changes nothing
         T = block_rotation([angle] * (device.values.shape[-1] // 2))
         turned = replace(loop, device=replace(device, values=T @ device.values @ T.T))
-        if _by_determinant(turned.path(nodes), loop.is_exact) != count:
+        if encirclements(turned.path(nodes), exact=loop.is_exact)[0] != count:
             return [
                 "the verdict depends on the angle between the frames of the two scans, which neither states: give it "
                 f"by --angle, or the files _angles.txt (turned by {np.rad2deg(angle):.0f}° it would be another)"

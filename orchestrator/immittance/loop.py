@@ -8,12 +8,20 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from orchestrator.arrays import Complex, Numbers, Vector
-from orchestrator.immittance.sides import Exact, Side
+from orchestrator.immittance.sides import ON_AXIS, Known, Side
+from orchestrator.immittance.together import SideBySide, Unit
 
 _STEP = np.deg2rad(25.0)  # largest turn of det(1 + L) from one point of the path to the next
-_ROUNDS = 12
-_WITHIN = 6  # points between two frequencies of a scan at first
+_AT_A_BUS = np.deg2rad(60.0)  # the same of the loop at one bus of several
+_ALIKE = 0.1  # turns of the determinant and of the loci, added up, differ by less [rad] where loci are followed rightly
+_ROUNDS, _MOST, _AT_ONCE = 14, 60_000, 500
+_ROUND = 1e-6  # radius of the way round an undamped pole of a model, relative to it
+_NARROW = 0.5  # poles damped by less than this part have points of their own
+_WITHIN, _ENOUGH = 6, 1000  # points between two frequencies at first, unless there are enough of them
 _ARC = 1e-4  # radius of the way round a pole on the axis, relative to the pole
+
+
+NO_MODES: Complex = np.zeros(0, dtype=complex)
 
 
 @dataclass(frozen=True)
@@ -66,6 +74,35 @@ class LoopPath:
     def on_axis(self) -> Numbers:
         return np.asarray(self.s.real == 0)
 
+    @cached_property
+    def loci_turns(self) -> Numbers:
+        """Turns of all 1 + λ from point to point, added up [rad]: that of the determinant, or whole turns from it."""
+        return np.asarray(np.angle((1 + self.loci[1:]) / (1 + self.loci[:-1])).sum(axis=1))
+
+    def at_bus(self, k: int) -> "LoopPath":
+        """The loop of the devices at one bus of several against all else: 1 + L there is S⁻¹, S that block of
+        (1 + L)⁻¹."""
+        L = np.asarray(np.linalg.inv(self._blocks[:, k]) - np.eye(2), dtype=complex)
+        return LoopPath(self.s, L, followed(np.linalg.eigvals(L)))
+
+    @cached_property
+    def _blocks(self) -> Complex:
+        return _at_buses(self.L)
+
+    @property
+    def buses(self) -> int:
+        return int(self.L.shape[-1] // 2)
+
+
+def _at_buses(L: Complex) -> Complex:
+    """Blocks of (1 + L)⁻¹ at each bus, shape (f, buses, 2, 2)."""
+    n, found = L.shape[-1], []
+    k = np.arange(n // 2)
+    for first in range(0, len(L), _AT_ONCE):
+        S = np.linalg.inv(np.eye(n) + L[first : first + _AT_ONCE]).reshape(-1, n // 2, 2, n // 2, 2)
+        found.append(np.moveaxis(S[:, k, :, k, :], 0, 1))
+    return np.concatenate(found)
+
 
 @dataclass(frozen=True)
 class CutLoop:
@@ -79,6 +116,16 @@ class CutLoop:
     def is_exact(self) -> bool:
         return self.device.is_exact and self.network.is_exact
 
+    @property
+    def units(self) -> tuple[Unit, ...]:
+        return self.device.units if isinstance(self.device, SideBySide) else ()
+
+    @property
+    def fastest(self) -> float:
+        """Size of the largest pole of the exact sides [rad/s]."""
+        sides = [x.poles for x in (self.device, self.network) if isinstance(x, Known)]
+        return max((float(np.abs(poles).max(initial=0.0)) for poles in sides), default=0.0)
+
     def values(self, s: Vector) -> Complex:
         """L at points on the axis, or close beside it."""
         return np.asarray(self.impedance(s) @ self.device.at(s))
@@ -89,21 +136,45 @@ class CutLoop:
 
     def path(self, nodes: Numbers) -> LoopPath:
         """The loop along the axis between the first and the last of some frequencies [Hz], as finely as it turns."""
-        between = [np.linspace(a, b, _WITHIN, endpoint=False) for a, b in pairwise(nodes.tolist())]
+        within = 1 if self.is_exact and len(nodes) > _ENOUGH else _WITHIN
+        between = [np.linspace(a, b, within, endpoint=False) for a, b in pairwise(nodes.tolist())]
         w = 2 * np.pi * np.unique(np.concatenate([*between, nodes[-1:]]))
         s = self._round_the_pole(1j * w)
         if self.is_exact:
             s = np.concatenate([w[0] * np.exp(1j * np.linspace(0, np.pi / 2, 17))[:-1], s])
+            for pole in self._on_axis(w[0], w[-1]).tolist():
+                far = 1j * _ROUND * pole * np.geomspace(1, 1e4, 30)
+                arc = _ROUND * pole * np.exp(1j * np.linspace(-np.pi / 2, np.pi / 2, 31))[1:-1]
+                s = np.concatenate(
+                    [s[np.abs(s.imag - pole) > 3 * _ROUND * pole], *(1j * pole + x for x in (far, -far, arc))]
+                )
+                s = s[np.argsort(s.imag)]
         L = self.values(s)
+        marks = self._marks(L)
+        most = [_STEP, *[_AT_A_BUS] * (marks.shape[1] - 1)]
+        path: LoopPath | None = None
         for _ in range(_ROUNDS):
-            det = _det(L)
-            wide = np.flatnonzero(np.abs(np.angle(det[1:] / det[:-1])) > _STEP)
-            if not len(wide) or len(s) > 200_000:
+            wide = (np.abs(np.angle(marks[1:] / marks[:-1])) > most).any(axis=1)
+            path = None if wide.any() else LoopPath(s, L, followed(np.linalg.eigvals(L)))
+            places = np.flatnonzero(wide if path is None else np.abs(path.loci_turns - path.turns) > _ALIKE)
+            if not len(places) or len(s) > _MOST:
                 break
-            middle = (s[wide] + s[wide + 1]) / 2
-            L = np.insert(L, wide + 1, self.values(middle), axis=0)
-            s = np.insert(s, wide + 1, middle)
-        return LoopPath(s, L, followed(np.linalg.eigvals(L)))
+            middle = (s[places] + s[places + 1]) / 2
+            more = self.values(middle)
+            s = np.insert(s, places + 1, middle)
+            L, marks = (np.insert(a, places + 1, b, axis=0) for a, b in ((L, more), (marks, self._marks(more))))
+        return path if path and len(path.s) == len(s) else LoopPath(s, L, followed(np.linalg.eigvals(L)))
+
+    def _on_axis(self, low: float, high: float) -> Numbers:
+        """Undamped poles of the exact sides [rad/s], those of one place once."""
+        poles = np.concatenate([NO_MODES, *(x.poles for x in (self.device, self.network) if isinstance(x, Known))])
+        w = np.sort(poles.imag[(np.abs(poles.real) <= ON_AXIS * poles.imag) & (poles.imag > low) & (poles.imag < high)])
+        return np.asarray(w[np.diff(w, prepend=0.0) > 0.3 * _ROUND * w])
+
+    def _marks(self, L: Complex) -> Complex:
+        """What must turn little from point to point: det(1 + L), and the same of the loop at each of several buses."""
+        det = _det(L)[:, None]
+        return np.hstack([det, np.linalg.det(_at_buses(L))]) if self.is_exact and L.shape[-1] > 2 else det
 
     def _round_the_pole(self, s: Vector) -> Complex:
         """The path with an arc to the right of the capacitors' pole, and points ever closer to it on both sides."""
@@ -137,17 +208,17 @@ def followed(eigenvalues: Vector) -> Complex:
     return found
 
 
-def nodes_of(device: Side, network: Side, lowest_hz: float, highest_hz: float) -> Numbers:
-    """Frequencies [Hz] at which both sides are best known, in their common range; dense around poles where exact."""
-    found = [np.geomspace(lowest_hz, highest_hz, 200)]
-    for side in (device, network):
-        if isinstance(side, Exact):
-            at, wide = np.abs(side.poles.imag) / (2 * np.pi), np.abs(side.poles.real) / (2 * np.pi)
-            found += [at + k * wide for k in (-3, -1, -0.5, 0, 0.5, 1, 3)]
-        else:
-            found.append(side.frequencies)
-    if not (device.is_exact and network.is_exact):
-        found = found[1:]
+def nodes_of(device: Side, network: Side, lowest_hz: float, highest_hz: float, modes: Complex = NO_MODES) -> Numbers:
+    """Frequencies [Hz] at which both sides are best known, in their common range; dense around narrow poles where
+    exact, and around what is known of the closed system's ``modes`` [rad/s]."""
+    found = [side.frequencies for side in (device, network) if not side.is_exact]
+    found = found or [np.geomspace(lowest_hz, highest_hz, 400)]
+    poles = [x.poles for x in (device, network) if isinstance(x, Known)]
+    for narrow in (*poles, modes):
+        kept = narrow[(narrow.imag > 0) & (np.abs(narrow.real) < _NARROW * narrow.imag)]
+        kept = np.unique(np.round(kept, 6))
+        at, wide = kept.imag / (2 * np.pi), np.abs(kept.real) / (2 * np.pi)
+        found += [at + k * wide for k in (-3, -1, -0.4, 0.4, 1, 3)]
     together = np.unique(np.concatenate(found))
     return np.asarray(together[(together >= lowest_hz) & (together <= highest_hz)])
 

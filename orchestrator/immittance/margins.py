@@ -1,8 +1,10 @@
 """Margins of a loop: changes of gain, phase and delay in all its entries that bring an eigenvalue to −1; the disk's."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 from orchestrator.immittance.loop import LoopPath
@@ -10,6 +12,7 @@ from orchestrator.immittance.loop import LoopPath
 _LEAST = 1e-4  # loci that cross the axis nearer to 0 tell nothing
 _LEVEL, _FLAT = 0.05, 0.5  # parts by which a locus that begins on the real axis may leave it, and change up to thrice f
 _TOUCHES, _FREE = 1e-9, 0.01  # distances from −1 of an undamped mode, and of the locus of a free angle near 0 Hz
+_NEAR = 0.3  # distance from −1 up to which a locus may come from there
 _SLOWEST = 0.05  # least frequency of a distance [Hz]: below, a free angle moves as far as one likes
 
 
@@ -69,9 +72,14 @@ def gains_of(path: LoopPath, crossings: list[Crossing]) -> list[Margin]:
     begins = [
         Margin(float(-1 / a.real), 0.0)
         for a, b in zip(path.loci[0], path.loci[later], strict=True)
-        if a.real < -_LEAST and abs(1 + a) > _FREE and abs(a.imag) < _LEVEL * abs(a) and abs(b - a) < _FLAT * abs(a)
+        if a.real < -_LEAST and not _is_free(a, b) and abs(a.imag) < _LEVEL * abs(a) and abs(b - a) < _FLAT * abs(a)
     ]
     return [*begins, *(Margin(-1 / c.real, c.frequency_hz) for c in crossings)]
+
+
+def _is_free(a: complex, b: complex) -> bool:
+    """Whether a locus comes from −1 at 0 Hz, as that of a free angle does: from its values at f and at 3·f."""
+    return abs(1 + a) <= _FREE or (abs(1 + a) < _NEAR and abs(1 + b) > 2 * abs(1 + a))
 
 
 def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
@@ -87,11 +95,11 @@ def margins_of(path: LoopPath, crossings: list[Crossing]) -> NyquistMargins:
                 hertz = float(path.hertz[i] + t * (path.hertz[i + 1] - path.hertz[i]))
                 turned.append(Margin(float(abs(np.rad2deg(np.angle(np.exp(1j * angle))))), hertz))
                 delayed.append(Margin(float(angle % (2 * np.pi) / (2 * np.pi * hertz)), hertz))
-    told = path.on_axis & (path.hertz >= min(_SLOWEST, path.hertz[-1]))
+    counted = told(path)
     one, disk = np.eye(path.L.shape[-1]), np.full(len(path.s), np.inf)
-    disk[told & (path.distance <= _TOUCHES)] = 0.0
-    told &= path.distance > _TOUCHES
-    disk[told] = 1 / np.linalg.norm(np.linalg.pinv(one + path.L[told], rcond=0.0) - one / 2, ord=2, axis=(1, 2))
+    disk[counted & (path.distance <= _TOUCHES)] = 0.0
+    counted = counted & (path.distance > _TOUCHES)
+    disk[counted] = 1 / np.linalg.norm(np.linalg.inv(one + path.L[counted]) - one / 2, ord=2, axis=(1, 2))
     return NyquistMargins(
         up, down, _least(turned), _least(delayed), _where_least(path, path.distance), _where_least(path, disk)
     )
@@ -107,7 +115,24 @@ def _least(margins: list[Margin]) -> Margin | None:
     return min(margins, key=lambda m: m.value, default=None)
 
 
+def told(path: LoopPath) -> NDArray[np.bool_]:
+    """Where a distance counts: from the slowest frequency on, and where a free angle's locus still comes away from −1,
+    from there on where it no longer does."""
+    counted = path.on_axis & (path.hertz >= min(_SLOWEST, path.hertz[-1]))
+    later = int(np.argmax(path.on_axis & (path.hertz >= 3 * path.hertz[path.on_axis][0])))
+    if any(_is_free(a, b) for a, b in zip(path.loci[0], path.loci[later], strict=True)):
+        first = int(np.argmax(counted))
+        falls = np.flatnonzero(np.diff(path.distance[first:]) < 0)
+        counted[first : first + (int(falls[0]) if len(falls) else 0)] = False
+    return np.asarray(counted)
+
+
 def _where_least(path: LoopPath, values: Numbers) -> Margin:
-    told = path.on_axis & (path.hertz >= min(_SLOWEST, path.hertz[-1]))
-    k = int(np.argmin(np.where(told, values, np.inf)))
+    k = int(np.argmin(np.where(told(path), values, np.inf)))
     return Margin(float(values[k]), float(path.hertz[k]))
+
+
+def margins_json(m: NyquistMargins | None) -> dict[str, Any]:
+    keys = ("gain", "gain_up", "gain_down", "phase_deg", "delay_s", "distance", "disk")
+    found = {key: None if m is None else getattr(m, key) for key in keys}
+    return {key: None if one is None else vars(one) for key, one in found.items()}

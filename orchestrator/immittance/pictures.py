@@ -10,16 +10,18 @@ from matplotlib.figure import Figure
 from orchestrator.immittance.judgement import CutJudgement
 from orchestrator.immittance.retune import Retuned
 from orchestrator.immittance.study import CutResult
+from orchestrator.immittance.together import named
 from orchestrator.report.plot_style import STYLE, add_legend, colour, save_figure
 
 _PANELS = 4  # parameters in a picture
+_NAMED = 8  # loci, and crossings nearest to −1, that are told apart
 
 
 def draw(result: CutResult, folder: Path, retuned: Sequence[Retuned] = (), goal: float = 0.0) -> list[Path]:
     """Write ``eigenloci.png``, ``matrices.png``, and what parameters do as ``retune.png``."""
     loci, matrices = folder / "eigenloci.png", folder / "matrices.png"
     with mpl.rc_context(STYLE):
-        save_figure(_eigenloci(result.judgement, f"{result.verdict}: {result.loop.device.name}"), loci)
+        save_figure(_eigenloci(result.judgement, f"{result.verdict}: {named(result.loop.device.name)}"), loci)
         save_figure(_matrices(result), matrices)
         shown = [one for one in retuned if one.figures][:_PANELS]
         if shown:
@@ -55,28 +57,33 @@ def _retuned(shown: Sequence[Retuned], goal: float, scr: float | None) -> Figure
 def _eigenloci(judgement: CutJudgement, title: str) -> Figure:
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
     path, m = judgement.path, judgement.margins
+    nearest = sorted(judgement.crossings, key=lambda c: abs(1 + c.real))[:_NAMED]
     near = 1.2 * max([1.5, *(min(abs(c.real), 3.0) for c in judgement.crossings)])
     for axes, reach, name in zip(
         figure.subplots(1, 2), (near, 3 * near), (title, "the same, further off"), strict=True
     ):
         for k in range(path.loci.shape[1]):
             z = path.loci[:, k]
-            axes.plot(z.real, z.imag, color=colour(k + 1), label=f"locus {k + 1}")
+            label = (
+                f"locus {k + 1}" if path.loci.shape[1] <= _NAMED else f"{path.loci.shape[1]} loci" if not k else None
+            )
+            axes.plot(z.real, z.imag, color=colour(k + 1), label=label)
             axes.plot(z.real, -z.imag, color=colour(k + 1), linestyle=":", linewidth=0.8)
         turn = np.exp(2j * np.pi * np.linspace(0, 1, 200))
         axes.plot(turn.real, turn.imag, color="#888888", linewidth=0.8, label="unit circle")
-        close = -1 + m.distance.value * turn
-        axes.plot(close.real, close.imag, color="#a11d1d", linewidth=0.8, linestyle="--",
-                  label=f"distance {m.distance.value:.3g} at {m.distance.frequency_hz:.3g} Hz")  # fmt: skip
+        if not judgement.reasons:
+            close = -1 + m.distance.value * turn
+            axes.plot(close.real, close.imag, color="#a11d1d", linewidth=0.8, linestyle="--",
+                      label=f"distance {m.distance.value:.3g} at {m.distance.frequency_hz:.3g} Hz")  # fmt: skip
         axes.plot([-1], [0], "+", color="#a11d1d", ms=10, mew=2)
-        for k, c in enumerate(judgement.crossings):
+        for k, c in enumerate(nearest):
             axes.plot([c.real], [0], "o", color="black", ms=3.5)
             if abs(c.real) < reach and reach == near:
                 axes.annotate(f"{c.real:.3f} at {c.frequency_hz:.2f} Hz", (c.real, 0), (-12, 18 + 13 * (k % 4)),
                               fontsize=8, textcoords="offset points",
                               arrowprops={"arrowstyle": "-", "linewidth": 0.5})  # fmt: skip
         for margin, text in ((m.gain, "gain × {:.3g}"), (m.phase_deg, "phase {:.3g}°")):
-            if margin is not None:
+            if margin is not None and not judgement.reasons:
                 axes.plot([], [], " ", label=f"{text.format(margin.value)} at {margin.frequency_hz:.4g} Hz")
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel="Re λ(Z·Y)", ylabel="Im λ(Z·Y)", aspect="equal")
         axes.set_title(name, loc="left")

@@ -12,10 +12,17 @@ from orchestrator.immittance.poles import unstable_poles
 NEAR_ZERO = 1e-3
 """Poles of models this near to 0 [rad/s] are the free angle's and clocks'; the path goes round them to the right."""
 
+ON_AXIS = 1e-7
+"""Poles of models whose damping is less than this are on the axis, as of coils and capacitors without losses; the path
+goes round them to the right, too."""
+
 _RESOLVED, _SHARE, _NOISE, _UNRESOLVED = 0.3, 0.5, 1e-3, 6.0
 """Where a cubic through its neighbours predicts a left-out value by 0.3 times the error of a straight line or better,
 half of its error is the interpolation's with room to spare. Elsewhere what is seen is noise up to 1e-3 of the value;
 larger, it may be the flank of something that is far larger between the frequencies."""
+
+
+_AT_ONCE = 200  # points whose matrices are held at a time
 
 
 class Side(Protocol):
@@ -94,8 +101,26 @@ def _lagrange(f: Numbers, values: Vector, at: Numbers, places: Vector) -> Comple
     return total
 
 
+class Known:
+    """A side that is known everywhere, and its poles [rad/s] with it."""
+
+    is_exact = True
+    poles: Complex
+
+    @property
+    def frequencies(self) -> Numbers:
+        return np.sort(np.abs(self.poles.imag)) / (2 * np.pi)
+
+    @property
+    def unstable(self) -> tuple[complex, ...]:
+        return tuple(p for p in self.poles.tolist() if p.real > ON_AXIS * abs(p) and abs(p) > NEAR_ZERO)
+
+    def error(self, s: Vector) -> Numbers:
+        return np.zeros(len(s))
+
+
 @dataclass(frozen=True)
-class Exact:
+class Exact(Known):
     """C·(sI − A)⁻¹·B + D of a continuous model; by its modes where they give the same."""
 
     name: str
@@ -103,7 +128,6 @@ class Exact:
     B: Matrix
     C: Matrix
     D: Matrix
-    is_exact: bool = True
 
     @cached_property
     def _modes(self) -> tuple[Complex, Complex, Complex] | None:
@@ -119,16 +143,8 @@ class Exact:
         return found if alike else None
 
     @cached_property
-    def poles(self) -> Complex:
+    def poles(self) -> Complex:  # type: ignore[override]
         return np.asarray(np.linalg.eigvals(self.A), dtype=complex)
-
-    @property
-    def frequencies(self) -> Numbers:
-        return np.sort(np.abs(self.poles.imag)) / (2 * np.pi)
-
-    @property
-    def unstable(self) -> tuple[complex, ...]:
-        return tuple(p for p in self.poles.tolist() if p.real > 0 and abs(p) > NEAR_ZERO)
 
     def at(self, s: Vector) -> Complex:
         return self._direct(s) if self._modes is None else self._modal(s, self._modes)
@@ -139,10 +155,8 @@ class Exact:
 
     def _modal(self, s: Vector, modes: tuple[Complex, Complex, Complex]) -> Complex:
         values, C, B = modes
-        return np.asarray((C / (s[:, None, None] - values)) @ B + self.D)
-
-    def error(self, s: Vector) -> Numbers:
-        return np.zeros(len(s))
+        parts = [(C / (s[k : k + _AT_ONCE, None, None] - values)) @ B for k in range(0, len(s), _AT_ONCE)]
+        return np.asarray(np.concatenate([*parts, np.zeros((0, *self.D.shape))]) + self.D)
 
     def negated(self) -> "Exact":
         return replace(self, C=-self.C, D=-self.D)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.arrays import Complex, Numbers, Vector
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.short_circuit import ShortCircuit
 from orchestrator.immittance.sides import Side
 
@@ -35,6 +36,13 @@ class SourceBehind:
 
     def error(self, s: Vector) -> Numbers:
         return np.zeros(len(s))
+
+
+def converters_scr(prepared: PreparedScenario | None) -> dict[str, float]:
+    """SCR of the converters by bus, of a case with a power flow."""
+    if prepared is None or prepared.network is None or prepared.power_flow is None:
+        return {}
+    return {b.bus: b.scr for b in ShortCircuit.of(prepared).strengths() if b.scr is not None}
 
 
 def short_circuit_mva(network: Side, hertz: float, base: float | None, prepared: Any, bus: str) -> float | None:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +15,17 @@ from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.black_box.port import start_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
-from orchestrator.immittance.belonging import check_pair, check_place, check_size
+from orchestrator.immittance.belonging import beside_modes, check_pair, check_place, check_size
 from orchestrator.immittance.cut import Cut, cut_of
 from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judge_loop
-from orchestrator.immittance.loop import CutLoop, SeriesCapacitors, common_range
-from orchestrator.immittance.margins import Margin
+from orchestrator.immittance.loop import NO_MODES, CutLoop, SeriesCapacitors, common_range
+from orchestrator.immittance.margins import NyquistMargins, margins_json
 from orchestrator.immittance.measured import scan_fmu
+from orchestrator.immittance.participation import Critical, critical
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
-from orchestrator.immittance.strength import SourceBehind, short_circuit_mva
+from orchestrator.immittance.strength import SourceBehind, converters_scr, short_circuit_mva
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class CutResult:
     # short_circuit, rating: of the network at the cut and of the device [MVA]; None where they are not known
     short_circuit: float | None = None
     rating: float | None = None
+    ratios: Mapping[str, float] = field(default_factory=dict)  # SCR of the converters at a bus of the case
 
     @property
     def scr(self) -> float | None:
@@ -84,6 +87,18 @@ class CutResult:
         return self.judgement.verdict
 
     @property
+    def margins(self) -> NyquistMargins | None:
+        """None where the verdict is not known: nothing is then left over of what is not there."""
+        return None if self.judgement.reasons else self.judgement.margins
+
+    @cached_property
+    def critical(self) -> list[Critical]:
+        """Where the loop of a case comes near −1, and who takes part."""
+        if self.cut is None or self.request.device is not None or self.judgement.reasons:
+            return []
+        return critical(self.loop, self.judgement, self.cut)
+
+    @property
     def because(self) -> str:
         j = self.judgement
         if j.reasons:
@@ -99,7 +114,7 @@ class CutResult:
     def difference(self) -> dict[str, float] | None:
         """Largest difference of a scan from the case's own device in its place, relative, where there is one."""
         device = self.loop.device
-        if self.cut is None or not isinstance(device, Sampled) or device.values.shape[1:] != self.cut.device.D.shape:
+        if self.cut is None or not isinstance(device, Sampled) or device.values.shape[1] != 2 * len(self.cut.ports):
             return None
         own = self.cut.device.at(2j * np.pi * device.frequencies)
         apart = np.linalg.norm(device.values - own, ord=2, axis=(1, 2)) / np.linalg.norm(own, ord=2, axis=(1, 2))
@@ -107,11 +122,7 @@ class CutResult:
 
     def as_json(self) -> dict[str, Any]:
         """Verdict and figures as JSON's types."""
-        j, m = self.judgement, self.judgement.margins
-
-        def margin(one: Margin | None) -> dict[str, float] | None:
-            return None if one is None else {"value": one.value, "frequency_hz": one.frequency_hz}
-
+        j = self.judgement
         points = {s: {p: vars(v) for p, v in scan.points.items()} for s, scan in self.scans.items() if scan.points}
         return {
             "verdict": str(self.verdict),
@@ -127,11 +138,9 @@ class CutResult:
             "open_loop_unstable_poles": [{"real": p.real, "imag": p.imag} for p in j.open_loop],
             "modes_stable": None if self.cut is None or self.request.device else self.cut.modes_stable,
             "crossings": [{"real": c.real, "frequency_hz": c.frequency_hz} for c in j.crossings],
-            "margins": {
-                "gain": margin(m.gain), "gain_up": margin(m.gain_up), "gain_down": margin(m.gain_down),
-                "phase_deg": margin(m.phase_deg), "delay_s": margin(m.delay_s),
-                "distance": margin(m.distance), "disk": margin(m.disk),
-            },
+            "margins": margins_json(self.margins),
+            "buses": self._buses_json(),
+            "critical": [vars(one) for one in self.critical],
             "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit},
             "difference_from_case": self.difference,
             "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
@@ -139,6 +148,21 @@ class CutResult:
             "operating_points": points,
             "questions": list(self.questions),
         }  # fmt: skip
+
+    def _buses_json(self) -> list[dict[str, Any]]:
+        """The closed system judged at each bus of several: `BusJudgement` with its bus, and the SCR there."""
+        if self.cut is None or self.judgement.reasons:
+            return []
+        found = []
+        for one in self.judgement.buses:
+            bus, devices = self.cut.ports[one.port]
+            found.append({
+                "bus": bus, "devices": list(devices), "verdict": str(self.verdict),
+                "encirclements": {"determinant": one.encirclements, "eigenloci": one.by_loci},
+                "growing_modes_without": one.without, "margins": margins_json(one.margins),
+                "scr": self.ratios.get(bus.rpartition(".")[2]),
+            })  # fmt: skip
+        return found
 
 
 def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) -> CutResult:
@@ -179,12 +203,14 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
         check_size(loop, *common_range(device, network, (0.0, 0.0)))
     if request.compensation:
         loop = replace(loop, capacitors=_capacitors(loop, request))
-    judgement = judge_loop(loop, frames_known=known)
-    if cut is not None and request.device is None and not request.compensation and request.scr is None:
-        judgement = _beside_modes(judgement, cut)
+    closed = cut if request.device is None and not request.compensation and request.scr is None else None
+    judgement = judge_loop(loop, frames_known=known, modes=closed.eigenvalues if closed else NO_MODES)
+    if cut is not None and closed:
+        judgement = beside_modes(judgement, cut)
     prepared = request.network if isinstance(request.network, PreparedScenario) and request.scr is None else None
     short = short_circuit_mva(network, request.frequency, base, prepared, cut.bus if cut else "")
-    return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating)
+    ratios = converters_scr(prepared) if judgement.buses else {}
+    return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating, ratios)
 
 
 def _side(request: CutRequest, side: str, path: Path, cut: Cut | None, report: Callable[[str], None] | None) -> Scan:
@@ -271,12 +297,3 @@ def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:
             f"--compensation: {loop.network.name} has no inductive reactance at one port to be compensated"
         )
     return SeriesCapacitors(request.compensation * X, 2 * np.pi * request.frequency)
-
-
-def _beside_modes(judgement: CutJudgement, cut: Cut) -> CutJudgement:
-    """Where the modes of the closed system say otherwise, nothing is known."""
-    said = {True: NyquistVerdict.STABLE, False: NyquistVerdict.UNSTABLE, None: NyquistVerdict.NOT_KNOWN}
-    if judgement.reasons or said[cut.modes_stable] is judgement.verdict:
-        return judgement
-    reason = f"the eigenvalues of the closed system say {said[cut.modes_stable]}, the encirclements {judgement.verdict}"
-    return replace(judgement, verdict=NyquistVerdict.NOT_KNOWN, reasons=(reason,), growing=None)

@@ -11,6 +11,7 @@ from orchestrator.immittance.margins import Margin
 from orchestrator.immittance.retune import Retuned, Study, Tunable, retune
 from orchestrator.immittance.retune_view import retuned_json, retuned_table
 from orchestrator.immittance.study import CutResult
+from orchestrator.immittance.together import named
 from orchestrator.report.tables import make_table
 from orchestrator.report.verdict import VerdictSentence
 from orchestrator.results.storage import save_json
@@ -23,6 +24,8 @@ _MARGINS = (
     ("delay", "delay_s", "{:.2e} s"), ("distance from −1", "distance", "{:.3f}"), ("disk", "disk", "{:.3f}"),
 )  # fmt: skip
 
+
+_NAMED, _LITTLE = 4, 5e-3  # buses and devices that take part, in a line, and what is too little for it
 
 Report = Callable[[str], None]
 
@@ -110,18 +113,47 @@ def parts(found: Nyquist) -> Iterator[RenderableType]:
     result = found.result
     good = {"stable": True, "unstable": False}.get(str(result.verdict))
     yield VerdictSentence(good, str(result.verdict), result.because).markup()
-    rows = [(name, *_cells(getattr(result.judgement.margins, key), text)) for name, key, text in _MARGINS]
-    yield make_table("Margins", "Margin", "Value", "at [Hz]", rows=rows)
+    if (m := result.margins) is not None:
+        rows = [(name, *_cells(getattr(m, key), text)) for name, key, text in _MARGINS]
+        yield make_table("Margins", "Margin", "Value", "at [Hz]", rows=rows)
+    yield from _by_bus(result)
     if result.scr is not None:
         yield _strength(result)
     for side, bands in result.judgement.active.items():
         said = ", ".join(f"{a:.4g}–{b:.4g} Hz" for a, b in bands) or "nowhere"
-        yield escape(f"{side} ({getattr(result.loop, side).name}) not passive: {said}")
+        yield escape(f"{side} ({named(getattr(result.loop, side).name)}) not passive: {said}")
     if (far := result.difference) is not None:
         yield (f"The device differs from the case's own by {100 * far['largest_relative']:.2g} % at most, at "
                f"{far['frequency_hz']:.4g} Hz")  # fmt: skip
     if found.retuned:
         yield from retuned_table(found.retuned, found.goal)
+
+
+def _by_bus(result: CutResult) -> Iterator[RenderableType]:
+    """The loop at each bus alone, least distance first, and who takes part where the whole comes near −1."""
+    sheets = sorted(result.as_json()["buses"], key=lambda b: b["margins"]["distance"]["value"])
+    rows: list[tuple[str, ...]] = []
+    for b in sheets:
+        m = b["margins"]
+        gain = f"× {m['gain']['value']:.3f}" if m["gain"] else "none"
+        phase = f"{m['phase_deg']['value']:.1f}°" if m["phase_deg"] else "none"
+        left = {True: "UNSTABLE", False: "stable"}[b["growing_modes_without"] > 0]
+        scr = "" if b["scr"] is None else f"{b['scr']:.2f}"
+        rows.append((b["bus"], ", ".join(b["devices"]), f"{m['distance']['value']:.3f}",
+                     f"{m['distance']['frequency_hz']:.3f}", gain, phase, left, scr))  # fmt: skip
+    if rows:
+        yield make_table("At each bus alone (SCR is no margin: devices and settings differ at one ratio)", "Bus",
+                         "Devices", "Distance", "at [Hz]", "Gain", "Phase", "Without it", "SCR", rows=rows)  # fmt: skip
+    for one in result.critical if rows else ():
+        buses = _most(one.buses, "{} {:.0%}")
+        devices = _most(one.devices, "{} {:+.3f}")
+        yield escape(f"At {one.frequency_hz:.4g} Hz, {one.distance:.3g} from −1: {buses}; per part by which a device "
+                     f"grows the distance changes by {devices}")  # fmt: skip
+
+
+def _most(found: dict[str, float], text: str) -> str:
+    most = [item for item in sorted(found.items(), key=lambda item: -abs(item[1]))[:_NAMED] if abs(item[1]) > _LITTLE]
+    return ", ".join(text.format(name, value) for name, value in most)
 
 
 def _strength(result: CutResult) -> str:

@@ -1,5 +1,7 @@
 """Cuts through cases: the verdict of the loop is that of the modes, and a measured device gives the same limit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -7,11 +9,14 @@ from scipy.optimize import brentq
 import orchestrator as gfor
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.errors import InputError
+from orchestrator.immittance import cut as cut_module
 from orchestrator.immittance.cut import cut_of
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.measured import scan_fmu
+from orchestrator.immittance.participation import critical
 from orchestrator.immittance.sides import Sampled
+from orchestrator.immittance.together import SideBySide
 
 
 @pytest.mark.parametrize(
@@ -26,8 +31,7 @@ def test_the_verdict_at_a_cut_is_that_of_the_modes(scenario, names, stable):
 
 
 def test_a_disagreement_with_the_modes_is_no_verdict(monkeypatch):
-    monkeypatch.setattr("orchestrator.immittance.judgement._by_determinant", lambda path, loop: 2)
-    monkeypatch.setattr("orchestrator.immittance.judgement._by_crossings", lambda path, loop: 2)
+    monkeypatch.setattr("orchestrator.immittance.judgement._count", lambda path, turns, exact: 2)
     found = gfor.nyquist("two_area", scenario="gfor", components=["gfor"])
     assert found.verdict == "not known"
     assert "eigenvalues of the closed system say stable" in found.reasons[0]
@@ -78,3 +82,69 @@ def test_the_rated_frequency_is_that_of_the_components_and_not_50_hz():
 def test_a_case_of_phasor_models_is_refused_with_the_way_out():
     with pytest.raises(InputError, match="phasor models have another port: cut its EMT models"):
         cut_of(gfor.load("two_area_rms").scenario("gfor").prepared, None, ())
+
+
+def test_each_bus_of_a_whole_case_is_what_a_cut_there_finds():
+    """At a bus, the poles of all else are eigenvalues; of the whole, they are what the count leaves over."""
+    prepared = gfor.load("two_area").scenario("gfor").prepared
+    whole = cut_of(prepared, None, ())
+    found = judge_loop(CutLoop(whole.device, whole.network), modes=whole.eigenvalues)
+    assert [devices for _, devices in whole.ports] == [("gfor", "sg1"), ("sg2",)]
+    for one, bus in zip(found.buses, ("bus_2", "bus_3"), strict=True):
+        cut = cut_of(prepared, bus, ())
+        alone = judge_loop(CutLoop(cut.device, cut.network))
+        assert (alone.growing, alone.encirclements) == (found.growing, one.encirclements)
+        assert len(cut.network.unstable) == one.without
+        assert alone.margins.distance.value == pytest.approx(one.margins.distance.value, rel=5e-3)
+        assert alone.margins.phase_deg.value == pytest.approx(one.margins.phase_deg.value, rel=5e-3)
+
+
+def test_what_a_device_does_to_the_distance_is_what_more_of_it_does():
+    cut = cut_of(gfor.load("two_area").scenario("gfor").prepared, None, ())
+    loop = CutLoop(cut.device, cut.network)
+    nearest = critical(loop, judge_loop(loop), cut)[0]
+    s, h = np.array([2j * np.pi * nearest.frequency_hz]), 1e-5
+    assert sum(nearest.buses.values()) == pytest.approx(1)
+    for unit in cut.units:
+        grown = replace(unit, side=replace(unit.side, C=(1 + h) * unit.side.C, D=(1 + h) * unit.side.D))
+        units = tuple(grown if other is unit else other for other in cut.units)
+        L = CutLoop(replace(cut.device, units=units), cut.network).values(s)[0]
+        moved = np.linalg.svd(np.eye(len(L)) + L, compute_uv=False)[-1] - nearest.distance
+        assert moved == pytest.approx(h * nearest.devices[", ".join(unit.devices)], rel=0.01)
+
+
+def test_a_loop_that_is_not_of_the_system_is_seen_by_the_modes(monkeypatch):
+    """With a device left out, all is stable as well, but det(1 + L) is of another system; no margin is told then."""
+    sides = SideBySide.at
+    monkeypatch.setattr(SideBySide, "at", lambda self, s: sides(replace(self, units=self.units[1:]), s))
+    found = gfor.nyquist("two_area", scenario="gfor").as_json()
+    assert found["verdict"] == "not known"
+    assert "det(1 + L) is not that of the eigenvalues and poles" in found["reasons"][0]
+    assert set(found["margins"].values()) == {None}
+    assert found["buses"] == found["critical"] == []
+
+
+def test_undamped_poles_are_passed_on_the_right(monkeypatch):
+    """Stators without resistance: three poles on the axis, at one place, on either side of it by rounding."""
+    cut = cut_of(gfor.load("wscc9").scenario("pod_q").prepared, None, ())
+    assert ((np.abs(cut.device.poles.real) < 1e-7) & (cut.device.poles.imag > 300)).sum() == 3
+    found = judge_loop(CutLoop(cut.device, cut.network), modes=cut.eigenvalues)
+    assert (found.verdict, found.growing, cut.modes_stable) == ("stable", 0, True)
+    monkeypatch.setattr(CutLoop, "_on_axis", lambda self, low, high: np.zeros(0))
+    monkeypatch.setattr("orchestrator.immittance.sides.ON_AXIS", 0.0)
+    assert gfor.nyquist("wscc9", scenario="pod_q").verdict != "unstable"
+
+
+def test_a_device_that_measures_at_another_bus_cannot_be_cut_off(monkeypatch):
+    """Its voltage is read from elsewhere, too, as a wide-area controller does."""
+    whole = cut_module._Opened._open
+
+    def measured(self, rows):
+        A, B, C, D = whole(self, rows)
+        B = B.copy()
+        B[0, 4] = 1.0  # the first state of the first device from the voltage of the third, at another bus
+        return [A, B, C, D]
+
+    monkeypatch.setattr(cut_module._Opened, "_open", measured)
+    with pytest.raises(InputError, match="no cut separates gfor from the network: other signals"):
+        cut_of(gfor.load("two_area").scenario("gfor").prepared, None, ())

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.immittance import judgement as judging
 from orchestrator.immittance import loop as looping
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
@@ -144,8 +143,7 @@ def test_a_capacitor_inside_the_scan_whose_rated_frequency_is_left_out():
     assert inside.verdict == "not known"
 
 
-def test_loci_that_were_swapped_disagree_with_the_determinant(monkeypatch):
-    """Here the loci keep the order in which LAPACK gives them, or change it at one point."""
+def test_loci_that_change_places_change_no_count_and_a_turn_too_many_is_seen(monkeypatch):
     plant = constant_power(g=1.2, h=0.6, T=0.003, G=0.2)
     right = judged(plant, WEAK)
     assert right.verdict == "unstable"
@@ -160,8 +158,11 @@ def test_loci_that_were_swapped_disagree_with_the_determinant(monkeypatch):
     looping_followed = looping.followed
     monkeypatch.setattr(looping, "followed", swapped)
     found = judged(plant, WEAK)
-    assert found.by_loci != found.encirclements or found.verdict == right.verdict
-    monkeypatch.setattr(judging, "_by_crossings", lambda path, loop: right.by_loci + 2)
+    assert (found.by_loci, found.encirclements, found.verdict) == (right.by_loci, right.encirclements, right.verdict)
+    turns = looping.LoopPath.loci_turns.func
+    monkeypatch.setattr(
+        looping.LoopPath, "loci_turns", property(lambda path: turns(path) + 2 * np.pi / len(path.turns))
+    )
     found = judged(plant, WEAK)
     assert found.verdict == "not known"
     assert "some loci were not followed rightly" in found.reasons[-1]

@@ -68,7 +68,8 @@ def test_damping_that_is_least_on_the_way_is_told():
         tried = [{"value": k, "kind": str(H), "damping_percent": d} for k, d in enumerate(dampings)]
         tried.append({"value": len(dampings), "kind": str(F), "damping_percent": -1.0})
         end = float(len(dampings))
-        return ParameterLimit("x", "", "s", "S", Until(), F, end - 0.5, end, None, "", tuple(tried), (), "", end).sentence
+        found = ParameterLimit("x", "", "s", "S", Until(), F, end - 0.5, end, None, "", tuple(tried), (), "", end)
+        return found.sentence
 
     assert "x = 2.5 (on the way 3.06 % at 1), " in limit(3.98, 3.06, 4.2)
     assert "on the way" not in limit(3.98, 3.06, 2.9)
