@@ -221,7 +221,7 @@ class _Look:
             away, moves = float(np.abs(current - rest).max()), float(np.abs(current - current[-1]).max())
             if away < _BACK:
                 return _End.BACK, away
-            quiet = quiet + 1 if moves < _STILL and away > _ELSEWHERE else 0
+            quiet = quiet + 1 if moves < min(_STILL, away / 1000) and away > _ELSEWHERE else 0
             if quiet == 3:
                 break
             if number == _WINDOWS - 1 or (number >= _GIVEN_UP and away > _LOST):

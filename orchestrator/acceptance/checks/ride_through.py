@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.events import Segment, factor, in_words, scale, series
+from orchestrator.acceptance.checks.events import Segment, scale, series
 from orchestrator.acceptance.checks.port import IMPORTING, WHY, cannot_import, current_limit, currents
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex
@@ -100,9 +100,9 @@ def _runs(draw: np.random.Generator, longest: float) -> Iterator[list[Disturbanc
             for bounds, at, lasts, point in _STAY:
                 (words, to), lasting = dip(*bounds), min(lasts, longest)
                 yield [Disturbance(f"{words} for {lasting:.3g} s", to, at, lasting, point)]
-            for kind, least, most in (("swell", 0.6, 1.0), ("swell", 2.2, 3.5), ("shallow", 1.0, 2.5)):
-                voltage, lasts = factor(draw, kind), round(draw.uniform(least, most), 3)
-                before, long = ((voltage, lasts),), f"{in_words(voltage)} for {lasts:g} s"
+            for bounds, least, most in (((1.12, 1.2), 0.6, 1.0), ((1.12, 1.16), 2.2, 3.5), ((0.8, 0.9), 1.0, 2.5)):
+                (words, voltage), lasts = dip(*bounds), round(draw.uniform(least, most), 3)
+                before, long = ((voltage, lasts),), f"{words} for {lasts:g} s"
                 (words, to), (turned, by) = dip(0.1, 0.35), jump(50, 70)
                 yield [Disturbance(f"{words} after the {long}", to, 0.1, before=before)]
                 yield [Disturbance(f"{turned} in the {long}", voltage * by, 0.1, before=before)]
