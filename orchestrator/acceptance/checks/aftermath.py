@@ -139,7 +139,7 @@ class _Look:
         self._times = scale(subject, 1.5)
         time = np.arange(self._steps(_PROBE)) * subject.step_size
         self._small = 0.985 * np.exp(1j * pi * (1 / 120 - 0.1 * time))
-        self._rest = complex(self._course((), 0, np.ones(self._steps(_WINDOW)))[-1])
+        self._rest = complex(self._course((), 0, np.ones(self._steps(_WINDOW), complex))[-1])
         self._usual = self._course((), 0, self._small) - self._rest
 
     def _running(self) -> Running:
@@ -198,7 +198,7 @@ class _Look:
 
     def _changed(self, segments: Sequence[Segment], wait: int) -> float:
         """By which part of it the answer to small changes differs, beside the same run without them; 0 where alike."""
-        still = np.ones(len(self._small))
+        still = np.ones(len(self._small), complex)
         here = self._course(segments, wait, still)
         away = float(np.abs(here - self._rest).max())
         if not away < _NEAR:
