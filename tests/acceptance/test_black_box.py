@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from orchestrator.api.admittance import Admittance
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import fit
@@ -26,6 +27,9 @@ def test_a_port_of_powers_in_si_units_gives_the_same_admittance(gallery):
     assert not bound_fmu(*gallery("converter_without_state")).can_save_state
     difference = np.linalg.norm(plain.values - powers.values, axis=(1, 2)) / np.linalg.norm(plain.values, axis=(1, 2))
     assert difference.max() < 1e-3
+    content = Admittance(plain, 1 + 0j).as_json()
+    assert content["lines"] == len(plain.values)
+    assert content["model"]["order"] == len(fit(plain).poles)
     slow = [pole for pole in fit(powers).poles if 0.1 < abs(pole.imag) < 100]
     assert slow
     assert min(abs(fit(plain).poles - slow[0])) < 0.05 * abs(slow[0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.acceptance.checks.port import _fit
-from orchestrator.binding.misfits import diagnosis
+from orchestrator.binding.misfits import diagnosis, of_power
 
 ASKED = np.array([0.5, 0.3 + 0.2j, -0.4 + 0.1j, -0.2j, 0.7])
 
@@ -28,6 +28,13 @@ def test_a_law_has_its_name(law, fault, words):
     name, says = diagnosis("i", *map(complex, law[:3]), law[3])
     assert name == fault
     assert words in says
+
+
+def test_a_power_at_the_start_has_its_fault_and_its_words():
+    found = of_power(0.5 + 0.1j, -0.5 - 0.1j)
+    assert found.fault == "wrong sign"
+    assert "at the start" in found.evidence
+    assert of_power(0.5 + 0.1j, 0.51 + 0.1j) is None
 
 
 def test_what_no_law_gives_is_left():

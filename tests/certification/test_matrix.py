@@ -96,6 +96,8 @@ def test_the_norms_margins_are_in_parts_of_5_percent_and_of_the_ratio_of_swings(
     assert swings.margin is None  # its modes accept it without a figure, which is the better way
     _, swings = norm((mode(8.0),), response(0.1, least=4.0, modal=False))
     assert swings.margin == pytest.approx(0.6)
+    _, swings = norm((mode(8.0),), response(0.5, least=8.0, swings=False))
+    assert swings.margin == pytest.approx(0.6, abs=0.01)  # by its modes: 8 % where 5 are asked for
     low, _ = norm((mode(2.0),), response(0.1), ["low"])
     assert low.margin == pytest.approx(-0.6)
     assert not low.accepted

@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.linalg import eig
 
-from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, Worth, band_of, floors_of
+from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, RatedPoint, Worth, band_of, floors_of
 from orchestrator.coordinated_design.search import SettingSearch, Tried
 from orchestrator.coordinated_design.settings import PodGroup
 from orchestrator.coordinated_design.study import values_of
@@ -22,6 +23,16 @@ def test_a_band_keeps_the_damping_that_it_has_where_that_is_below_the_bound():
     floors = floors_of([weak], 0.05)
     assert floors.pop(band_of(weak)) == pytest.approx(0.01 - ALLOWED)
     assert set(floors.values()) == {0.05}
+
+
+def test_a_residue_is_what_a_small_gain_moves():
+    rng = np.random.default_rng(3)
+    A, U, V = rng.normal(size=(4, 4)), rng.normal(size=(4, 1)), rng.normal(size=(1, 4))
+    values, left, right = eig(A, left=True)
+    point = SimpleNamespace(loops=SimpleNamespace(U=U, V=V))
+    (residue,) = RatedPoint._residues(point, 0, left, 3 * right)
+    moved = np.linalg.eigvals(A + 1e-6 * U @ V)
+    assert residue == pytest.approx((moved[np.argmin(abs(moved - values[0]))] - values[0]) / 1e-6, rel=1e-4)
 
 
 @pytest.mark.parametrize(("gain", "enabled"), [(0.0, False), (123.456789012, True)])

@@ -200,10 +200,13 @@ def test_missing_rows_cut_the_record_and_doubled_times_count_once():
     places = [replace(x, **{s: getattr(x, s)[keep] for s in ("v", "angle", "p", "q")}) for x in whole.places]
     cut = made_ready("cut", TIMES[keep], places)
     assert any("rows are missing" in text for text in cut.remarks)
+    assert cut.times[0] == TIMES[260]
     assert at(locate(cut), 0.8).drives == "sg1"
     twice = np.sort(np.r_[0:1500, 300])
     places = [replace(x, **{s: getattr(x, s)[twice] for s in ("v", "angle", "p", "q")}) for x in whole.places]
-    assert len(made_ready("twice", TIMES[twice], places).times) == 1500
+    doubled = made_ready("twice", TIMES[twice], places)
+    assert len(doubled.times) == 1500
+    assert any("1 times are written twice" in text for text in doubled.remarks)
     with pytest.raises(InputError, match="do not rise"):
         made_ready("back", TIMES[::-1], whole.places)
 

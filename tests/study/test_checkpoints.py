@@ -192,6 +192,14 @@ def test_another_value_is_named(tmp_path, said):
         resumed(prepared_scenario(values={"gfor.P_0": 0.5}), tmp_path, said)
 
 
+def test_another_kernel_is_another_run(monkeypatch):
+    prepared = prepared_scenario()
+    before = checkpoint_mark.mark_of(prepared)
+    monkeypatch.setenv("GFOR_COSIM_KERNEL", "plain")
+    after = checkpoint_mark.mark_of(prepared)
+    assert {name for name in before if before[name] != after[name]} == {"the environment variable GFOR_COSIM_KERNEL"}
+
+
 @pytest.mark.parametrize("library", ["numpy", "scipy"])
 def test_another_version_of_a_library_is_named(tmp_path, said, monkeypatch, library):
     interrupted(prepared_scenario(), tmp_path, said, 0.4)

@@ -18,7 +18,7 @@ from orchestrator.arrays import Complex
 from orchestrator.errors import ComponentError
 
 _POINT = OperatingAt(1.0, 0.0, 0.4, 0.05)  # with so little power that a converter comes back from most disturbances
-_PROBE = 0.3  # duration [s] of each small change: 1.5 % less voltage, a jump of 1.5°, 0.1 % less frequency
+_PROBE = 0.3  # duration [s] of small changes at once: 1.5 % less voltage, a jump of 1.5°, 0.1 % less frequency
 _CHANGED = 0.05  # part of an answer to a small change by which it may differ after a disturbance
 _BACK = 5e-4  # distance of the current from where it was [pu, S_n] at which it has come back
 
@@ -36,13 +36,13 @@ _LEAST = 32.0
 _BLOCKS = 5  # parts of a disturbance, between which the memory is read
 _SOON = (0, 2, 4)  # numbers of those soon after which it is asked as well
 _PART = 0.75  # time to spend, in parts of the time for which an FMU is made to run
-_EVENTS = (("deep", 0.45), ("jump", 0.15), ("middle", 0.2), ("swell", 0.2), ("low", 0.15), ("small jump", 0.2))
+_EVENTS = (("deep", 0.45), ("jump", 0.15), ("series", 0), ("middle", 0.2), ("swell", 0.2), ("low", 0.15),
+           ("small jump", 0.2))  # fmt: skip
 """Kinds of disturbances, and how long they last [s]."""
-_LATER = ((0.15, 0.4), (0.8, 1.6), (3.5, 5.0))
+_LATER = ((0.15, 0.4), (0.8, 1.6), (2.5, 3.5))
 """Times [s] after a disturbance, of which one each is drawn, at which it is asked before it has come back as well."""
-_NEAR, _APART, _BENT = 0.3, 0.15, 0.5
-"""Distance [pu, S_n] from which it is too far away to be asked; parts of an answer by which it may differ then: this
-much, and so much a pu of the distance."""
+_NEAR, _BENT = 0.3, 0.5
+"""Distance [pu, S_n] from which it is too far away to be asked; by what more an answer may differ, a pu of it."""
 
 
 class _End(Enum):
@@ -69,8 +69,7 @@ class _After:
     words: str
     end: _End
     away: float = 0.0  # distance of the current from where it was [pu, S_n]
-    changed: float = 0.0  # by which part of it the answer to a small change differs, and to which
-    of: str = ""
+    changed: float = 0.0  # by which part of it the answer to small changes differs
     kept: float = 0.0  # bytes kept by each step meanwhile
 
 
@@ -88,21 +87,19 @@ def after_dips(subject: Subject) -> CheckResult:
     for number, segments in enumerate(_drawn(subject)):
         if number >= 3 and spent() > budget:
             break
-        found.append(look.after(segments))
+        found.append(look.after(segments, number in _SOON))
         if found[-1].end is not _End.BACK and found[-1].end is not _End.ELSEWHERE:
-            found.append(look.after([(1 + (voltage - 1) / 3, lasts / 2) for voltage, lasts in segments]))
-        soon = look.soon(segments) if number in _SOON else found[-1]
-        if result := _wrong(found[-1]) or _wrong(soon):
+            found.append(look.after([(1 + (voltage - 1) / 3, lasts / 2) for voltage, lasts in segments], False))
+        if result := _wrong(found[-1]):
             return result
     return _judged(found)
 
 
 def _drawn(subject: Subject) -> Iterator[list[Segment]]:
     draw = subject.random("after dips")
-    for number, (kind, lasts) in enumerate(_EVENTS):
-        if number == 2:
-            yield series(draw)
-        yield [(factor(draw, kind), round(lasts * draw.uniform(0.85, 1.15), 3))]
+    for kind, lasts in _EVENTS:
+        one = round(lasts * draw.uniform(0.85, 1.15), 3)
+        yield series(draw) if kind == "series" else [(factor(draw, kind), one)]
 
 
 def _wrong(after: _After) -> CheckResult | None:
@@ -111,7 +108,7 @@ def _wrong(after: _After) -> CheckResult | None:
         says = f"it keeps {after.kept:.0f} bytes with every step in the {after.words}"
         return failed("after_dips", "memory leak", says, kept=after.kept)
     if after.changed:
-        says = f"its answer to {after.of} differs by {100 * after.changed:.2g} % after the {after.words}"
+        says = f"its answer to small changes differs by {100 * after.changed:.2g} % after the {after.words}"
         return failed("after_dips", "changed by a disturbance", says, changed=after.changed)
     if after.end is _End.ELSEWHERE:
         says = f"it rests {after.away:.3g} pu away from where it was after the {after.words}"
@@ -134,38 +131,22 @@ def _judged(found: list[_After]) -> CheckResult:
 
 
 class _Look:
-    """Runs with a disturbance and small changes after it, and what they are compared with."""
+    """Runs with disturbances and small changes after them, and what they are compared with."""
 
     def __init__(self, subject: Subject) -> None:
-        self._subject = subject
+        self._subject, self._draw = subject, subject.random("soon after")
         self._point = (subject.use.point or _POINT) if subject.starts else None
-        self._times, self._draw = scale(subject, 1.5), subject.random("soon after")
-        with self._running() as running:
-            self._rest = complex(currents(running, 0j, self._steps(_WINDOW))[-1])
-            self._usual = self._probed(running)
-        self._sizes = [float(np.abs(part - part[0]).max()) for part in self._usual]
+        self._times = scale(subject, 1.5)
+        time = np.arange(self._steps(_PROBE)) * subject.step_size
+        self._small = 0.985 * np.exp(1j * pi * (1 / 120 - 0.1 * time))
+        self._rest = complex(self._course((), 0, np.ones(self._steps(_WINDOW), complex))[-1])
+        self._usual = self._course((), 0, self._small) - self._rest
 
     def _running(self) -> Running:
         return self._subject.running(point=self._point)
 
     def _steps(self, seconds: float) -> int:
         return max(2, round(self._times * seconds / self._subject.step_size))
-
-    def _probed(self, running: Running) -> list[Complex]:
-        """The current in the frame of the voltage while small changes are made, one after another."""
-        steps = self._steps(_PROBE)
-        time = np.arange(steps) * self._subject.step_size
-        turning = np.exp(-2j * pi * 0.05 * time)  # 0.1 % of 50 Hz
-        found = []
-        for change in (np.full(steps, 0.985 + 0j), np.full(steps, np.exp(1j * pi / 120)), turning):
-            found.append(followed(running, change) * np.abs(change) / change)
-        return found
-
-    def _words(self, segments: Sequence[Segment]) -> str:
-        lasts = f"{self._times * sum(lasts for _, lasts in segments):.2g} s"
-        if len(segments) > 1:
-            return f"{len(segments) // 2} dips, overvoltages and jumps in {lasts}"
-        return f"{in_words(segments[0][0])} for {lasts}"
 
     def _disturb(self, running: Running, segments: Sequence[Segment]) -> Iterator[int]:
         """Rest, and disturb it by factors of the voltage; the steps of each part."""
@@ -176,71 +157,60 @@ class _Look:
                 running.hold(voltage_rows(running, np.array([voltage])), steps, self._subject.step_size)
                 yield steps
 
-    def soon(self, segments: Sequence[Segment]) -> _After:
-        """Whether it answers less voltage and frequency at once alike at some times after a disturbance.
+    def _course(self, segments: Sequence[Segment], wait: int, factors: Complex) -> Complex:
+        """The current in the frame of the voltage while that is changed by factors, some steps after a disturbance."""
+        with self._running() as running:
+            for _ in self._disturb(running, segments):
+                pass
+            seen = followed(running, np.concatenate([np.ones(wait), factors]))
+        return seen[wait:] * np.abs(factors) / factors
 
-        Beside the same run without them, so that it need not have come back."""
-        time = np.arange(self._steps(_PROBE)) * self._subject.step_size
-        both = 0.985 * np.exp(-2j * pi * 0.05 * time)
-        waits = [self._steps(self._draw.uniform(*bounds)) for bounds in _LATER]
+    def after(self, segments: Sequence[Segment], soon: bool) -> _After:
+        """What a disturbance of the voltage by factors leaves behind.
 
-        def course(disturbed: Sequence[Segment], wait: int, asked: Complex) -> Complex:
-            with self._running() as running:
-                for _ in self._disturb(running, disturbed):
-                    pass
-                seen = followed(running, np.concatenate([np.ones(wait), asked]))
-            return seen[wait:] * np.abs(asked) / asked
-
-        words = self._words(segments)
-        try:
-            plain = course(segments, 0, np.ones(waits[-1] + len(both)))
-            begin = course((), 0, np.ones(1))[0]
-            usual = course((), 0, both) - begin
-            for wait in waits:
-                here = plain[wait : wait + len(both)]
-                away = float(np.abs(here - begin).max())
-                if not away < _NEAR:
-                    continue
-                apart = float(np.abs(course(segments, wait, both) - here - usual).max() / np.abs(usual).max())
-                if apart > _APART + _BENT * away:
-                    of = "less voltage and frequency"
-                    later = f"{words}, {wait * self._subject.step_size:.2g} s later"
-                    return _After(later, _End.BACK, away, apart, of)
-        except ComponentError:
-            pass  # which 'after' tells
-        return _After(words, _End.BACK)
-
-    def after(self, segments: Sequence[Segment]) -> _After:
-        """What a disturbance of the voltage by factors leaves behind."""
-        words = self._words(segments)
+        ``soon``: whether small changes are made before it has come back as well."""
+        lasts = f"{self._times * sum(lasts for _, lasts in segments):.2g} s"
+        one = f"{in_words(segments[0][0])} for {lasts}"
+        words = one if len(segments) == 1 else f"{len(segments) // 2} dips, overvoltages and jumps in {lasts}"
         try:
             with self._subject.while_doing(f"in the {words} and after it"), self._running() as running:
-                return self._seen(running, segments, words)
+                end, away, kept, wait = self._seen(running, segments)
+            waits = [self._steps(self._draw.uniform(*bounds)) for bounds in (_LATER if soon else ())]
+            for steps in [*waits, *([wait] if end is _End.BACK else [])]:
+                if changed := self._changed(segments, steps):
+                    later = f"{words}, {steps * self._subject.step_size:.2g} s later"
+                    return _After(later, _End.BACK, away, changed, kept)
         except ComponentError:
             self._subject.doing = ""
             return _After(words, _End.REFUSED)
+        return _After(words, end, away, kept=kept)
 
-    def _seen(self, running: Running, segments: Sequence[Segment], words: str) -> _After:
+    def _seen(self, running: Running, segments: Sequence[Segment]) -> tuple[_End, float, float, int]:
+        """What becomes of it, how far away it is, the bytes that each step keeps, and after how many steps."""
         sizes = []
         for number, steps in enumerate(self._disturb(running, segments)):
             if number < _BLOCKS:
                 sizes.append((self._subject.memory_in_use(), steps))
         kept = max(0.0, min((b - a) / steps for (a, _), (b, steps) in pairwise(sizes)))
-        end, away = self._came_back(running, self._rest)
-        if end is not _End.BACK:
-            return _After(words, end, away, kept=kept)
         begun = running.time
-        changed, of = self._apart(self._probed(running), self._usual, away)
-        if changed:  # perhaps by the time that has passed
-            with self._running() as twin:
-                currents(twin, 0j, round(begun / self._subject.step_size))
-                usual = self._probed(twin)
-            with self._running() as again:
-                for _ in self._disturb(again, segments):
-                    pass
-                currents(again, 0j, round((begun - again.time) / self._subject.step_size))
-                changed, of = self._apart(self._probed(again), usual, away)
-        return _After(words, end, away, changed, of, kept)
+        end, away = self._came_back(running, self._rest)
+        return end, away, kept, round((running.time - begun) / self._subject.step_size)
+
+    def _changed(self, segments: Sequence[Segment], wait: int) -> float:
+        """By which part of it the answer to small changes differs, beside the same run without them; 0 where alike."""
+        still = np.ones(len(self._small), complex)
+        here = self._course(segments, wait, still)
+        away = float(np.abs(here - self._rest).max())
+        if not away < _NEAR:
+            return 0.0
+        answer, most = self._course(segments, wait, self._small) - here, _CHANGED + _BENT * away
+        size = max(float(np.abs(self._usual).max()), 0.01)
+        changed = float(np.abs(answer - self._usual).max()) / size
+        if changed > most:  # perhaps by the time that has passed
+            idle = [(1 + 0j, lasts) for _, lasts in segments]
+            usual = self._course(idle, wait, self._small) - self._course(idle, wait, still)
+            changed = float(np.abs(answer - usual).max()) / size
+        return changed if changed > most else 0.0
 
     def _came_back(self, running: Running, rest: complex) -> tuple[_End, float]:
         steps, quiet = self._steps(_WINDOW), 0
@@ -251,7 +221,7 @@ class _Look:
             away, moves = float(np.abs(current - rest).max()), float(np.abs(current - current[-1]).max())
             if away < _BACK:
                 return _End.BACK, away
-            quiet = quiet + 1 if moves < _STILL and away > _ELSEWHERE else 0
+            quiet = quiet + 1 if moves < min(_STILL, away / 1000) and away > _ELSEWHERE else 0
             if quiet == 3:
                 break
             if number == _WINDOWS - 1 or (number >= _GIVEN_UP and away > _LOST):
@@ -260,13 +230,3 @@ class _Look:
         if size < _NOTHING:
             return _End.NOTHING, away
         return (_End.HELD if size > _LATCHED * min(1.0, current_limit(self._subject) or 1.0) else _End.ELSEWHERE), away
-
-    def _apart(self, found: list[Complex], usual: list[Complex], away: float) -> tuple[float, str]:
-        """By which part of it an answer differs, and to what; 0 where all are alike."""
-        names = ("1.5 % less voltage", "a phase jump of 1.5°", "0.1 % less frequency")
-        seen = []
-        for here, there, size, name in zip(found, usual, self._sizes, names, strict=True):
-            apart = float(np.abs(here - there).max()) - 4 * away
-            seen.append((apart / max(size, 0.01), name))
-        worst = max(seen)
-        return worst if worst[0] > _CHANGED else (0.0, "")

@@ -1,5 +1,6 @@
 """Whether a converter answers the frequency alike at other operating points, and its switches act alike there."""
 
+from contextlib import suppress
 from math import pi
 
 import numpy as np
@@ -23,8 +24,7 @@ _LATE, _MORE = 0.05, 5.0
 
 _MUCH = 0.9  # power [pu, S_n] from which it is asked for less of it
 
-_ANSWERS, _PARTS, _RESTS = 0.5, 10, 2.0
-"""Time [s] of an answer compared along a line of places, the means taken of it, and the time before it [s]."""
+_ANSWERS, _PARTS, _RESTS = 0.5, 10, 2.0  # time [s] of an answer along a line, its parts, the time before it [s]
 _JUMP = 0.08  # what an answer changes by from one place to the next, in parts of the largest and beyond its slope
 _LINES = (("v_0", 0.87, 1.1, 9), ("P_0", -0.85, 1.0, 11), ("Q_0", -0.55, 0.55, 9), ("frequency", -0.008, 0.008, 7))
 """What differs along a line of places, from where to where [pu], and at how many."""
@@ -100,20 +100,16 @@ def _jump(subject: Subject) -> str:
         places, answers = [], []
         for place in at:
             v, P, Q = (place if name == n else usual for n, usual in (("v_0", 1.0), ("P_0", 0.3), ("Q_0", 0.05)))
-            try:
-                answer = _small(subject, OperatingAt(v, 0.0, P, Q), place if name == "frequency" else 0.0, times)
-            except ComponentError:
-                continue  # which 'operating_points' tells
-            places.append(place)
-            answers.append(answer)
+            with suppress(ComponentError):  # which 'operating_points' tells
+                answers.append(_small(subject, OperatingAt(v, 0, P, Q), place if name == "frequency" else 0.0, times))
+                places.append(place)
         if len(places) < 4:
             continue
         size, gaps = np.abs(answers).max(initial=_SOME), np.diff(places)
         slopes = np.diff(answers, axis=0) / gaps[:, None] / size
         usual = (np.vstack([slopes[1], slopes[:-1]]) + np.vstack([slopes[1:], slopes[-2]])) / 2
         k = int(np.argmax(np.abs(slopes).max(axis=1) * gaps * (np.abs(slopes - usual).max(axis=1) * gaps > _JUMP)))
-        beyond = np.abs(slopes[k] - usual[k]).max() * gaps[k]
-        if beyond > _JUMP:
+        if (beyond := np.abs(slopes[k] - usual[k]).max() * gaps[k]) > _JUMP:
             ends = f"{name} = {places[k]:.3g} and {places[k + 1]:.3g}"
             return f"its answer to a small change jumps by {100 * beyond:.2g} % between {ends}"
     return ""

@@ -1,7 +1,7 @@
 """What a converter does in voltage dips, overvoltages and phase jumps, early and late."""
 
 from cmath import rect
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi
 from time import perf_counter
@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.events import Segment, factor, in_words, scale, series
+from orchestrator.acceptance.checks.events import Segment, scale, series
 from orchestrator.acceptance.checks.port import IMPORTING, WHY, cannot_import, current_limit, currents
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex
@@ -100,25 +100,17 @@ def _runs(draw: np.random.Generator, longest: float) -> Iterator[list[Disturbanc
             for bounds, at, lasts, point in _STAY:
                 (words, to), lasting = dip(*bounds), min(lasts, longest)
                 yield [Disturbance(f"{words} for {lasting:.3g} s", to, at, lasting, point)]
-            yield from ([event] for event in _later(draw, dip, jump))
+            for bounds, least, most in (((1.12, 1.2), 0.6, 1.0), ((1.12, 1.16), 2.2, 3.5), ((0.8, 0.9), 1.0, 2.5)):
+                (words, voltage), lasts = dip(*bounds), round(draw.uniform(least, most), 3)
+                before, long = ((voltage, lasts),), f"{words} for {lasts:g} s"
+                (words, to), (turned, by) = dip(0.1, 0.35), jump(50, 70)
+                yield [Disturbance(f"{words} after the {long}", to, 0.1, before=before)]
+                yield [Disturbance(f"{turned} in the {long}", voltage * by, 0.1, before=before)]
+            words, to = dip(0.1, 0.35)
+            yield [Disturbance(f"{words} after a series of events", to, 0.1, before=tuple(series(draw)))]
             some = zip((kinds[8], kinds[6], kinds[5]), times, strict=False)
             yield [Disturbance(*kind, at, point=IMPORTING[0]) for kind, at in some]
         yield [Disturbance(*kinds[(k + 2 * place) % len(kinds)], at) for place, at in enumerate(times)]
-
-
-_Kind = Callable[[float, float], tuple[str, complex]]
-
-
-def _later(draw: np.random.Generator, dip: _Kind, jump: _Kind) -> Iterator[Disturbance]:
-    """Dips after, and jumps in, a voltage that lasts, and a dip after a series of other events."""
-    for kind, least, most in (("swell", 0.6, 1.0), ("swell", 2.2, 3.5), ("shallow", 1.0, 2.5)):
-        voltage, lasts = factor(draw, kind), round(draw.uniform(least, most), 3)
-        (name, to), (turned, by) = dip(0.1, 0.35), jump(50, 70)
-        words = f"{in_words(voltage)} for {lasts:g} s"
-        yield Disturbance(f"{name} after the {words}", to, 0.1, before=((voltage, lasts),))
-        yield Disturbance(f"{turned} in the {words}", voltage * by, 0.1, before=((voltage, lasts),))
-    name, to = dip(0.1, 0.35)
-    yield Disturbance(f"{name} after a series of events", to, 0.1, before=tuple(series(draw)))
 
 
 @check("limits", "Does it limit its current, and come back from voltage dips, overvoltages and phase jumps?")
@@ -221,15 +213,11 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     if declared is None and worst.mean > NO_LIMIT:
         return failed("limits", "no current limit", seen, **figures)
     early, late = (
-        [a.early for a in answers if a.event.factor.imag and bool(a.event.before) is later] for later in (False, True)
+        [a.early for a in answers if a.event.factor.imag and bool(a.event.before) is b] for b in (False, True)
     )
     if max(late, default=0.0) > _UNEVEN * max(early, default=np.inf):
-        says = (
-            f"{max(late):.3g} pu in a phase jump's third cycle in a voltage that lasts, and {max(early):.3g} pu without"
-        )
-        return failed(
-            "limits", "no current limit", f"a limit that such a voltage takes away: {says}; {seen}", **figures
-        )
+        says = f"{max(late):.3g} pu in a phase jump's third cycle in a voltage that lasts, {max(early):.3g} pu without"
+        return failed("limits", "no current limit", f"{says}; {seen}", **figures)
     bolted = max((a.mean for a in answers if a.event.factor == 0), default=worst.mean)
     deep = max((a for a in answers if 0 < abs(a.event.factor) < _HEALTHY), key=lambda a: a.mean, default=worst)
     if declared is None and deep.mean > max(_UNEVEN * bolted, _MUCH):

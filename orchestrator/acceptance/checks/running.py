@@ -103,12 +103,9 @@ def _ended(subject: Subject, error: EndedError) -> CheckResult:
 
 def _not_finite(subject: Subject, values: Numbers, time: float) -> CheckResult:
     bad = [n for n, v in zip(subject.watched, values, strict=True) if not np.isfinite(v)]
-    return failed(
-        "runs",
-        "not a number",
-        f"{', '.join(bad[:3])} is {values[~np.isfinite(values)][0]} at t = {time:.6g} s, and fmi2DoStep returned OK",
-        time=time,
-    )
+    value = values[~np.isfinite(values)][0]
+    says = f"{', '.join(bad[:3])} is {value} at t = {time:.6g} s, and fmi2DoStep returned OK"
+    return failed("runs", "not a number", says, time=time)
 
 
 def affordable(subject: Subject, steps: int, step_size: float | None = None) -> int:
@@ -137,20 +134,13 @@ def reading(subject: Subject) -> CheckResult:
             running.step(subject.step_size)
             once, twice = running.read(), (backwards.read(), running.read())[1]
             if not np.array_equal(once, twice, equal_nan=True):
-                return failed(
-                    "reading",
-                    "reading changes it",
-                    f"at t = {running.time:.6g} s, reading twice gives {once.tolist()[:3]} and {twice.tolist()[:3]}",
-                )
+                says = f"at t = {running.time:.6g} s, reading twice gives {once.tolist()[:3]} and {twice.tolist()[:3]}"
+                return failed("reading", "reading changes it", says)
             rows.append(twice)
     apart, place = difference(plain, np.array(rows))
     if apart > EQUAL:
-        return failed(
-            "reading",
-            "reading changes it",
-            f"{subject.watched[place]} differs by {apart:.3g} of its range where everything was read in between",
-            difference=apart,
-        )
+        says = f"{subject.watched[place]} differs by {apart:.3g} of its range where everything was read in between"
+        return failed("reading", "reading changes it", says, difference=apart)
     return passed("reading", f"{len(everything)} variables read backwards at every step change nothing")
 
 

@@ -129,6 +129,13 @@ def test_the_bounds_are_the_published_ones(case, monkeypatch):
         assert (np.abs(ours[known] - theirs[known]) < tolerance).all()
 
 
+def test_the_bounds_after_a_step_of_the_strength_end_in_the_tunnel():
+    late = np.array([10.0, 20.0])
+    quick = e.strength_bounds(plant(QUICK, STRONG_GRID), 0.2)(late)
+    slow = e.strength_bounds(plant(SLOW, STRONG_GRID), 0.2)(late)
+    assert quick.allowed == pytest.approx(slow.allowed, abs=1e-3)
+
+
 def test_the_curves_between_oscillating_and_not_are_continuous():
     """At ζ = 1 both roots are one."""
     t = np.linspace(0, 2, 200)
