@@ -34,7 +34,7 @@ from orchestrator.results.room import require_room
 from orchestrator.results.staging import ScenarioFolder, mend, staged, unfinished
 from orchestrator.safe_files import PARTIAL, made_folder
 from orchestrator.study.all_modes import all_ours
-from orchestrator.study.early_end import EarlyEnd
+from orchestrator.study.answers import EarlyEnd
 from orchestrator.study.files import save_run, save_study, summary_of
 from orchestrator.study.run import RunResult
 

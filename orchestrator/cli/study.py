@@ -11,9 +11,14 @@ from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.api.progress import shown_progress
-from orchestrator.cli.arguments import add_json_argument, add_request_arguments, option
+from orchestrator.cli.arguments import (
+    add_executor_arguments,
+    add_json_argument,
+    add_request_arguments,
+    choose_executor,
+    option,
+)
 from orchestrator.cli.case_arguments import add_case_arguments, asked_of_case, case_of
-from orchestrator.cli.executors import add_executor_arguments, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.points import Progressing
 from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, print_questions, say

@@ -24,9 +24,8 @@ from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import made_folder, write_text
 from orchestrator.siting.confirmation import Confirmation
-from orchestrator.siting.placing import OURS_MVA
+from orchestrator.siting.placing import ACTIVE, OURS_MVA, REACTIVE
 from orchestrator.siting.residues import SeenMode
-from orchestrator.siting.responses import ACTIVE, REACTIVE
 from orchestrator.siting.study import DEVICE, DROOP, SiteResult, SupportShift
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
