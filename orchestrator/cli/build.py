@@ -19,7 +19,7 @@ from orchestrator.cli.arguments import option, repeatable, switch
 from orchestrator.cli.terminal import make_errors, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.linear_model import linear_model_members
-from orchestrator.study.component_model import component_model
+from orchestrator.study.linear_model_files import component_model
 
 Port = Literal["dq", "abc", "phasor"]
 

@@ -31,7 +31,7 @@ from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
 from orchestrator.cli.arguments import choose_executor
 from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.points import Progressing
+from orchestrator.cli.study import Progressing
 from orchestrator.cli.terminal import make_console, make_errors, print_json, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.port import BoundDescription

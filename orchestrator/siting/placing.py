@@ -1,4 +1,4 @@
-"""A case with a device of its own at some buses, which feeds nothing at rest."""
+"""A case with a device at some buses, which feeds nothing at rest, and how it answers a voltage."""
 
 import cmath
 import math

@@ -13,8 +13,7 @@ from rich.table import Table
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.late import pd
 from orchestrator.points.code import code_hash
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, damping, table
+from orchestrator.report.html.elements import Figures, damping, document, table
 from orchestrator.report.html.network_map import network_map
 from orchestrator.report.notebook import page
 from orchestrator.report.tables import make_table, share_text

@@ -10,8 +10,7 @@ from rich.text import Text
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Cause
 from orchestrator.errors import RunInterruptedError
-from orchestrator.report.tables import first_few, make_table, short
-from orchestrator.report.verdict import COLOURS
+from orchestrator.report.tables import COLOURS, first_few, make_table, short
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 

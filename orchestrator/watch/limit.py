@@ -1,4 +1,4 @@
-"""A limit of an FMU, described by the variables that show when it acts."""
+"""A limit of an FMU, described by the variables that show when it acts, and the limits of machines' parts."""
 
 from collections.abc import Container
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Limits that stay active: the component, the beginning and the duration."""
+"""Limits that stay active (component, beginning, duration), those that act at a point, and a declared current."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Numbers
 from orchestrator.binding.misfits import of_dip
+from orchestrator.coupling.master import Master
 from orchestrator.coupling.system import ComponentPlan, System
+from orchestrator.fmi.component import Component, RealBatch
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.watch.finding import MISFIT, Finding
 from orchestrator.watch.limit import BYPASS_TIME, MACHINE_LIMITS, Lead, Limit
@@ -172,3 +174,24 @@ def told_of(findings: Sequence[Mapping[str, Any]], component: str) -> Mapping[st
     return next(
         (f for f in findings if f["kind"] == MISFIT and f.get("component") == component and "declared" in f), None
     )
+
+
+def limits_that_act(master: Master) -> dict[str, tuple[str, ...]]:
+    found = {
+        name: tuple(limit.name for limit in limits_of(plan) if _acts(limit, plan, master.components[name]))
+        for name, plan in master.system.components.items()
+    }
+    return {name: limits for name, limits in found.items() if limits}
+
+
+def _acts(limit: Limit, plan: ComponentPlan, component: Component) -> bool:
+    if not limit.represented or (limit.enabled is not None and not plan.value(limit.enabled)):
+        return False
+    names = [limit.signal, *([] if limit.scale is None else [limit.scale])]
+    signal, *scales = RealBatch(component, names).read().tolist()
+    scale = scales[0] if scales else 1.0
+    high = 1.0 if limit.limit is None else plan.number(limit.limit) * scale
+    if limit.low is None:
+        return bool(abs(signal) >= AT_LIMIT * high)
+    low, room = plan.number(limit.low) * scale, (1 - AT_LIMIT) * max(abs(high), 1.0)
+    return bool(signal >= high - room or signal <= low + room)

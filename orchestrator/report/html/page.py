@@ -1,4 +1,4 @@
-"""The page as a whole."""
+"""The page as a whole, its first page, and what changed since an older one."""
 
 import json
 import re
@@ -13,8 +13,7 @@ from orchestrator.errors import InputError
 from orchestrator.report.html import sections, studies
 from orchestrator.report.html.chapters import Chapter, chapters_of, of_run, of_sweep
 from orchestrator.report.html.chapters import sections as sections_of
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, held_data, table
+from orchestrator.report.html.elements import Figures, document, held_data, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, ResultsWarning
