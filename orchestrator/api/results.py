@@ -313,7 +313,7 @@ class Run:
         InputError
             If the signal was not recorded.
         """
-        from orchestrator.study.signal_plots import draw_signal  # noqa: PLC0415 - a second to import
+        from orchestrator.study.mode_plots import draw_signal  # noqa: PLC0415 - a second to import
 
         if signal is not None and not isinstance(signal, str):
             raise InputError(f"signal = {signal!r}; give one signal, 'a.b' or 'a.b - c.d', and plot each with its ax")

@@ -27,10 +27,10 @@ from orchestrator.errors import AnalysisError, CaseError, CosimError, InputError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.report.tables import first_few
 from orchestrator.sensitivities.derivative import Derivative, Shift, differentiate
-from orchestrator.sensitivities.limits_here import limits_that_act
 from orchestrator.sensitivities.parameters import SHARE, Parameter, parameters_of
 from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.study.modes import ModesResult, changed, modes_from, running
+from orchestrator.watch.limits import limits_that_act
 
 CRITICAL = "critical"  # stands for the least damped mode of the range
 _STAYS = 1e-13

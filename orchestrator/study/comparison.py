@@ -22,8 +22,7 @@ from orchestrator.results.recording import FOLDER, TRAJECTORY, parts_of
 from orchestrator.results.signals import signal
 from orchestrator.results.staging import unfinished
 from orchestrator.safe_files import PARTIAL
-from orchestrator.study.common_times import common_times
-from orchestrator.study.measured import is_measured, measured_modes
+from orchestrator.study.measured import common_times, is_measured, measured_modes
 
 if TYPE_CHECKING:
     import xarray as xr
