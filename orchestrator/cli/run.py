@@ -22,12 +22,11 @@ from orchestrator.cli.run_tables import print_run
 from orchestrator.cli.side_by_side import Outcome, Report, SideBySide, number_of_workers
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
 from orchestrator.cores import MOST_THREADS, number_of_cores
-from orchestrator.coupling.progress import Progress
+from orchestrator.coupling.observers import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, InputError, ResultsError, RunInterruptedError
 from orchestrator.federation.choice import Federates
 from orchestrator.fmi.interrupts import calls
-from orchestrator.interop.masters import MASTERS, master_rules
-from orchestrator.interop.rules import MasterRules
+from orchestrator.interop.rules import MASTERS, MasterRules, master_rules
 from orchestrator.late import xr
 from orchestrator.report.progress import progress_bar
 from orchestrator.results.lock import held

@@ -12,8 +12,8 @@ import numpy as np
 from orchestrator.analysis.continuation import Eigenpair, pair_at, pairs_near
 from orchestrator.analysis.coupled_response import foreign_components
 from orchestrator.analysis.coupled_state import CoupledState
-from orchestrator.analysis.eigenvalue_shift import eigenvalue_shift
 from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearity import eigenvalue_shift
 from orchestrator.analysis.linearization import Blocks, continuous, where_given
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.periodic import model_of

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orchestrator.analysis.identification import TOLERANCE, IdentifiedMode, identify_modes, sampling
-from orchestrator.analysis.mode_doubts import COARSER, SHORTER, with_doubts, worth_showing
-from orchestrator.analysis.window_halves import WindowPart, part_of
+from orchestrator.analysis.mode_doubts import COARSER, SHORTER, WindowPart, part_of, with_doubts, worth_showing
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade

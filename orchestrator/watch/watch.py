@@ -10,11 +10,10 @@ import numpy as np
 from orchestrator.arrays import Numbers
 from orchestrator.binding.misfits import Misfit
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.coupling.coupled import LateStart
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.filtered_recorder import FilteredRecorder
-from orchestrator.coupling.late_start import LateStart
-from orchestrator.coupling.recorder import Recorder
-from orchestrator.coupling.rows import RowSink
+from orchestrator.coupling.recorder import Recorder, RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind

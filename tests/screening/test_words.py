@@ -7,8 +7,8 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.operating_points.item import Status
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.request import ScreeningRequest
