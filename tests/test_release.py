@@ -57,7 +57,7 @@ def test_the_changelog_names_commands_models_and_cases_that_exist():
     assert set(COMMANDS) - {"fmu info"} <= everywhere | set(re.findall(r"`gfor ([a-z]+ [a-z]+)", CHANGELOG))
     assert {"gfor", "gfor_abc", "gfor_phasor", "infinite_bus"} <= set(model_names())
     for case in (path.parent.name for path in BUILT_IN.glob("*/case.toml")):
-        assert f"`{case}`" in text
+        assert f"`{case}`" in CHANGELOG
 
 
 def test_nothing_lies_at_the_top_that_has_no_place_there():

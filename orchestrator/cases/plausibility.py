@@ -126,7 +126,7 @@ def _doubts(draft: Draft) -> Iterator[UnusualValue]:
                 yield UnusualValue(f"{name}.{of_lead}", place_of(draft, name, of_lead, of_lag), text)
         for resistance, reactance in RESISTANCES:
             R, X = value_of(plan, resistance), value_of(plan, reactance)
-            if R is not None and X is not None and R > X > 0:
+            if R is not None and X is not None and R > 1.05 * X > 0:
                 text = f"{resistance} = {R:g} pu exceeds {reactance} = {X:g} pu; are the two swapped?"
                 yield UnusualValue(f"{name}.{resistance}", place_of(draft, name, resistance, reactance), text)
     yield from _small_units(draft)

@@ -67,6 +67,8 @@ class TriedStep:
 
 @dataclass(frozen=True)
 class StepChoice:
+    """What communication steps do to a scenario's critical modes."""
+
     prepared: PreparedScenario
     allowed: Allowed
     critical: NDArray[np.complex128]  # the continuous system's critical modes [rad/s], least damped first
@@ -77,12 +79,15 @@ class StepChoice:
 
     @property
     def schedules(self) -> tuple[ScheduleName, ...]:
+        """Those that were tried."""
         return tuple(dict.fromkeys(trial.schedule for trial in self.trials))
 
     def of(self, schedule: ScheduleName) -> list[TriedStep]:
+        """The trials of one schedule, the shortest step first."""
         return [trial for trial in self.trials if trial.schedule == schedule]
 
     def largest(self, schedule: ScheduleName) -> TriedStep | None:
+        """The largest step up to which all are within the error; None where the shortest is not."""
         found = None
         for trial in self.of(schedule):
             if not trial.is_within(self.allowed):

@@ -38,11 +38,16 @@ def test_an_example_runs(example, tmp_path, monkeypatch):
     assert not said, "".join(said)
 
 
+RESULTS = ("Nyquist", "RunComparison", "SignalModes", "Sources", "StepChoice", "Verification")
+"""Types of results, named for annotations; the functions that return them have the examples."""
+
+
 @pytest.mark.parametrize("name", [name for name in orchestrator.__all__ if name != "CosimError"])
 def test_every_name_has_an_example(name):
     value = getattr(orchestrator, name)
     with_example = {example.name for example in EXAMPLES}
-    assert f"{value.__module__}.{value.__qualname__}" in with_example
+    assert name in RESULTS or f"{value.__module__}.{value.__qualname__}" in with_example
+    assert value.__doc__
     for method, function in inspect.getmembers(value, inspect.isfunction):
         if not method.startswith("_"):
             assert function.__doc__, f"{name}.{method}"

@@ -8,7 +8,6 @@ from fmus.toolchain.model_builder import ModelBuilder
 from orchestrator.analysis.state_access import obstacle
 from orchestrator.api import models
 from orchestrator.black_box.frequency_response import Excitation, measure
-from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.cli import main
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.instance import open_component
@@ -73,11 +72,3 @@ def test_an_identification_says_what_it_is_doing():
     assert "brought to rest" in said[0]
     assert [line.rpartition(", ")[2] for line in said[1:]] == [f"run {k} of 4" for k in (1, 2, 3, 4)]
     assert sum("v_re" in line for line in said) == 2
-
-
-def test_help_names_the_codes_of_60_hz(capsys):
-    with pytest.raises(SystemExit):
-        main(["certify", "--help"])
-    text = " ".join(capsys.readouterr().out.split())
-    *others, last = sorted((key for key, code in CODES.items() if code.f_n == 60), key=list(CODES).index)
-    assert f"of 60 Hz are {', '.join(others)} and {last}, the others of 50 Hz" in text

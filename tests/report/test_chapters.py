@@ -191,7 +191,7 @@ def test_a_page_tells_of_the_mode_that_the_name_was_without_the_controller(gfor,
 
 
 def test_the_answer_of_a_search_for_a_limit_is_on_the_page(tmp_path):
-    tried = ({"value": 2.0}, {"value": 9.0})
+    tried = [{"value": v, "kind": kind, "damping_percent": 5.0} for v, kind in ((2.0, "fails"), (9.0, "holds"))]
     limit = ParameterLimit(
         "grid.scr", "1", "base", "Base", Until(), Ending.FAILS, 6.87, 6.86, None, "", tried, (), "", 2.0
     )

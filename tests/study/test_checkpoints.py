@@ -10,7 +10,7 @@ import pytest
 from orchestrator.api.case import load
 from orchestrator.api.scenario import CheckpointWarning
 from orchestrator.cases.case import BUILT_IN, load_case
-from orchestrator.coupling import kept_run
+from orchestrator.coupling import run as coupled_run
 from orchestrator.coupling.run import Run
 from orchestrator.errors import InputError
 from orchestrator.results.checkpoint_file import previous
@@ -285,7 +285,7 @@ def test_an_fmu_that_does_not_come_back_is_not_believed(tmp_path, said, monkeypa
     """Planted: what was serialised is not restored."""
     prepared = prepared_scenario()
     interrupted(prepared, tmp_path, said, 1.15)
-    monkeypatch.setattr(kept_run, "set_state", lambda component, content: None)
+    monkeypatch.setattr(coupled_run, "set_state", lambda component, content: None)
     result = resumed(prepared_scenario(), tmp_path, said)
     assert len(said) == 1
     assert "'dip' is computed from its start again: component 'gfor' does not go on from its state" in said[0]
