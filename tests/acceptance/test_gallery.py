@@ -169,7 +169,6 @@ def test_a_place_at_which_its_small_answer_jumps_is_told(tmp_path):
     (*_, found) = check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results
     assert found.verdict == "remark"
     assert "its answer to a small change jumps by" in found.evidence
-    assert "between Q_0 =" in found.evidence
 
 
 def test_power_that_moves_in_steps_is_told(tmp_path):
