@@ -5,6 +5,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from orchestrator.api.case import Case
+from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.port import start_of
 from orchestrator.cases.given import case_values, plain
@@ -21,8 +23,8 @@ _FMU = "device."  # before the names of an FMU's own parameters
 
 
 def nyquist(
-    device: str | Path, network: str | Path | None = None, *, frequency: float | str = 50.0, compensation: float = 0.0,
-    angle: float | None = None, voltage: float | str | None = None, bus: str | None = None,
+    device: str | Path | Case, network: str | Path | Case | None = None, *, frequency: float | str = 50.0,
+    compensation: float = 0.0, angle: float | None = None, voltage: float | str | None = None, bus: str | None = None,
     components: Sequence[str] = (), scenario: str | None = None, values: Mapping[str, Any] | None = None,
     scr: float | None = None, x_r: float = 10.0, rating: float | str | None = None,
 ) -> Nyquist:  # fmt: skip
@@ -73,11 +75,16 @@ def nyquist(
     """
     rated = None if rating is None else to_unit(rating, "MVA")
     return Asked(
-        str(device), None if network is None else str(network), scenario, plain(values),
+        _place(device, "device"), None if network is None else _place(network, "network"), scenario, plain(values),
+        trust_fmus=any(isinstance(one, Case) and one.file.trust_fmus for one in (device, network)),
         frequency=to_unit(frequency, "Hz"), compensation=compensation / 100, angle=angle, bus=bus,
         components=tuple(components), scr=scr, x_r=x_r, rating_mva=rated,
         kilovolt=None if voltage is None else to_unit(voltage, "kV"),
     ).judged()  # fmt: skip
+
+
+def _place(given: str | Path | Case, argument: str) -> str:
+    return str(given.file.path if isinstance(given, Case) else path_of(given, argument))
 
 
 class Asked:
