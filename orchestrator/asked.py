@@ -124,7 +124,7 @@ def number_in(given: Any, unit: str, argument: str, rule: str) -> float:
 def number_between(given: Any, unit: str, argument: str, least: float, most: float, rule: str) -> float:
     number = number_in(given, unit, argument, rule)
     if not least <= number <= most:
-        raise InputError(f"{argument} = {given!r}; give {rule}")
+        raise InputError(f"{argument} = {given!r}; it must be {rule}")
     return number
 
 

@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import Any
 
 from orchestrator.api.case import Case
+from orchestrator.asked import number_in
 from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.port import start_of
@@ -17,7 +18,6 @@ from orchestrator.immittance.scan_files import ENDINGS
 from orchestrator.immittance.study import CutRequest, CutResult, study_cut
 from orchestrator.immittance.view import Nyquist
 from orchestrator.sensitivities.parameters import Parameter, parameters_in
-from orchestrator.units import to_unit
 
 _FMU = "device."  # before the names of an FMU's own parameters
 
@@ -73,13 +73,14 @@ def nyquist(
     >>> gfor.nyquist("two_area", components=["gfor"], scenario="gfor").verdict
     'stable'
     """
-    rated = None if rating is None else to_unit(rating, "MVA")
+    rated = None if rating is None else number_in(rating, "MVA", "rating", "a rating in MVA, such as 100")
+    share = number_in(compensation, "", "compensation", "a share in percent, such as 30") / 100
     return Asked(
         _place(device, "device"), None if network is None else _place(network, "network"), scenario, plain(values),
         trust_fmus=any(isinstance(one, Case) and one.file.trust_fmus for one in (device, network)),
-        frequency=to_unit(frequency, "Hz"), compensation=compensation / 100, angle=angle, bus=bus,
-        components=tuple(components), scr=scr, x_r=x_r, rating_mva=rated,
-        kilovolt=None if voltage is None else to_unit(voltage, "kV"),
+        frequency=number_in(frequency, "Hz", "frequency", "one in Hz, such as 50"), compensation=share, angle=angle,
+        bus=bus, components=tuple(components), scr=scr, x_r=x_r, rating_mva=rated,
+        kilovolt=None if voltage is None else number_in(voltage, "kV", "voltage", "a voltage in kV, such as 230"),
     ).judged()  # fmt: skip
 
 

@@ -322,7 +322,7 @@ class Scenario:
         >>> weakest.bus, round(weakest.s_sc_mva)
         ('bus_12', 2751)
         """
-        rule = "what a converter feeds in pu of its rating, from 0 to 10: 1.1 is 110 %"
+        rule = "a converter's current in pu of its rating, from 0 to 10: 1.1 is 110 %"
         current = number_between(converter_current, "pu", "converter_current", 0.0, 10.0, rule)
         rule = "a rating above 0 in MVA, such as 100 or '100 MVA'"
         rated = None if rating is None else number_between(rating, "MVA", "rating", 1e-6, 1e6, rule)

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.asked import Value, number_in, path, plain_value
+from orchestrator.asked import Value, number_between, number_in, path, plain_value
 from orchestrator.errors import InputError
 from orchestrator.late import pd
 
@@ -116,19 +116,12 @@ def in_seconds(time: Time | None, argument: str) -> float | None:
     """A time [s]; None for None."""
     if time is None:
         return None
-    number = number_in(time, "s", argument, "a time above 0 and finite, such as 5.0 or '200 us'")
-    if not 0 < number < float("inf"):
-        raise InputError(f"{argument} = {time!r}; it must be a time above 0 and finite, such as 5.0 or '200 us'")
-    return number
+    return number_between(time, "s", argument, 5e-324, 1e308, "a time above 0 and finite, such as 5.0 or '200 us'")
 
 
 def moment(time: Any, argument: str) -> float:
     """A time on the axis of a run [s], which begins at 0."""
-    rule = "a time of 0 or later and finite, such as 2.0 or '500 ms'"
-    number = number_in(time, "s", argument, rule)
-    if not 0 <= number < float("inf"):
-        raise InputError(f"{argument} = {time!r}; it must be {rule}")
-    return number
+    return number_between(time, "s", argument, 0.0, 1e308, "a time of 0 or later and finite, such as 2.0 or '500 ms'")
 
 
 def in_megabytes(given: Any, argument: str, least: float) -> float:

@@ -232,6 +232,10 @@ def fmu(tmp_path_factory):
         (lambda case: case.interactions("gfor", bindings="a.toml"), "bindings = 'a.toml'; give files by name"),
         (lambda _: gfor.admittance(__file__, frequencies=(0, 10)), r"\(0, 10\); the lowest must be above 0"),
         (lambda _: gfor.nyquist(3), "device = 3; give the path of a file"),
+        (lambda case: gfor.nyquist(case, frequency="x"), "frequency: 'x' is not a number"),
+        (lambda case: gfor.nyquist(case, compensation=None), "compensation = None; give a share"),
+        (lambda case: gfor.nyquist(case, rating="5 kV"), "rating: '5 kV' is in kV"),
+        (lambda case: gfor.nyquist(case, voltage=np.array([1, 2])), "voltage = .*; give a voltage in kV"),
         (lambda case: case.modes(), r"it belongs to a scenario: case.scenario\(…\).modes"),
         (lambda case: case.run(), r"it belongs to a scenario: case.scenario\(…\).run"),
     ],
@@ -253,10 +257,10 @@ def test_a_signal_is_one_name(run, nothing):
 def test_a_current_and_a_rating_are_in_their_range(current):
     scenario = gfor.load("infinite_bus").scenario("dip")  # refused before its power flow is asked for, which it lacks
     with pytest.raises(
-        InputError, match=r"converter_current.* give what a converter feeds|converter_current: '1.1 MW'"
+        InputError, match=r"converter_current.* a converter's current in pu|converter_current: '1.1 MW'"
     ):
         scenario.strengths(current)
-    with pytest.raises(InputError, match=r"rating.* give a rating above 0 in MVA|rating: 'x'"):
+    with pytest.raises(InputError, match=r"rating.* a rating above 0 in MVA|rating: 'x'"):
         scenario.strengths(1.1, rating={110: 0, -1: -1, None: "x"}.get(current, np.nan))
 
 
