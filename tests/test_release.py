@@ -13,7 +13,7 @@ from orchestrator.acceptance.checks.all import CHECKS
 from orchestrator.acceptance.runner import FILE_CHECKS
 from orchestrator.cases.case import BUILT_IN
 from orchestrator.cli import COMMANDS, OLD
-from orchestrator.interop.masters import MASTERS
+from orchestrator.interop.rules import MASTERS
 
 ROOT = Path(__file__).parents[1]
 VERSION = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]

@@ -25,30 +25,17 @@ _ONLY_PHASORS = (
 class Network:
     """Buses, and the elements that are connected to them.
 
-    Attributes
-    ----------
-    stray_B
-        Capacitance to earth [pu, 100 MVA] of every bus without capacitance of its own (charging, capacitor). If it is
-        0, such a bus needs a load with P > 0. A unit at a bus with a weak load needs the stray capacitance as well: v =
-        Σi/G would jump with the unit's current.
-    faults
-        Buses at which there can be a fault.
-    transformers
-        Those with three windings; others are lines with a ratio.
-    phasors
-        Whether it is for a model without transients, where a bus needs neither a load nor capacitance, and a line may
-        have a negative resistance or reactance, as equivalents of reduced networks have them.
+    ``stray_B``: capacitance to earth [pu, 100 MVA] of every bus without capacitance of its own (charging, capacitor).
+    If it is 0, such a bus needs a load with P > 0. A unit at a bus with a weak load needs the stray capacitance as
+    well: v = Σi/G would jump with the unit's current. ``faults``: buses at which there can be a fault;
+    ``transformers``: those with three windings; others are lines with a ratio; ``phasors``: whether it is for a model
+    without transients, where a bus needs neither a load nor capacitance, and a line may have a negative resistance or
+    reactance, as equivalents of reduced networks have them; ``injections``: buses at which the FMU has a current of its
+    own besides, as tunable parameters that start at 0.
 
-    injections
-        Buses at which the FMU has a current of its own besides, as tunable parameters that start at 0.
-
-    Raises
-    ------
-    ValueError
-        Naming every element that refers to an unknown bus, has no reactance or repeats a name, and, unless it is for
-        phasors, every line with a negative resistance or reactance, and every bus that has neither a resistive load nor
-        capacitance.
-    """
+    Raises a `ValueError` that names every element that refers to an unknown bus, has no reactance or repeats a name,
+    and, unless it is for phasors, every line with a negative resistance or reactance, and every bus that has neither a
+    resistive load nor capacitance."""
 
     name: str
     buses: tuple[str, ...]

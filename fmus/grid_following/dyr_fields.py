@@ -37,16 +37,8 @@ def approximation(records: Mapping[str, Mapping[str, float]]) -> tuple[dict[str,
     ((1 + s·Trv)·(1 + s·Tg)), and ours δi_p = −i_p·δv/(1 + s·τ + s²·τ·Tg) with τ = Trv + Tg. The reactive current has
     Tiq besides, or with QFLAG = 1 the integrator Kvi/s, which is 1/(s·τ·X_s).
 
-    Parameters
-    ----------
-    records
-        Of one machine: values by field, by the record's name; REGCA1, and REECA1 or REECB1.
-
-    Returns
-    -------
-    tuple
-        Values by parameter, and one text for each thing that is replaced or left out.
-    """
+    ``records``: of one machine, REGCA1 and REECA1 or REECB1: values by field, by the record's name. Returned are values
+    by parameter, and one text for each thing that is replaced or left out."""
     electrical = next((name for name in records if name != CONVERTER), None)
     if electrical is None or CONVERTER not in records:
         missing = CONVERTER if electrical else "REECA1 or REECB1"

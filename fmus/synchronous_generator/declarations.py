@@ -1,7 +1,10 @@
-"""Declarations that exciters, governors and stabilisers share."""
+"""Declarations that exciters, governors and stabilisers share, and the saturation that exciters share with machines.
+
+Saturation goes through two points of a curve, S(x)·x = B·(x − A)² above A and 0 below, as stability programs have it.
+A machine's data sheet gives S(1.0) and S(1.2), an exciter's S_E(E_1) and S_E(E_2)."""
 
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, if_else
+from fmus.toolchain.symbols import Expr, Scalar, fmax, if_else, logic_and, logic_or, sqrt
 
 
 def time_constant(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0, *, source: str) -> Expr:
@@ -19,3 +22,35 @@ def require_between(
     """Refuse an operating point at or beyond a limit of a signal, whose steady state is ``value``."""
     for margin, name, side in ((value - low, names[0], "below"), (high - value, names[1], "above")):
         m.require(margin, f"{name}: the operating point of the power flow lies at or {side} this limit, {rule}")
+
+
+def saturated_part(x: Expr, one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar]) -> Expr:
+    """S(x)·x for x ≥ 0: what saturation adds to what is proportional.
+
+    ``x``: flux or voltage [pu]; ``one``, ``other``: two points (x, S) in either order; S = 0 at both for no saturation.
+    """
+    first, last = _ordered(one, other)
+    high = last[0] * last[1]
+    ratio = sqrt(first[0] * first[1] / if_else(high > 0, high, 1))
+    A = (first[0] - ratio * last[0]) / (1 - ratio)
+    B = high / (last[0] - A) ** 2
+    return B * fmax(x - A, 0) ** 2
+
+
+def require_rising(m: ModelBuilder, one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar], text: str) -> None:
+    """Refuse points between which S(x)·x does not rise.
+
+    ``text``: names the points."""
+    first, last = _ordered(one, other)
+    none = logic_and(first[1] <= 0, last[1] <= 0)
+    rises = logic_and(last[0] - first[0] > 1e-6, last[0] * last[1] - first[0] * first[1] > 1e-9)
+    m.require(if_else(logic_or(none, rises), 1, -1), f"{text}: saturation must rise; give 0 at both for none")
+
+
+def _ordered(one: tuple[Scalar, Scalar], other: tuple[Scalar, Scalar]) -> tuple[tuple[Expr, Expr], ...]:
+    """The points by rising x. Without saturation any two serve."""
+    swapped = Expr(one[0]) > Expr(other[0])
+    none = logic_and(Expr(one[1]) <= 0, Expr(other[1]) <= 0)
+    low = (if_else(swapped, other[0], one[0]), if_else(swapped, other[1], one[1]))
+    high = (if_else(swapped, one[0], other[0]), if_else(swapped, one[1], other[1]))
+    return (if_else(none, 1.0, low[0]), low[1]), (if_else(none, 1.2, high[0]), high[1])

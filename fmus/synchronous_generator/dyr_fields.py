@@ -49,12 +49,12 @@ class DyrRecord:
 
 
 _WORD = re.compile(
-    r"(?P<name>[^:=!]+)(:(?P<sets>[\w+]+))?(-(?P<negated>\w+))?(\*(?P<times>[^=!]+))?(==(?P<same>\w+))?(=(?P<only>\d+))?"
-    r"(?P<not_zero>!?)"
+    r"(?P<name>[^:=!]+)(:(?P<sets>[\w+]+))?(-(?P<negated>\w+))?(\*(?P<times>[^=!]+))?(==(?P<same>\w+))?(=(?P<only>[\d|]+))?"
+    r"(?P<not_zero>!?)(?P<switch>\??)"
 )
 """A field as the table has it."""
 
-_SCOPES = {"machine": "machine", "exciter": "exciter", "governor": "governor", "stabilizer": "pss"}
+_SCOPES = {"machine": "machine.", "exciter": "exciter.", "governor": "governor.", "stabilizer": "pss.", "converter": ""}
 
 
 def _record(table: Mapping[str, Any]) -> DyrRecord:
@@ -63,21 +63,22 @@ def _record(table: Mapping[str, Any]) -> DyrRecord:
         found = _WORD.fullmatch(word)
         assert found is not None, word
         sets, negated = (
-            tuple(f"{scope}.{p}" for p in (found[group] or "").split("+") if p) for group in ("sets", "negated")
+            tuple(f"{scope}{p}" for p in (found[group] or "").split("+") if p) for group in ("sets", "negated")
         )
-        only = (float(found["only"]),) if found["only"] else ()
-        fields.append(
-            DyrField(
-                found["name"], sets, negated, found["times"] or "", only, found["same"] or "", found["not_zero"] != ""
-            )
-        )
-    return DyrRecord(table["kind"], table["part"], tuple(fields), tuple(f"{scope}.{p}" for p in table.get("lacks", ())))
+        only = tuple(map(float, found["only"].split("|"))) if found["only"] else ()
+        times, same = found["times"] or "", found["same"] or ""
+        marks = found["not_zero"] != "", found["switch"] != ""
+        fields.append(DyrField(found["name"], sets, negated, times, only, same, *marks))
+    return DyrRecord(table["kind"], table["part"], tuple(fields), tuple(f"{scope}{p}" for p in table.get("lacks", ())))
 
 
-DYR_RECORDS = {
-    name: _record(table)
-    for name, table in tomllib.loads(Path(__file__).with_name("dyr_records.toml").read_text(encoding="utf-8")).items()
-}
+def records_beside(module: str) -> dict[str, DyrRecord]:
+    """The records of ``dyr_records.toml`` beside a module's file, by PSS/E's name."""
+    tables = tomllib.loads(Path(module).with_name("dyr_records.toml").read_text(encoding="utf-8"))
+    return {name: _record(table) for name, table in tables.items()}
+
+
+DYR_RECORDS = records_beside(__file__)
 """By PSS/E's name. What a part holds and a record does not set keeps our default: give X'_d of GENCLS, and R_s of
 every machine, from the network data (ZSORCE) as ``machine.X_d1`` and ``machine.R_s``; machine data are on ``S_n``
 unless ``machine.S_data`` [MVA] says otherwise, as MBASE does."""

@@ -5,26 +5,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fmus.synchronous_generator.excitation.ac1a import ac1a
-from fmus.synchronous_generator.excitation.ac4a import ac4a
+from fmus.synchronous_generator.excitation.alternators import ac1a, ac4a
 from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.excitation.dc1a import dc1a, ieeet1
-from fmus.synchronous_generator.excitation.external import external
-from fmus.synchronous_generator.excitation.manual import manual
-from fmus.synchronous_generator.excitation.sexs import sexs
-from fmus.synchronous_generator.excitation.st1a import st1a
-from fmus.synchronous_generator.excitation.st4b import st4b
+from fmus.synchronous_generator.excitation.static import sexs, st1a, st4b
+from fmus.synchronous_generator.excitation.without_regulator import external, manual
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
 from fmus.synchronous_generator.machines.standard import genrou, genrou_rated_speed, gensal, two_axis
-from fmus.synchronous_generator.stabilization.pss1a import pss1a
-from fmus.synchronous_generator.stabilization.pss2 import pss2a, pss2b
-from fmus.synchronous_generator.turbines.common import read_either_way
-from fmus.synchronous_generator.turbines.constant import constant_power, constant_torque
-from fmus.synchronous_generator.turbines.gast import gast
-from fmus.synchronous_generator.turbines.hygov import hygov
-from fmus.synchronous_generator.turbines.ieeeg1 import ieeeg1
-from fmus.synchronous_generator.turbines.tgov1 import tgov1
+from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b
+from fmus.synchronous_generator.turbines.common import constant_power, constant_torque, read_either_way
+from fmus.synchronous_generator.turbines.governors import gast, hygov, ieeeg1, tgov1
 from fmus.synchronous_generator.variants import Governor, Stabilizer
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort

@@ -5,6 +5,7 @@ FMUs needs no compiler."""
 
 import hashlib
 import re
+import struct
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -14,7 +15,6 @@ from pathlib import Path
 from fmus.toolchain.cache import cache_directory, intact, keep
 from fmus.toolchain.extras import installed_version, require
 from fmus.toolchain.temporary import own_folder, remove, sweep_partial_files
-from fmus.toolchain.universal_binary import universal_binary
 
 TARGETS = {
     # FMI platform -> zig targets of the machines with this platform
@@ -147,3 +147,24 @@ def compile_for(source: str, target: str, ending: str, libraries: Sequence[str] 
         return keep(library, built.read_bytes())
     finally:
         remove(folder)
+
+
+_MAGIC = 0xCAFEBABE
+_ALIGNMENT = 14  # alignment of each library in the file, as a power of two: the page size of the newer processors
+_THIN = b"\xcf\xfa\xed\xfe"
+
+
+def universal_binary(libraries: Sequence[bytes]) -> bytes:
+    """Join thin 64-bit libraries, one per processor."""
+    step = 1 << _ALIGNMENT
+    header, body = struct.pack(">II", _MAGIC, len(libraries)), b""
+    offset = step
+    for library in libraries:
+        if library[:4] != _THIN:
+            raise ValueError("a universal binary is made of thin 64-bit Mach-O files")
+        processor, variant = struct.unpack("<II", library[4:12])
+        header += struct.pack(">IIIII", processor, variant, offset, len(library), _ALIGNMENT)
+        padded = library + bytes(-len(library) % step)
+        body += padded
+        offset += len(padded)
+    return header + bytes(step - len(header)) + body

@@ -1,12 +1,16 @@
-"""Sparse elimination planned ahead: order and fill of an LU factorisation whose pattern never changes."""
+"""Sparse elimination planned ahead: order and fill of an LU factorisation whose pattern never changes, such as of the
+implicit step's matrix 1 − γh·A of a model."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
+from fmus.toolchain.model import Model
 from fmus.toolchain.plan import Plan
+from fmus.toolchain.symbols import Expr, Function, depends_on, jacobian, symbol, symbols
 
 
 def plan_pattern(n: int, rows: Sequence[int], columns: Sequence[int]) -> Plan:
@@ -53,3 +57,28 @@ def _compressed(pattern: list[list[int]]) -> tuple[list[int], list[int]]:
     for entries in pattern:
         row.append(row[-1] + len(entries))
     return row, [j for entries in pattern for j in entries]
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """The plan for 1 − γh·A, and a function (p, c, γh) → values of that matrix."""
+
+    plan: Plan
+    values: Function
+
+
+def plan_elimination(model: Model) -> Elimination:
+    """Plan the factorisation of a model whose implicit part is linear in its states."""
+    n = len(model.states)
+    x, u = symbols("x", n), symbols("u", len(model.inputs))
+    p, c = symbols("p", len(model.parameters)), symbols("c", len(model.calculated))
+    (rates,) = (model.implicit or model.derivatives).of(x, u, p, c)
+    A = jacobian(rates, x)
+    if depends_on(list(A.values()), [*x, *u]):
+        raise ValueError(f"model {model.name} is not linear in its states; the implicit integrator needs that")
+    gh = symbol("gh")
+    matrix = {(i, i): Expr(1) for i in range(n)}
+    for place, element in A.items():
+        matrix[place] = matrix.get(place, Expr(0)) - gh * element
+    plan = plan_pattern(n, *zip(*matrix, strict=True))
+    return Elimination(plan, Function("iteration", [p, c, [gh]], [[matrix[place] for place in plan.entries]]))

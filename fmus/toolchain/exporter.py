@@ -29,31 +29,15 @@ class Recipe(Protocol):
 
 
 def export(
-    recipe: Recipe,
-    destination: Path,
-    platforms: tuple[str, ...] | None = None,
+    recipe: Recipe, destination: Path, platforms: tuple[str, ...] | None = None,
     extra: Mapping[str, bytes] | None = None,
-) -> Path:
-    """Write ``<model name>.fmu`` into a folder.
+) -> Path:  # fmt: skip
+    """Write ``<model name>.fmu`` into a folder, which is created where missing.
 
-    Parameters
-    ----------
-    recipe
-        `NativeFmu` or `PythonFmu` of a model.
-    destination
-        Folder; it is created where missing.
-    platforms
-        FMI 2.0 names of the platforms to compile for; by default all of them for a native FMU, and this machine's
-        for a Python-backed one, which elsewhere evaluates the same equations in pure Python. ``darwin64`` of a
-        native FMU holds code for both kinds of Mac.
-    extra
-        Further members of the archive, by path.
-
-    Raises
-    ------
-    ValueError, RuntimeError
-        As `compile_library`.
-    """
+    ``platforms``: FMI 2.0 names of those to compile for; by default all of them for a native FMU, and this machine's
+    for a Python-backed one, which elsewhere evaluates the same equations in pure Python. ``darwin64`` of a native FMU
+    holds code for both kinds of Mac. ``extra``: further members of the archive, by path. Errors are those of
+    `compile_library`."""
     chosen = recipe.default_platforms() if platforms is None else platforms
     return write_archive(destination / f"{recipe.model.name}.fmu", recipe.contents(chosen) | dict(extra or {}))
 

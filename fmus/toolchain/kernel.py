@@ -16,7 +16,7 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
 from collections.abc import Mapping
 from pathlib import Path
 
-from fmus.toolchain.elimination import plan_elimination
+from fmus.toolchain.elimination_plan import plan_elimination
 from fmus.toolchain.model import Model
 from fmus.toolchain.symbols import Function
 from fmus.toolchain.symbols.c_code import c_function

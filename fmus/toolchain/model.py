@@ -36,33 +36,16 @@ class NodalEquations:
 class Model:
     """Variables and equations of one device or network.
 
-    Attributes
-    ----------
-    name, title
-        Identifier of the FMU, and a line for people.
-    parameters, calculated, inputs, states, outputs
-        Declarations, in the order of the vectors p, c, u, x, y.
-    initialise
-        p → (c, x): set-points and states of the operating point.
-    derivatives, outputs_function
-        (x, u, p, c) → ẋ, and → y.
-    requirements
-        (p, c) → r; the model may run where every r > 0.
-    requirement_texts
-        The rule behind each r, with its remedy.
-    integrator
-        ``runge_kutta`` (explicit, order 4) or ``sdirk`` (L-stable, order 2, for stiff models that
-        are linear in x but for what ``implicit`` leaves out).
-    implicit
-        (x, u, p, c) → the part of ẋ that an implicit step solves for; None for all of ẋ.
-    nodal
-        Equations of a large network, which a kernel solves as data. Their voltages are a fifth argument of
-        ``derivatives`` and ``outputs_function`` then.
-    kind
-        What the component is in a power system.
-    of_parts
-        Whether it is made of parts that somebody chose, so that few have the same.
-    """
+    ``name``, ``title``: identifier of the FMU, and a line for people; ``parameters``, ``calculated``, ``inputs``,
+    ``states``, ``outputs``: declarations, in the order of the vectors p, c, u, x, y; ``initialise``: p → (c, x):
+    set-points and states of the operating point; ``derivatives``, ``outputs_function``: (x, u, p, c) → ẋ, and → y;
+    ``requirements``: (p, c) → r; the model may run where every r > 0; ``requirement_texts``: the rule behind each r,
+    with its remedy; ``integrator``: ``runge_kutta`` (explicit, order 4) or ``sdirk`` (L-stable, order 2, for stiff
+    models that are linear in x but for what ``implicit`` leaves out); ``implicit``: (x, u, p, c) → the part of ẋ that
+    an implicit step solves for; None for all of ẋ; ``nodal``: equations of a large network, which a kernel solves as
+    data. Their voltages are a fifth argument of ``derivatives`` and ``outputs_function`` then; ``kind``: what the
+    component is in a power system; ``of_parts``: whether it is made of parts that somebody chose, so that few have the
+    same."""
 
     name: str
     title: str

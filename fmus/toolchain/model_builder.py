@@ -154,13 +154,7 @@ class ModelBuilder:
         return self._opened[-1]
 
     def close(self, signal: Expr, value: Scalar) -> None:
-        """Give the value of an `algebraic` signal.
-
-        Raises
-        ------
-        ValueError
-            If the value depends on the signal itself: an algebraic loop.
-        """
+        """Give the value of an `algebraic` signal; a `ValueError` if it depends on the signal itself."""
         value = Expr(value)
         if depends_on([value], [signal]):
             raise ValueError(f"model {self.name}: signal {signal.name()!r} depends directly on itself")
@@ -180,12 +174,8 @@ class ModelBuilder:
     def build(self, integrator: Integrator = "runge_kutta") -> Model:
         """Return the finished model.
 
-        Raises
-        ------
-        ValueError
-            If a state has no derivative, or a calculated parameter or initial state depends on
-            something other than parameters.
-        """
+        Raises a `ValueError` if a state has no derivative, or a calculated parameter or initial state depends on
+        something other than parameters."""
         kinds: dict[type, list[tuple[Variable, Expr]]] = {
             kind: [entry for entry in self._declared.values() if type(entry[0]) is kind]
             for kind in (Parameter, CalculatedParameter, Input, State, Output)
@@ -255,11 +245,7 @@ class ModelBuilder:
     def _closed_signals(self) -> list[tuple[Expr, Expr]]:
         """Algebraic signals in an order in which each can be substituted once and for all.
 
-        Raises
-        ------
-        ValueError
-            If one was never closed, or several depend on one another in a circle.
-        """
+        Raises a `ValueError` if one was never closed, or several depend on one another in a circle."""
         closed = [symbol.name() for symbol, _ in self._algebraic]
         never = [symbol.name() for symbol in self._opened if symbol.name() not in closed]
         if never:

@@ -9,11 +9,10 @@ from fmus.toolchain.archive import digest_of, guid_of
 from fmus.toolchain.c_text import identity_source
 from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for, compile_library, recipe
 from fmus.toolchain.description import model_description, with_guid
-from fmus.toolchain.description3 import build_description, model_description_3
+from fmus.toolchain.description3 import build_description, has_port, model_description_3, terminals_and_icons
 from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.model import FmiVersion, Model
 from fmus.toolchain.native_source import native_source
-from fmus.toolchain.terminals import has_port, terminals_and_icons
 
 _FOLDERS_3 = {
     # zig target -> platform tuple of FMI 3.0

@@ -13,13 +13,12 @@ from array import array
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from fmus.toolchain.elimination import plan_elimination
-from fmus.toolchain.instructions import CONSTANT, INPUT, OUTPUT, instructions
+from fmus.toolchain.elimination_plan import plan_elimination
 from fmus.toolchain.model import Model
 from fmus.toolchain.nodes import LARGEST_REST
 from fmus.toolchain.plan import Plan
 from fmus.toolchain.symbols import Function
-from fmus.toolchain.tape_order import Operation, runs_of, with_pairs
+from fmus.toolchain.tape_order import CONSTANT, INPUT, OUTPUT, Operation, instructions, runs_of, with_pairs
 
 MAGIC, VERSION = b"gfortape", 1
 

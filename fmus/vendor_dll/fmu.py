@@ -1,5 +1,8 @@
-"""An IEEE/CIGRE DLL as an FMU for co-simulation by FMI 2.0."""
+"""An IEEE/CIGRE DLL as an FMU for co-simulation by FMI 2.0.
 
+The FMU takes along the files that text parameters of the DLL name, as the DLL runs closed off from all others."""
+
+import contextlib
 import hashlib
 import json
 import re
@@ -19,7 +22,6 @@ from fmus.vendor_dll.device import Device
 from fmus.vendor_dll.interface import DATA_TYPES, DllInterface
 from fmus.vendor_dll.source import device_variables, host_source, host_variables
 from fmus.vendor_dll.state_trial import Trial
-from fmus.vendor_dll.text_files import hidden, places
 
 _LIBRARIES = {"linux64": ("dl",), "win64": (), "darwin64": ()}
 _LONGEST = 60  # time for a DLL to tell what it is, or for the trial, from when it is loaded [s]
@@ -184,3 +186,35 @@ def _check_names(dll: VendorDll, names: Sequence[str]) -> None:
         raise DllError(
             f"{dll.path.name}: the name {twice[0]!r} would stand for two variables of the FMU; rename it in the DLL"
         )
+
+
+_LOOKS_LIKE_A_FILE = re.compile(r"[^\n]{1,900}\.[A-Za-z][A-Za-z0-9]{0,4}|[^\n]*[/\\][^\n]*")
+
+
+def _values(interface: DllInterface, texts: Mapping[str, str]) -> dict[str, str]:
+    words = [p for p in interface.parameters if DATA_TYPES[p.data_type].kind == "String"]
+    return {p.name: texts.get(p.name, str(p.default)) for p in words}
+
+
+def places(interface: DllInterface, texts: Mapping[str, str], library: Path, folder: Path) -> dict[str, Path]:
+    """Where files would lie that text parameters name.
+
+    ``texts``: Values that somebody gave, absolute or from ``folder`` on.
+    ``library``: The DLL, whose own defaults name files in its folder only: it must not choose what it may read."""
+    found = {}
+    for name, value in _values(interface, texts).items():
+        with contextlib.suppress(OSError, ValueError):
+            path = ((folder if name in texts else library.parent) / value).resolve()
+            if value and (name in texts or library.parent.resolve() in path.parents):
+                found[name] = path
+    return found
+
+
+def hidden(interface: DllInterface, texts: Mapping[str, str], files: Mapping[str, Path]) -> str:
+    """Which text parameters name files that the DLL does not see, and the remedy; empty where there are none."""
+    named = {n: v for n, v in _values(interface, texts).items() if n not in files and _LOOKS_LIKE_A_FILE.fullmatch(v)}
+    said = ", ".join(f"{name} = {value!r}" for name, value in named.items())
+    return said and (
+        f"it sees no files but those that its text parameters name, and of {said} there is none: put it beside the "
+        "DLL, or give its path in [texts] of a device's file or with gfor fmu build --text NAME=PATH"
+    )

@@ -12,8 +12,8 @@ from orchestrator.analysis.component_linearization import (
     linearize_component,
 )
 from orchestrator.analysis.delays import WireLink, links_of
-from orchestrator.analysis.equations import Indices
 from orchestrator.analysis.held_inputs import LineMap, over_parts
+from orchestrator.analysis.linear_model import Indices
 from orchestrator.analysis.sampled import repeating, steps_of_period
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule

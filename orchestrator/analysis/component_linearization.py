@@ -10,12 +10,11 @@ import numpy as np
 
 from orchestrator.analysis.derivative_check import check_derivatives
 from orchestrator.analysis.differences import PerturbedStep
-from orchestrator.analysis.embedded_model import check_operating_point, embedded_model
 from orchestrator.analysis.held_inputs import over_held_inputs
 from orchestrator.analysis.linear_model import DIRECTIONAL, PACKED, PERTURBED
 from orchestrator.analysis.perturbation import perturb
 from orchestrator.analysis.response_check import ContinuousModel, check_response
-from orchestrator.analysis.state_access import StateAccess
+from orchestrator.analysis.state_access import StateAccess, check_operating_point, embedded_model
 from orchestrator.arrays import Matrix
 from orchestrator.coupling.turns import Exchange
 from orchestrator.errors import AnalysisError

@@ -8,8 +8,8 @@ import numpy as np
 
 from orchestrator.analysis.critical_modes import DENSE, nearest_pairs
 from orchestrator.analysis.linear_model import IDENTIFIED, LinearModel
+from orchestrator.analysis.mode_tracking import similarity
 from orchestrator.analysis.modes import Mode, eigenvectors, in_range
-from orchestrator.analysis.similarity import similarity
 from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 

@@ -4,7 +4,7 @@ z⁺ = F·z + G·w and w = H·z + K·w (ż for z⁺ where the model is continuou
 their way between components. The matrix A = F + G·(I − K)⁻¹·H that this comes down to is dense in large parts;
 the equations are not, which is what a search for a few eigenvalues of a large system lives on."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
@@ -149,3 +149,39 @@ class LinearModel:
             return factors.solve(right, transposed)[:n]
 
         return ShiftedSolver(solve, lambda b: solve(b, "H"))
+
+
+Indices = NDArray[np.int64]
+
+
+class Equations:
+    """Collects the blocks of z⁺ = F·z + G·w, w = H·z + K·w."""
+
+    def __init__(self, n: int, m: int) -> None:
+        self._shapes = {"F": (n, n), "G": (n, m), "H": (m, n), "K": (m, m)}
+        self._parts: dict[str, list[tuple[Indices, Indices, Matrix]]] = {name: [] for name in self._shapes}
+
+    def next_state(self, rows: slice, states: slice, A: Matrix, w: Indices, B: Matrix) -> None:
+        """Add z⁺[rows] = A·z[states] + B·w[w]."""
+        n = self._shapes["F"][0]
+        self._add("F", np.arange(n)[rows], np.arange(n)[states], A)
+        self._add("G", np.arange(n)[rows], w, B)
+
+    def output(self, rows: Indices, states: slice, C: Matrix, w: Indices, D: Matrix) -> None:
+        """Add w[rows] = C·z[states] + D·w[w]."""
+        self._add("H", rows, np.arange(self._shapes["F"][0])[states], C)
+        self._add("K", rows, w, D)
+
+    def _add(self, name: str, rows: Indices, columns: Indices, block: Matrix) -> None:
+        i, k = np.nonzero(block)
+        self._parts[name].append((rows[i], columns[k], block[i, k]))
+
+    def model(
+        self, names: Iterable[str], step_size: float | None, disagreement: float, sources: Mapping[str, str]
+    ) -> LinearModel:
+        F, G, H, K = (self._matrix(name) for name in self._shapes)
+        return LinearModel(F, G, H, K, tuple(names), step_size, disagreement, sources)
+
+    def _matrix(self, name: str) -> sp.csr_array:
+        rows, columns, values = (np.concatenate(part) for part in zip(*self._parts[name], strict=True))
+        return sp.coo_array((values, (rows, columns)), shape=self._shapes[name]).tocsr()

@@ -11,9 +11,7 @@ import numpy as np
 
 from orchestrator.analysis.blocks import Blocks, linearize_within
 from orchestrator.analysis.delays import DelayLine, continuous_line, delay_line
-from orchestrator.analysis.equations import Equations, Indices
-from orchestrator.analysis.feedthrough import check_feedthrough, feedthrough_sources
-from orchestrator.analysis.linear_model import DELAYED, HELD, LinearModel
+from orchestrator.analysis.linear_model import DELAYED, HELD, Equations, Indices, LinearModel
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.errors import AnalysisError
@@ -223,3 +221,24 @@ def _check_declared(blocks: Blocks) -> None:
                     f"directly, and it does ({c.D[row, column]:.3g}); a schedule of second order relies on that: take "
                     "gauss-seidel, or mend the dependencies in its modelDescription.xml"
                 )
+
+
+def check_feedthrough(blocks: Blocks, names: list[str]) -> None:
+    """No output of the named components may depend on itself within one instant."""
+    waiting = list(names)
+    while waiting:
+        pending = {i for name in waiting for i in range(len(blocks.output_names))[blocks.window[name]]}
+        ready = [name for name in waiting if not pending & feedthrough_sources(blocks, name)]
+        if not ready:
+            raise AnalysisError(
+                f"direct feed-through closes an algebraic loop through {', '.join(waiting)}; "
+                "one of them must give an output that does not depend directly on its inputs"
+            )
+        waiting = [name for name in waiting if name not in ready]
+
+
+def feedthrough_sources(blocks: Blocks, name: str) -> set[int]:
+    """Indices in y that a component's outputs depend on directly: not over a delay, nor over a cut connection."""
+    used = np.abs(blocks.components[name].D).max(axis=0, initial=0.0) > 0
+    used[list(blocks.linked(name))] = False
+    return {i for i in blocks.sources[name][used].tolist() if i < len(blocks.output_names)}

@@ -51,12 +51,7 @@ def opposition(mode: Mode, side: Sequence[str], other: Sequence[str]) -> float:
     groups' energies times sin²(φ/2) of the angle φ between their motions: the part of two equal motions that lies in
     their difference.
 
-    ``mode``: With its participations and its shape.
-
-    Returns
-    -------
-    0 where they are less than `LEAST_ANGLE` apart, or one of them rests or swings within itself.
-    """
+    It is 0 where they are less than `LEAST_ANGLE` apart, or one of them rests or swings within itself."""
     factors = dict(mode.participation)
     one, two = (_common_motion(mode, factors, group) for group in (side, other))
     smaller, larger = sorted((abs(one), abs(two)))

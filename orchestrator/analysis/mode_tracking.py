@@ -1,7 +1,7 @@
 """Following all modes from one operating point to the next by their eigenvectors.
 
 Sorted lists of eigenvalues lose a mode where two eigenvalues cross; eigenvectors stay the same. The similarity of
-`orchestrator.analysis.similarity` is the magnitude of a product, and these products sum to 1 over all modes b of a
+`orchestrator.analysis.mode_tracking` is the magnitude of a product, and these products sum to 1 over all modes b of a
 point. A similarity above a half therefore means that most of mode a is in mode b."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.analysis.modes import Mode
-from orchestrator.analysis.similarity import similarity
-from orchestrator.arrays import Complex
+from orchestrator.arrays import Complex, Vector
 
 THRESHOLD = 0.5  # least similarity with which two modes count as the same mode
 _MARGIN = 0.3  # A mode is left unmatched if the similarities of its two best candidates differ by less than this
@@ -146,3 +145,10 @@ def number_trajectories(
         result.similarity[place] = [alike for _, alike, _ in entries]
         result.origin[place] = [origin for _, _, origin in entries]
     return result
+
+
+def similarity(left_a: Vector, right_a: Vector, left_b: Vector, right_b: Vector) -> NDArray[np.float64]:
+    """|l_aᴴ·r_b|·|l_bᴴ·r_a| of every mode a with every mode b, shape (m_a, m_b)."""
+    forth = left_a.conj() @ right_b.T
+    back = (left_b.conj() @ right_a.T).T
+    return np.asarray(np.abs(forth * back), dtype=float)

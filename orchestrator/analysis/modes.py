@@ -92,11 +92,8 @@ class Mode:
     def swing(self, states: Iterable[str], least: float = 0.1) -> tuple[list[str], list[str]]:
         """Two groups of some states, such as all speeds, that swing against each other.
 
-        Returns
-        -------
-        The states less than 90° from the largest one, and the others, each group sorted by size. States that move less
-        than ``least`` of the largest are left out.
-        """
+        They are the states less than 90° from the largest one, and the others, each group sorted by size. States that
+        move less than ``least`` of the largest are left out."""
         moving = sorted((s for s in states if s in self.shape), key=lambda s: -abs(self.shape[s]))
         if not moving or abs(self.shape[moving[0]]) == 0:
             return [], []

@@ -13,9 +13,9 @@ from orchestrator.cases.given import Time, moment
 from orchestrator.errors import InputError
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.results.recorded import in_memory
-from orchestrator.study.common_times import common_times
 from orchestrator.study.comparison import compare as compare_signal
 from orchestrator.study.comparison import most_different
+from orchestrator.study.measured import common_times
 from orchestrator.study.signal_modes import RunComparison, doubt_text
 
 RINGS_FROM = 2.0

@@ -14,7 +14,7 @@ from orchestrator.api.results import Run
 from orchestrator.asked import text_or_none
 from orchestrator.cases.given import Time, moment
 from orchestrator.errors import AnalysisError, InputError
-from orchestrator.oscillations.kind import forced_frequencies
+from orchestrator.oscillations.verdict import forced_frequencies
 from orchestrator.results.recorded import warn_of_early_end
 from orchestrator.study.ambient import AmbientModes, AmbientWindow
 from orchestrator.study.comparison import open_trajectory, recorded, require_numbers, strongest_modes

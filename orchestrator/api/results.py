@@ -313,7 +313,7 @@ class Run:
         InputError
             If the signal was not recorded.
         """
-        from orchestrator.study.signal_plots import draw_signal  # noqa: PLC0415 - a second to import
+        from orchestrator.study.mode_plots import draw_signal  # noqa: PLC0415 - a second to import
 
         expression = self._first_plotted() if signal is None else signal
         unit = self.signal(expression).attrs.get("units") or self.dataset[expression.split(" - ")[0].strip()].units

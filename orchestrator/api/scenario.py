@@ -24,8 +24,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
 from orchestrator.cores import MOST_THREADS
-from orchestrator.coupling.observers import Observer
-from orchestrator.coupling.progress import Progress
+from orchestrator.coupling.observers import Observer, Progress
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import Federates

@@ -1,4 +1,4 @@
-"""Rows of a CSV file, each with its place for errors."""
+"""Rows of a CSV file, each with its place for errors, and paths as messages write them."""
 
 import csv
 import math
@@ -6,9 +6,18 @@ from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path
 
-from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.errors import InputError
 from orchestrator.units import LARGEST
+
+
+def seen_from_here(path: Path) -> Path:
+    """The path as a user in the working directory writes it; places in messages are read there."""
+    try:
+        path.exists()  # false where there is none; it fails where nobody could tell
+    except OSError as error:
+        raise InputError(f"{str(path)[:200]}: it cannot be looked for: {error.strerror}; give another path") from error
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
+
 
 Row = dict[str, str]
 PLACE = "_place"  # key of a row's file and line

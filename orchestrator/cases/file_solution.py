@@ -11,9 +11,8 @@ from scipy.sparse.linalg import spsolve
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Matrix
-from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
+from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.flow_equations import FlowEquations
-from orchestrator.cases.flow_transformers import inner_buses, legs_of
 from orchestrator.cases.network_import import ImportedNetwork, bus_of
 
 _VM, _VA = 7, 8  # columns of MATPOWER's table

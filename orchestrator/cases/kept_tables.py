@@ -7,19 +7,41 @@ import json
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fmus.toolchain.cache import CacheError, cache_directory, intact, keep
 from fmus.toolchain.extras import installed_version
-from orchestrator.cases.source_tables import SourceTables
+from orchestrator.arrays import Matrix
+
+
+@dataclass(frozen=True)
+class SourceTables:
+    """MATPOWER's tables of a network, its columns in MATPOWER's order."""
+
+    name: str
+    base_mva: float
+    bus: Matrix
+    branch: Matrix
+    gen: Matrix
+    # conductance and susceptance to earth at both ends of every branch [pu]: g + jb behind the ratio at the from side,
+    # and at the to side
+    branch_to_earth: NDArray[np.complex128]
+    labels: dict[int, str]  # number of a bus → what people call it
+    frequency: float | None = None  # rated frequency [Hz], where the source knows it
+    # number of a bus → what its loads draw as constant impedance and as constant current [MW, Mvar], where the source
+    # tells them apart; the rest of the bus' load is as the case says
+    load_parts: dict[int, tuple[complex, complex]] = field(default_factory=dict)
+
 
 LIBRARIES = ("pandapower", "numpy", "scipy", "pandas", "lightsim2grid")
 """What the tables depend on beside our code; pandapower takes the last where it is installed."""
 
-_FILES = [Path(__file__).with_name(name) for name in ("kept_tables.py", "network_sources.py", "source_tables.py")]
+_FILES = [Path(__file__).with_name(name) for name in ("kept_tables.py", "network_sources.py")]
 _CODE = "".join(file.read_text(encoding="utf-8") for file in _FILES)
 """What is loaded, if it is the same when tables are kept."""
 

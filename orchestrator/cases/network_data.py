@@ -6,14 +6,13 @@ from pathlib import Path
 from fmus.grid.network import Line, Load, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.cases.cgmes.network import read_cgmes
-from orchestrator.cases.csv_rows import Row, number, optional_number, place_of, rows_of
+from orchestrator.cases.csv_rows import Row, number, optional_number, place_of, rows_of, seen_from_here
 from orchestrator.cases.file_solution import NOT_SOLVED, misfit_of
 from orchestrator.cases.load_models import with_laws
 from orchestrator.cases.network_import import Generation, ImportedNetwork, bus_of, import_network
 from orchestrator.cases.network_sources import read_matpower, read_pandapower
 from orchestrator.cases.psse.raw import Machine, read_raw
 from orchestrator.cases.schema import NetworkTable
-from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.errors import InputError, Problem
 
 _IN_OHMS = ("kv", "R_ohm", "X_ohm", "B_us")  # of a file of lines, in the place of R, X, B

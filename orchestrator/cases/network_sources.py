@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fmus.toolchain.extras import require
-from orchestrator.cases.kept_tables import kept_tables
+from orchestrator.cases.csv_rows import seen_from_here
+from orchestrator.cases.kept_tables import SourceTables, kept_tables
 from orchestrator.cases.names import close_names
-from orchestrator.cases.seen_paths import seen_from_here
-from orchestrator.cases.source_tables import SourceTables
 from orchestrator.errors import InputError
 
 __all__ = ["SourceTables", "read_matpower", "read_pandapower"]

@@ -31,6 +31,7 @@ _TABLES = {
 """What a table of a plain network is → the columns that tell it."""
 
 _FILES = {".raw": "raw", ".m": "matpower", ".mat": "matpower", ".json": "pandapower", ".zip": "cgmes"}
+_TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
 _EMT_STEP = 1e-4
 _MOST_CURVES = 12
 
@@ -250,37 +251,6 @@ def _placed(wanted: WantedConverter, base: PreparedScenario) -> _Place:
     if wanted.less in at_slack:
         return found  # the slack feeds what is left, whatever it is given
     return replace(found, less=wanted.less, before_mw=power, rating_mva=rating)
-
-
-_TEMPLATE = """\
-# Written by: {command}
-# Change what you like. What the keys mean: orchestrator/cases/README.md
-name = {name}
-title = {title}
-source = {source}
-{models}
-[solver]
-step_size = "{step}"
-stop_time = "10 s"
-record_interval = "10 ms"
-record = ["*.omega", "grid.*.v"{record}]
-{other}
-[power_flow]
-grid = "grid"{slack}
-
-[components.grid]
-model = "{grid}"
-
-[network]
-{network}
-{loads}load_model = {{ active = "power", reactive = "power" }}    # or "current"; without it impedance
-{more}
-[units]
-{units}
-generator = "synchronous_generator{generator}{suffix}"
-converter = "gfor{suffix}"      # of a unit only where --set units.alpha.N=0.3 gives it a share
-{converter}
-{scenarios}"""
 
 
 class _Text:

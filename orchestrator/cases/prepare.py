@@ -25,9 +25,8 @@ from orchestrator.cases.operating_point import power_flow_of
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.plausibility import check_plausibility, question_loading
 from orchestrator.cases.power_flow import PowerFlow
-from orchestrator.cases.recording import record_every, recorded
 from orchestrator.cases.references import references_of
-from orchestrator.cases.run_plan import check_length, checked_schedule, clock_of
+from orchestrator.cases.run_plan import check_length, checked_schedule, clock_of, record_every, recorded
 from orchestrator.cases.scheduling import schedule_in, told_again
 from orchestrator.cases.schema import ComponentTable, ReferenceModeTable, Value
 from orchestrator.cases.unit_tables import unit_components

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 from fmus.grid.network import OPEN_CHARGING, Network, Shunt, ThreeWinding
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
-from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
+from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.flow_limits import Limits
-from orchestrator.cases.flow_transformers import inner_buses, legs_of
 from orchestrator.cases.flow_units import flow_unit
 from orchestrator.cases.power_flow import FlowUnit, PowerFlow, solve_power_flow
 from orchestrator.cases.sharing import Dispatch, shared_flow

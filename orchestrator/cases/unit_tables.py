@@ -9,17 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.build_choices import PARTS
-from orchestrator.cases.csv_rows import PLACE, Row, optional_number, place_of, rows_of
+from orchestrator.cases.csv_rows import PLACE, Row, optional_number, place_of, rows_of, seen_from_here
 from orchestrator.cases.draft import Draft, UnitOrigin
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.network_import import Generation
 from orchestrator.cases.plausibility import question
 from orchestrator.cases.plausible_values import UnusualValue
-from orchestrator.cases.psse.dyr_units import rows_of_machines, with_records
-from orchestrator.cases.psse.parts_without_records import completed, missing_records, with_choices
+from orchestrator.cases.psse.dyr_units import completed, missing_records, rows_of_machines, with_choices, with_records
 from orchestrator.cases.schema import ComponentTable, UnitsTable
-from orchestrator.cases.seen_paths import seen_from_here
 from orchestrator.cases.source_changes import Changes
 from orchestrator.cases.unit_row import UnitRow, checked
 from orchestrator.errors import InputError

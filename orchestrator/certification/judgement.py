@@ -22,8 +22,8 @@ from orchestrator.certification.criteria import (
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
 from orchestrator.certification.swings import LARGEST_RATIO, SLOWEST_PERIOD, SwingTest, slow_part, swing_test
-from orchestrator.watch.declared_current import told_of
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
+from orchestrator.watch.limits import told_of
 
 SETTLING = 0.5  # time after the event [s] from which the signal counts as a free response and is decomposed into modes
 RATED_POWER = 1350.0  # active power of the converter in the norm's study [MW]

@@ -17,8 +17,7 @@ from orchestrator.certification.margins import margin_text
 from orchestrator.certification.matrix import CertificateMatrix, MatrixCell
 from orchestrator.certification.verdict import FAILS, PASSES
 from orchestrator.fmi.values import as_text
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import table
+from orchestrator.report.html.elements import document, table
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
 

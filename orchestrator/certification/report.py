@@ -20,8 +20,7 @@ from orchestrator.certification.report_document import (
 from orchestrator.certification.request import missing_reactances
 from orchestrator.certification.study import Certification
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, damping, number, table
+from orchestrator.report.html.elements import Figures, damping, document, number, table
 
 _TITLES = {PASSES: "passed", FAILS: "failed", INCOMPLETE: "incomplete"}
 

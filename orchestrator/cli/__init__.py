@@ -21,39 +21,9 @@ from orchestrator.spelling import as_options
 
 _ESCAPE = "gfor_escape"
 
-COMMANDS = {
-    "new": "write a case file from a network's files, such as RAW and DYR",
-    "run": "steady state, modes and time response of a case's scenarios",
-    "modes": "steady state and eigenvalues of a case's scenarios",
-    "steps": "the largest communication step within a given error, for each schedule",
-    "scr": "short-circuit power of every bus, and SCR of the converters",
-    "sweep": "modes over a grid of parameters, followed from point to point",
-    "sensitivities": "how each parameter of each FMU moves a mode",
-    "interactions": "modes that several vendors' converters share, and the pair that does not agree",
-    "site": "where a converter helps: the shift of each mode by support at each bus",
-    "screen": "critical modes of many operating points and outages",
-    "explore": "a case in the browser: map of modes, sliders, single-line diagram, responses",
-    "design": "design a POD controller by eigenvalue sensitivity",
-    "certify": "the grid code's damping test on a converter FMU",
-    "verify": "whether a certificate still holds: hashes, verdict, points computed anew",
-    "report": "one self-contained HTML page from results of any study",
-    "fmu info": "show what an FMU declares",
-    "fmu bind": "draft a binding: what a foreign FMU's variables mean at our port",
-    "fmu check": "acceptance tests of an FMU: can it be trusted in a co-simulation?",
-    "fmu build": "build FMUs of the catalogue's models",
-    "fmu admittance": "measure a device's admittance, and fit a model to it",
-    "fmu nyquist": "whether a device is stable at a network, from scans, FMUs and cases",
-    "signal identify": "the modes in a recorded signal (matrix pencil; in noise: stochastic subspace)",
-    "signal compare": "two recorded runs: differences, and what each rings with",
-    "signal source": "where the oscillations of a run or recording come from: which unit drives them",
-    "export linear": "write a scenario's linear model A, B, C, D for other tools",
-    "export ssp": "write a case's scenarios as SSP archives for other tools",
-    "export comtrade": "write a run's signals as a COMTRADE recording for other tools",
-    "export dll": "write a converter's control as IEEE/CIGRE DLL for EMT programs",
-    "master which": "which schedule another tool runs, shown by a pair of probe FMUs",
-    "master federate": "one component of a case as a federate at HELICS, for a run elsewhere",
-}
-"""Commands; those of a group follow its name."""
+_LISTED = Path(__file__).with_name("commands.txt").read_text(encoding="utf-8").splitlines()
+COMMANDS = {name: words for name, _, words in (line.partition(": ") for line in _LISTED)}
+"""Commands, with what they are for; those of a group follow its name."""
 
 _ROOMS = rooms()
 COMMANDS |= {n.replace("_", "-"): words_of(room) for n, room in _ROOMS.items() if n not in COMMANDS}

@@ -11,7 +11,7 @@ from rich.markup import escape
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.api.admittance import admittance
 from orchestrator.cli.arguments import option, quantity, repeatable, seconds, setting, switch
-from orchestrator.cli.excitation import add_excitation_arguments, excitation_of
+from orchestrator.cli.case_arguments import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, print_json, said_stages
 from orchestrator.errors import InputError
 from orchestrator.immittance.measured import as_scan

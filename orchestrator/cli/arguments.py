@@ -2,12 +2,15 @@
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from orchestrator.asked import as_number, asked_of
+from orchestrator.asked import as_number, asked_of, read_whole
 from orchestrator.coupling.schedule import check_tolerance
+from orchestrator.errors import InputError
+from orchestrator.points import study
+from orchestrator.points.executor import Executor
 from orchestrator.units import read_value, to_unit
 
 _ASKED = "asked_"  # before the name of a field whose own name is that of another option
@@ -124,3 +127,15 @@ def reactances(text: str) -> tuple[float, ...]:
     if not all(1e-3 <= value <= 10 for value in values) or len(set(values)) < len(values):
         raise ValueError(f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3")
     return values
+
+
+def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
+    option(parser, "--workers", "N", "processes to compute in (default: one a core)", read=read_whole(1, 1000))
+    option(parser, "--scheduler", "ADDRESS", "compute on a Dask cluster, such as tcp://host:8786")
+    option(parser, "--tls", "DIR", "folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")
+
+
+def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:
+    if options.scheduler is not None and options.workers is not None:
+        raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
+    return study.choose_executor(options.workers, options.scheduler, imports, options.tls)

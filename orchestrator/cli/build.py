@@ -1,19 +1,62 @@
 """``gfor fmu build``: FMUs of the catalogue's models."""
 
 import argparse
+import tomllib
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from fmus.toolchain.catalogue import model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
 from fmus.toolchain.extras import require
+from fmus.toolchain.model import FmiVersion
 from orchestrator.api.dll import build_from_dll
 from orchestrator.api.models import build, catalogue_model
 from orchestrator.cases.build_choices import PARTS
-from orchestrator.cli import linear_model
+from orchestrator.cases.case import load_case
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli.arguments import option, repeatable, switch
-from orchestrator.cli.build_hosts import HOSTS, with_port
 from orchestrator.cli.terminal import make_errors, said_stages
 from orchestrator.errors import InputError
+from orchestrator.fmi.linear_model import linear_model_members
+from orchestrator.study.linear_model_files import component_model
+
+Port = Literal["dq", "abc", "phasor"]
+
+ENDINGS: dict[Port, str] = {"dq": "", "abc": "_abc", "phasor": "_phasor"}  # of the names of models with a port
+
+
+@dataclass(frozen=True)
+class Tool:
+    """What to build for a host.
+
+    ``why``: the reason for the kind, the version and the port.
+    ``source``: where that is to be read; "here" where our own tests run such FMUs in it."""
+
+    native: bool
+    fmi: FmiVersion
+    port: Port
+    platforms: tuple[str, ...]
+    why: str
+    source: str
+
+    @property
+    def kind(self) -> str:
+        return "native" if self.native else "Python-backed"
+
+
+HOSTS = {
+    name: Tool(**table | {"platforms": tuple(table["platforms"])})
+    for name, table in tomllib.loads(Path(__file__).with_name("build_hosts.toml").read_text(encoding="utf-8")).items()
+}
+"""By the name that ``--for`` takes."""
+
+
+def with_port(name: str, port: Port, known: tuple[str, ...]) -> str:
+    """The model with a port; the one that was asked for where it has another port by its name, or there is none."""
+    found = name + ENDINGS[port]
+    return found if found in known and not name.endswith(tuple(filter(None, ENDINGS.values()))) else name
+
 
 _SUCH_AS = {"machine": "genrou", "exciter": "sexs", "governor": "tgov1", "stabilizer": "pss1a"}
 
@@ -40,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     repeatable(parser, "--text", "NAME=VALUE", "text parameter of that DLL (repeatable)")
     switch(parser, "--reference", "add a smoke test with reference results (layered standard LS-REF)")
     switch(parser, "--sources", "add the C source, for tools that compile (native only)")
-    linear_model.add_arguments(parser)
+    add_linear_model_arguments(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -60,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
     if parts and not options.names:
         raise InputError(f"--{next(iter(parts))} is for one model: name it, such as synchronous_generator")
     models = [catalogue_model(name, parts) for name in names]
-    extra = linear_model.extra_members(options, [model.name for model in models])
+    extra = extra_members(options, [model.name for model in models])
     kind = "native" if options.native else "Python-backed"
     with said_stages() as report:
         for number, model in enumerate(models, start=1):
@@ -103,3 +146,49 @@ def _from_dll(options: argparse.Namespace) -> int:
         print(line)
     print(built.path)
     return 0
+
+
+OPTION = "--with-linear-model"
+
+
+def add_linear_model_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(OPTION, dest="linear_case", metavar="CASE", help="pack the model's linear model at the steady "
+                        "state of this case into the FMU")  # fmt: skip
+    option(parser, "--scenario", "NAME", "scenario of that case (default: its only one)")
+    option(parser, "--component", "NAME", "component of that case (default: the only one of this model)")
+
+
+def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, bytes]:
+    """Members for the FMU's ``extra/`` folder; nothing without the option."""
+    if options.linear_case is None:
+        if options.scenario or options.component:
+            raise InputError(f"--scenario and --component say more of {OPTION}; add it")
+        return {}
+    if len(models) != 1:
+        raise InputError(f"{OPTION} needs one model to build, not {len(models)}; name it before the options")
+    case = load_case(options.linear_case)
+    scenario = _chosen("--scenario", "scenario", options.scenario, list(case.scenarios), f"the case {case.name!r}")
+    (prepared,) = case.prepare([scenario], {"*.native": True} if options.native else {})
+    component = _component(options.component, models[0], prepared)
+    return linear_model_members(component_model(prepared, component))
+
+
+def _component(wanted: str | None, model: str, prepared: PreparedScenario) -> str:
+    plans = prepared.system.components
+    known = [name for name, plan in plans.items() if plan.description.model_name == model]
+    if not known:
+        made = sorted({plan.description.model_name for plan in plans.values()})
+        raise InputError(
+            f"{OPTION}: scenario {prepared.name!r} has no component of the model {model!r}; it has some of: "
+            f"{', '.join(made)}"
+        )
+    return _chosen("--component", f"component of the model {model!r}", wanted, known, f"scenario {prepared.name!r}")
+
+
+def _chosen(option: str, what: str, wanted: str | None, known: list[str], where: str) -> str:
+    if wanted is None and len(known) == 1:
+        return known[0]
+    if wanted not in known:
+        asked = f"there is no {what} {wanted!r}" if wanted else f"there are several {what}s"
+        raise InputError(f"{OPTION}: {asked} in {where}; choose with {option} from: {', '.join(known)}")
+    return wanted

@@ -7,11 +7,10 @@ from orchestrator.cases.devices import devices_of
 from orchestrator.certification.details import TEMPLATE
 from orchestrator.certification.issue import NTS631
 from orchestrator.certification.request import PODS, REACTANCES
-from orchestrator.cli.arguments import option, reactances, repeatable, setting, switch
+from orchestrator.cli.arguments import add_executor_arguments, option, reactances, repeatable, setting, switch
 from orchestrator.cli.certificate import ALL, CODE_NAMES, GB, codes_of, run_one, run_stiffness
 from orchestrator.cli.certify_matrix import run_matrix
 from orchestrator.cli.certify_sensitivities import add_sensitivity_arguments, check_sensitivity_options
-from orchestrator.cli.executors import add_executor_arguments
 from orchestrator.errors import INTERRUPTED, InputError
 
 

@@ -13,10 +13,9 @@ from orchestrator.certification.codes import needs_record
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.change_point import ChangeTask
 from orchestrator.certification.codes.what_it_takes import CHANGE, confirm_changes, plan_changes, run_changes
-from orchestrator.cli.arguments import repeatable, switch
-from orchestrator.cli.executors import choose_executor
+from orchestrator.cli.arguments import choose_executor, repeatable, switch
 from orchestrator.cli.interrupted import saying_how_it_goes_on
-from orchestrator.cli.points import Progressing
+from orchestrator.cli.study import Progressing
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 

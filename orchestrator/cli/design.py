@@ -8,19 +8,38 @@ from shutil import rmtree
 from rich.markup import escape
 
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
-from orchestrator.cli.arguments import add_request_arguments, option, repeatable, switch
+from orchestrator.cli.arguments import add_executor_arguments, add_request_arguments, option, repeatable, switch
 from orchestrator.cli.case_arguments import add_case_arguments, asked_of_case, case_of
-from orchestrator.cli.design_points import add_points_arguments, run_over_points
 from orchestrator.cli.interrupted import saying_how_it_goes_on
+from orchestrator.cli.study import shown, working_in
 from orchestrator.cli.terminal import make_console, print_json, print_parts, print_questions, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
+from orchestrator.coordinated_design.command import STUDY
 from orchestrator.coordinated_design.one_point import design_controller
+from orchestrator.coordinated_design.study import ALL, PointsDesignRequest
 from orchestrator.errors import NOT_MET, CosimError, InputError
 from orchestrator.pod_design.design import DesignRequest
 from orchestrator.pod_design.sheet import first_screen, sheet
 from orchestrator.pod_design.view import parameter_file_path
 from orchestrator.points.store import PointStore, any_kept
 from orchestrator.results.origin import as_typed
+
+
+def add_points_arguments(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("over operating points")
+    add_request_arguments(group, PointsDesignRequest)
+    add_executor_arguments(group)
+
+
+def run_over_points(options: argparse.Namespace, path: Path) -> int:
+    several = {"controllers": tuple(options.controller), "components": tuple(options.component),
+               "modes": () if ALL in options.mode else tuple(options.mode)}  # fmt: skip
+    with working_in(options, "design", STUDY, path.with_suffix(".points"), **several) as (_, compute, folder):
+        design = compute()
+        written = design.save(path, as_typed())
+    files = ", ".join(one.name for one in written[1:])
+    end = f"Parameter file {path}, beside it {files}; points are kept in {folder}"
+    return shown(options, STUDY, design, folder, written, end)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -12,8 +12,7 @@ from orchestrator.api.scenario import Scenario, modes_of
 from orchestrator.asked import read_percent
 from orchestrator.cli import terminal
 from orchestrator.cli.arguments import add_request_arguments, asked_by, option, switch
-from orchestrator.cli.case_arguments import add_case_arguments, chosen
-from orchestrator.cli.excitation import add_excitation_arguments, excitation_given
+from orchestrator.cli.case_arguments import add_case_arguments, add_excitation_arguments, chosen, excitation_given
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code, print_answers, print_details
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held

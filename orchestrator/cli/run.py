@@ -13,7 +13,8 @@ from rich.markup import escape
 
 from orchestrator.api.scenario import RunEndedWarning, Scenario
 from orchestrator.asked import read_whole
-from orchestrator.cli import checkpoints, federates, like, run_request, terminal
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cli import checkpoints, federates, run_request, terminal
 from orchestrator.cli.arguments import option, repeatable, seconds, switch, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
@@ -21,21 +22,24 @@ from orchestrator.cli.run_tables import print_run
 from orchestrator.cli.side_by_side import Outcome, Report, SideBySide, number_of_workers
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
 from orchestrator.cores import MOST_THREADS, number_of_cores
-from orchestrator.coupling.progress import Progress
-from orchestrator.errors import INTERRUPTED, CosimError, ResultsError, RunInterruptedError
+from orchestrator.coupling.observers import Progress
+from orchestrator.errors import INTERRUPTED, CosimError, InputError, ResultsError, RunInterruptedError
 from orchestrator.federation.choice import Federates
 from orchestrator.fmi.interrupts import calls
+from orchestrator.interop.rules import MASTERS, MasterRules, master_rules
 from orchestrator.late import xr
 from orchestrator.report.progress import progress_bar
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import open_whole
 from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder
 from orchestrator.results.room import require_room
-from orchestrator.results.staging import ScenarioFolder, mend, staged, unfinished
+from orchestrator.results.staging import ScenarioFolder, mend, new_run_id, staged, unfinished
+from orchestrator.results.storage import save_dataset
 from orchestrator.safe_files import PARTIAL, made_folder
 from orchestrator.study.all_modes import all_ours
-from orchestrator.study.early_end import EarlyEnd
+from orchestrator.study.answers import EarlyEnd
 from orchestrator.study.files import save_run, save_study, summary_of
+from orchestrator.study.like import run_like
 from orchestrator.study.run import RunResult
 
 
@@ -59,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_verdict_argument(parser)
     add_details_argument(parser)
     run_request.add_arguments(parser)
-    like.add_arguments(parser)
+    _add_like_arguments(parser)
     federates.add_arguments(parser)
 
 
@@ -70,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
             stack.enter_context(held(options.resume))  # before the request in it is read
         options = run_request.with_request(options)
         stack.enter_context(saying_how_it_goes_on(lambda: run_request.how_it_goes_on(options)))
-        rules = like.rules_of(options)
+        rules = _rules_of(options)
         scenarios = chosen(options)
         terminal.ask(question for scenario in scenarios for question in scenario.prepared.about_rows)
         engine = federates.choice(options, len(scenarios))
@@ -81,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
         if options.resume is None:
             stack.enter_context(held(folder))
         if rules is not None:
-            return like.run([scenario.prepared for scenario in scenarios], rules, folder, options.order)
+            return _run_like([scenario.prepared for scenario in scenarios], rules, folder, options.order)
         return _run_all(scenarios, folder, options, engine)
 
 
@@ -243,3 +247,33 @@ def _end(stopped: Mapping[str, BaseException], folder: Path) -> int:
         text += f"{head}{escape(f'scenario {scenario!r}: {str(error) or calls.how}')}\n"
     terminal.make_errors().print(f"{text}{escape(f'What was computed until then is in {folder}{where}')}")
     return INTERRUPTED if any(map(_is_interrupt, stopped.values())) else 1
+
+
+def _add_like_arguments(parser: argparse.ArgumentParser) -> None:
+    option(parser, "--like", "MASTER", f"only trajectories, as another master would give them: {', '.join(MASTERS)}")
+    option(parser, "--order", "A,B,…", "with --like: in which order components step, where they take turns")
+
+
+def _rules_of(options: argparse.Namespace) -> MasterRules | None:
+    if options.order and not options.like:
+        raise InputError("--order goes with --like MASTER; our own order stands in the case, under [solver]")
+    if options.like and (options.threads or options.workers):
+        raise InputError("--like steps as another master does, on one thread; leave out --threads, --workers or --like")
+    if options.like and options.tolerance is not None:
+        raise InputError("--like steps as another master does, in fixed steps; leave out --tolerance or --like")
+    return master_rules(options.like) if options.like else None
+
+
+def _run_like(scenarios: Sequence[PreparedScenario], rules: MasterRules, folder: Path, turns: str | None) -> int:
+    """Run scenarios as another master would; their trajectories are all that is written.
+
+    ``turns`` are components with commas between them, in the order in which they step; the master's own where None."""
+    order = turns.split(",") if turns else None
+    run_id = new_run_id()
+    for prepared in scenarios:
+        dataset = run_like(prepared, rules, order)
+        path = folder / prepared.name / "trajectory"
+        with staged(folder / prepared.name, run_id) as staging:
+            save_dataset(dataset, staging / "trajectory")
+        print(f"{prepared.name} like {rules.title}: {dataset.sizes['time']} rows in {path}.nc and .csv")
+    return 0

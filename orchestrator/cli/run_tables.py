@@ -11,8 +11,7 @@ from orchestrator.cli.verdict import print_answers, print_details
 from orchestrator.coupling.statistics import StepCounts, StepStatistics
 from orchestrator.fmi.loaded import PYTHON_BACKED
 from orchestrator.study import tables
-from orchestrator.study.answers import of_run
-from orchestrator.study.early_end import EarlyEnd
+from orchestrator.study.answers import EarlyEnd, of_run
 from orchestrator.study.run import RunResult
 
 

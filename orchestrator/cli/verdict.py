@@ -9,7 +9,7 @@ from rich.markup import escape
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.stability import Stability
 from orchestrator.cli.arguments import switch
-from orchestrator.report.verdict import COLOURS, VerdictSentence
+from orchestrator.report.tables import COLOURS, VerdictSentence
 from orchestrator.study import tables
 from orchestrator.study.answers import ScenarioAnswer, answers_table, outside
 from orchestrator.study.modes import ModesResult

@@ -12,8 +12,7 @@ from orchestrator.certification.anew import POINTS, TOLERANCE, TOLERANCE_IDENTIF
 from orchestrator.certification.inside import laid_out
 from orchestrator.certification.issue import NTS631
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
-from orchestrator.cli.arguments import option, reactances
-from orchestrator.cli.executors import add_executor_arguments, choose_executor
+from orchestrator.cli.arguments import add_executor_arguments, choose_executor, option, reactances
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import INTERRUPTED
 from orchestrator.report.progress import progress_bar

@@ -18,8 +18,7 @@ from orchestrator.coordinated_design.following import with_followed_names
 from orchestrator.coordinated_design.objective import Aim, RatedPoint, worth_of_all
 from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointModes, PointsTask, compute_points
-from orchestrator.coordinated_design.ranking import RankedConverter, best_first, ranked
-from orchestrator.coordinated_design.search import SettingSearch, Tried
+from orchestrator.coordinated_design.search import RankedConverter, SettingSearch, Tried, best_first, ranked
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict, judged, least_of
 from orchestrator.errors import AnalysisError, InputError

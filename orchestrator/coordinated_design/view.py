@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.parameter_files import parameter_file_text
-from orchestrator.coordinated_design.ranking import RankedConverter
+from orchestrator.coordinated_design.search import RankedConverter
 from orchestrator.coordinated_design.study import PointsDesign, values_of
 from orchestrator.coordinated_design.verdict import JudgedPoint, PlacedMode, PointsVerdict
 from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on

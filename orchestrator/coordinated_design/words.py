@@ -5,7 +5,7 @@ from collections import Counter
 from orchestrator.analysis.stability import zeros_in_words
 from orchestrator.coordinated_design.study import PointsDesign
 from orchestrator.coordinated_design.verdict import PointsVerdict
-from orchestrator.report.verdict import VerdictSentence
+from orchestrator.report.tables import VerdictSentence
 
 _SHOWN = 4
 

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.cores import number_of_cores
-from orchestrator.coupling.memory import apart
-from orchestrator.coupling.sharing import best_number, shares, worth_sharing
-from orchestrator.coupling.team import Team
+from orchestrator.coupling.sharing import Trial, best_number, shares, worth_sharing
+from orchestrator.coupling.team import Team, apart
 from orchestrator.coupling.tracks import Tracks
-from orchestrator.coupling.trial import Trial
 from orchestrator.coupling.turns import Turn, not_finite
 from orchestrator.fmi.interrupts import calls
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,9 @@ from fmus.toolchain.removal import remove_tree
 from orchestrator.arrays import Numbers
 from orchestrator.closing import Closing
 from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.late_start import LateStart
-from orchestrator.coupling.memory import apart
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.system import ComponentPlan, Endpoint, System
+from orchestrator.coupling.team import apart
 from orchestrator.coupling.turns import Exchange
 from orchestrator.coupling.wires import Wires
 from orchestrator.errors import ComponentError, InputError
@@ -25,6 +25,14 @@ from orchestrator.fmi.instance import open_component
 _INITIAL_PASSES = 20
 _JUMP = 1e-6  # of 1 or of an output: by how much it may change as initialisation ends, with the inputs as they were
 _SAME = 1e-6  # relative difference of a parameter from what was set, as of an FMU that computes in single precision
+
+
+@dataclass(frozen=True)
+class LateStart:
+    """An output that is another just after initialisation than just before its end; ``text`` has both values."""
+
+    variable: str
+    text: str
 
 
 def open_plan(name: str, plan: ComponentPlan, directory: Path) -> Component:

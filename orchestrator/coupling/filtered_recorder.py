@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.coupling.observers import ObservedRun
-from orchestrator.coupling.recorder import Recorder
-from orchestrator.coupling.rows import RowSink
+from orchestrator.coupling.recorder import Recorder, RowSink
 
 PASS_BAND, STOP_BAND = 0.4, 0.5
 """Frequencies below the first pass, those above the second are taken away, in parts of 1/interval."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -61,3 +61,21 @@ class Observer(Protocol):
 
     def end(self, run: ObservedRun) -> None:
         """Called once, also after a failure; what was observed so far must survive."""
+
+
+class Progress:
+    """Calls ``report(done, total)`` with communication steps every so often."""
+
+    def __init__(self, report: Callable[[int, int], None], every: int = 2000) -> None:
+        self.every = every
+        self._report = report
+        self._total = 0
+
+    def begin(self, run: ObservedRun, stop_index: int) -> None:
+        self._total = stop_index
+
+    def observe(self, run: ObservedRun) -> None:
+        self._report(run.index, self._total)
+
+    def end(self, run: ObservedRun) -> None:
+        self._report(run.index, self._total)

@@ -1,7 +1,8 @@
-"""Threads that share the calls of the compiled loop.
+"""Threads that share the calls of the compiled loop, and memory that they do not share.
 
 Python starts them and they never run its code: they stay in C (``team.c``) until they are dismissed. One that logs in
-the name of an FMU waits for Python's lock, which the caller gives away while it waits for the others."""
+the name of an FMU waits for Python's lock, which the caller gives away while it waits for the others. Two threads that
+write to one line of the processor's cache wait for each other."""
 
 import ctypes
 import logging
@@ -10,9 +11,20 @@ from typing import Any
 from weakref import finalize
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from orchestrator.cores import MOST_THREADS
-from orchestrator.coupling.memory import apart
+
+LINE = 128  # bytes that a processor may fetch together: two lines of 64
+
+
+def apart(count: int, dtype: DTypeLike = np.float64) -> NDArray[Any]:
+    """An array of zeros, shape (count,), that shares no line with anything else."""
+    size = count * np.dtype(dtype).itemsize
+    memory = np.zeros(size + 2 * LINE, dtype=np.uint8)
+    first = -memory.ctypes.data % LINE
+    return memory[first : first + size].view(dtype)
+
 
 _LOG = logging.getLogger("gfor")
 

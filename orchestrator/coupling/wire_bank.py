@@ -4,6 +4,7 @@ The compiled loop calls a bank as it calls an FMU, so that it is the same loop w
 Where no library can be compiled, the same arithmetic runs in Python and gives the same bits."""
 
 import ctypes
+import hashlib
 import math
 from collections.abc import Sequence
 from functools import cache
@@ -15,7 +16,6 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.compiler import compile_here
 from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Imperfection, Noise, Quantisation, WirePlan
-from orchestrator.coupling.noise import key_of_noise, white
 from orchestrator.errors import InputError
 
 STRETCH = 1000  # communication steps for which the noise is made at once
@@ -245,3 +245,22 @@ def _check_bandwidths(plan: WirePlan, step_size: float) -> None:
                 f"connection {plan.name}: noise up to {noise.bandwidth:g} Hz does not fit a communication step of "
                 f"{step_size:g} s, which shows {0.5 / step_size:g} Hz at most; leave the bandwidth out for white noise"
             )
+
+
+_BLOCK = 1024  # values of one setting of the counter
+
+
+def key_of_noise(seed: int, name: str) -> int:
+    """128 bits from a seed and the name of a connection."""
+    return int.from_bytes(hashlib.sha256(f"{seed}\0{name}".encode()).digest()[:16], "little")
+
+
+def white(key: int, first: int, count: int) -> NDArray[np.float64]:
+    """Values of standard deviation 1 for ``count`` communication steps from ``first`` on, shape (count,)."""
+    blocks = range(first // _BLOCK, (first + count - 1) // _BLOCK + 1) if count else range(0)
+    values = [
+        np.random.Generator(np.random.Philox(key=key, counter=[0, b, 0, 0])).standard_normal(_BLOCK) for b in blocks
+    ]
+    start = first % _BLOCK
+    whole = np.concatenate(values) if values else np.zeros(0)
+    return whole[start : start + count]

@@ -12,8 +12,7 @@ from orchestrator.immittance.retune import Retuned, Study, Tunable, retune
 from orchestrator.immittance.retune_view import retuned_json, retuned_table
 from orchestrator.immittance.study import CutResult
 from orchestrator.immittance.together import named
-from orchestrator.report.tables import make_table
-from orchestrator.report.verdict import VerdictSentence
+from orchestrator.report.tables import VerdictSentence, make_table
 from orchestrator.results.storage import save_json
 
 GOAL = 0.3

@@ -22,8 +22,7 @@ from orchestrator.interactions.systems import Kind, SystemName
 from orchestrator.interactions.words import damping_text, frequency_text, sentences, stand_in_sentence, verdict_word
 from orchestrator.late import pd
 from orchestrator.report.cells import CELLS, Cell, CellLine, Cells
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, paragraphs
+from orchestrator.report.html.elements import Figures, document, paragraphs
 from orchestrator.report.notebook import page
 from orchestrator.report.table import Column, ColumnTable, mode_columns, verdict
 from orchestrator.report.tables import first_few

@@ -1,7 +1,7 @@
 """Sentences of a study of interactions."""
 
 from orchestrator.interactions.judgement import JudgedInteractions, JudgedSystem, place_of, plan_text
-from orchestrator.report.verdict import VerdictSentence
+from orchestrator.report.tables import VerdictSentence
 
 _SHOWN = 3
 

@@ -1,7 +1,10 @@
-"""The choices by which masters differ: each of them changes the digits of a result."""
+"""The choices by which masters differ, each of which changes the digits of a result, and the masters whose choices are
+known: each was driven with the probe pair and with whole systems (tests/interop)."""
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from orchestrator.coupling.schedule import FirstInputs, Schedule
@@ -65,3 +68,15 @@ class MasterRules:
             time += step_size
             steps += 1
         return steps + bool(ahead)
+
+
+MASTERS = {
+    name: MasterRules(name, **rules)
+    for name, rules in tomllib.loads(Path(__file__).with_name("masters.toml").read_text(encoding="utf-8")).items()
+}
+
+
+def master_rules(name: str) -> MasterRules:
+    if name not in MASTERS:
+        raise InputError(f"there is no master {name!r} to run like; known are: {', '.join(MASTERS)}")
+    return MASTERS[name]

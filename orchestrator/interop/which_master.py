@@ -1,16 +1,16 @@
-"""Which schedule a tool runs, found from the probe pair's results in it."""
+"""How to run the probe pair in a tool, and which schedule the tool runs, found from the results."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import EXTRAPOLATIONS, SIGNALS, Candidate, candidates
-from orchestrator.interop.masters import MASTERS
 from orchestrator.interop.probe_result import ProbeResult
-from orchestrator.interop.rules import MasterRules
+from orchestrator.interop.rules import MASTERS, MasterRules
 
 STEP_SIZE, STOP_TIME = 0.1, 2.0  # step size and stop time that the instructions ask for [s]
 
@@ -112,3 +112,12 @@ def _is(fit: Candidate, rules: MasterRules) -> bool:
     in_turn = fit.order != "side by side"
     same = ("first_inputs", "extrapolation", "early_label", "after_exchange", "wire_by_wire")
     return in_turn == (rules.steps == "in turn") and all(getattr(fit, name) == getattr(rules, name) for name in same)
+
+
+def instructions(step_size: float, stop_time: float, platforms: tuple[str, ...]) -> str:
+    """How to couple and run the probe pair in another tool."""
+    signals = ", ".join(f"`{signal}`" for signal in SIGNALS)
+    usual = (step_size, stop_time) == (STEP_SIZE, STOP_TIME)
+    options = "" if usual else f" --step {step_size:g} --stop {stop_time:g}"
+    page = Path(__file__).with_name("instructions.txt").read_text(encoding="utf-8")
+    return page.format(step=step_size, stop=stop_time, signals=signals, platforms=", ".join(platforms), options=options)

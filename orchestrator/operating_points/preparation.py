@@ -19,7 +19,6 @@ from orchestrator.errors import CosimError, ErrorKind, InputError, StartError
 from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.outages import Remains, what_remains
-from orchestrator.operating_points.service import switched_off
 from orchestrator.points.failure import Failure
 
 ACCEPT = 1e-9  # largest change of a state over a communication step with which the power flow's point is a steady state
@@ -164,3 +163,17 @@ def unexpected(error: Exception) -> str:
     at = f" at {Path(ours[-1].filename).relative_to(_PACKAGE)}, line {ours[-1].lineno}" if ours else ""
     blame = "" if isinstance(error, (MemoryError, OSError)) else "; gfor-cosim has failed here: please report it"
     return f"{type(error).__name__}{at}: {error}{blame}"
+
+
+_DEAD_CHARGING = 1e-3  # part of its charging that a dead line keeps: a bus without any has no voltage
+
+
+def switched_off(out: Sequence[str], remains: Remains, prepared: PreparedScenario, grid: str) -> dict[str, Value]:
+    """Values that take elements out of service in the power flow and in the grid, with all that is dead then."""
+    opened = [name for name in (*out, *remains.units, *remains.shunts)
+              if name not in remains.loads and name not in remains.ties]  # fmt: skip
+    values: dict[str, Value] = {f"{grid}.{name}.connected": False for name in opened}
+    plan = prepared.system.components[grid]
+    for scale in (f"{name}.scale" for name in remains.loads):  # some loads alone determine a voltage, and keep a trace
+        values[f"{grid}.{scale}"] = max(0.0, plan.description.variables[scale].minimum or 0.0)
+    return values | {f"{grid}.{name}": _DEAD_CHARGING * plan.number(name) for name in remains.charging}

@@ -10,8 +10,7 @@ from orchestrator.oscillations.location import works
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.verdict import Located
 from orchestrator.report.html.charts import ChartCurve, legend, line_chart
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, colour, table
+from orchestrator.report.html.elements import Figures, colour, document, table
 from orchestrator.report.html.network_map import network_map
 
 _LEAST_FLOW = 0.02  # part of the largest energy flow below which a branch has no arrow

@@ -2,16 +2,154 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
-from orchestrator.oscillations.detection import SpectralLine, find_oscillations, signals_of
-from orchestrator.oscillations.kind import Evidence, evidence_of
+import numpy as np
+
+from orchestrator.arrays import Numbers
+from orchestrator.oscillations.detection import Signals, SpectralLine, envelope, find_oscillations, phasors, signals_of
 from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, felt_beyond, opinions
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.models import OWN_MODEL, UnitModels, own_models
 
+OscillationKind = Literal["forced", "mode", "not known"]
+
+_STRONGEST = 5
+_FEWEST_PERIODS = 8
+_STEADY, _RESTLESS = 0.25, 0.35
+"""Spread of the envelope as a part of its mean: a sine's below the first; of filtered noise it is 0.52."""
+
+_TREND = 0.7  # part of the envelope's variance that an exponential must explain to be one
+_SINE = 1.85  # fourth moment beside the square of the second: 1.5 of a sine, 3 of noise
+_LEAST_PART = 0.2
+"""Amplitude, as a part of the largest of its kind of signal, from which a signal is looked at for disturbances."""
+
+_CLEAN, _SKIRT = 0.04, 5.0
+"""Spread of the envelope up to which nothing else is asked; beyond it what is left beside the line, near it and further
+off, must not fall by more than the factor, as it does beside a mode with next to no damping that noise shakes."""
+
+_SHOCK = 6.0  # deviation at the begin, in amplitudes, that a forcing's own transient does not reach
+_COHERENT = 0.975
+_CHANGE = 0.25  # change of the amplitude over the window from which on an oscillation decays or grows
+
+
+@dataclass(frozen=True)
+class Evidence:
+    kind: OscillationKind
+    damping_percent: float  # from the envelope; negative where it grows
+    envelope_spread: float  # standard deviation of the envelope as a part of its mean
+    kurtosis: float  # 1.5 of a sine, 3 of noise
+    coherence: float  # length of the mean phasor beside the phasors' mean length: 1 where the phase stays
+    skirt: float  # power beside the line as a multiple of that further off
+    periods: float
+    disturbed: bool  # whether it begins with a step or a shock in the signals
+    reasons: tuple[str, ...]  # in words
+
+
+def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
+    f, step = found.frequency, float(signals.times[1] - signals.times[0])
+    settle = 0 if found.begin is None else round(2 / (f * step))
+    used = slice(min(found.first + settle, found.last - 2), found.last)
+    names = list(found.amplitudes)[:_STRONGEST]
+    columns = [signals.names.index(name) for name in names]
+    t = signals.times[used]
+    periods = len(t) * step * f
+    if periods < _FEWEST_PERIODS:
+        return Evidence("not known", 0.0, 0.0, 0.0, 0.0, 0.0, periods, False, (f"only {periods:.1f} periods are seen",))
+    spreads, kurtoses, coherences, slopes, changes = [], [], [], [], []
+    for k in columns:
+        z, half = envelope(t, signals.values[used, k], f)
+        size, late = np.abs(z), t[half : len(t) - half]
+        slope, level = np.polyfit(late - late.mean(), np.log(np.maximum(size, 1e-300)), 1)
+        spreads.append(float(size.std() / size.mean()))
+        slopes.append(float(slope))
+        trend = np.exp(level + slope * (late - late.mean()))
+        explained = 1 - float(((size - trend) ** 2).mean() / size.var())
+        changes.append(float(np.expm1(slope * (late[-1] - late[0]))) if explained > _TREND else 0.0)
+        coherences.append(float(abs(z.mean()) / size.mean()))
+        wave = np.real(z * np.exp(2j * np.pi * f * late))
+        kurtoses.append(float((wave**4).mean() / (wave**2).mean() ** 2))
+    skirt = float(np.median([_skirt(t, signals.values[used, k], f) for k in columns]))
+    middle = [float(np.median(x)) for x in (spreads, kurtoses, coherences, slopes, changes)]
+    spread, kurtosis, coherence, slope, change = middle
+    disturbed = _disturbed(signals, found)
+    damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
+    figures = Evidence("not known", damping, spread, kurtosis, coherence, skirt, periods, disturbed, ())
+    kind, reasons = _judged(figures, change, found)
+    return replace(figures, kind=kind, reasons=tuple(reasons))
+
+
+def forced_frequencies(times: Numbers, names: Sequence[str], values: Numbers) -> list[float]:
+    """Of the oscillations in signals, shape (n, m), that are forced."""
+    signals = Signals(times, tuple(names), values - values.mean(axis=0))
+    return [one.frequency for one in find_oscillations(signals) if evidence_of(signals, one).kind == "forced"]
+
+
+def _judged(seen: Evidence, change: float, found: SpectralLine) -> tuple[OscillationKind, list[str]]:
+    harmonics = ", ".join(f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items())
+    sharp = seen.envelope_spread <= _CLEAN or seen.skirt <= _SKIRT or bool(harmonics)
+    steady = seen.envelope_spread < _STEADY and seen.kurtosis < _SINE and seen.coherence > _COHERENT
+    figures = (
+        f"envelope ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f}, phase coherence "
+        f"{seen.coherence:.2f}"
+    )
+    if abs(change) > _CHANGE and seen.coherence > 0.8 and not harmonics:
+        way = "decays" if change < 0 else "grows"
+        return "mode", [
+            f"its amplitude {way}, by {100 * abs(change):.0f} % over {seen.periods:.0f} periods ({figures})"
+        ]
+    if steady and seen.disturbed and not harmonics:
+        after = "a mode without damping would ring alike after the disturbance with which it begins"
+        return "not known", [f"it is steady ({figures}), but {after}"]
+    if steady and not sharp:
+        return "not known", [f"it is steady ({figures}), but its line widens as that of a mode that noise shakes"]
+    if steady:
+        said = [f"it is steady over {seen.periods:.0f} periods ({figures}): noise would make a mode's amplitude wander"]
+        said += [f"multiples of its frequency: {harmonics}, as of a limit or a switch"] if harmonics else []
+        return "forced", said
+    if seen.envelope_spread > _RESTLESS and seen.kurtosis > _SINE and seen.coherence < 0.9:
+        return "mode", [f"its amplitude and phase wander as noise makes them ({figures})"]
+    return "not known", [f"neither steady nor restless: {figures}"]
+
+
+def _skirt(times: Numbers, values: Numbers, frequency: float) -> float:
+    """Mean power beside a line that is taken away, within five widths of it, as a multiple of that further off."""
+    amplitude = phasors(times, values[:, None], [frequency])[0]
+    rest = values - np.real(amplitude * np.exp(2j * np.pi * frequency * times))
+    line = np.polyfit(times - times.mean(), rest, 2)
+    rest = (rest - np.polyval(line, times - times.mean())) * np.hanning(len(rest))
+    power = np.abs(np.fft.rfft(rest)) ** 2
+    length = len(times) * float(times[1] - times[0])
+    apart = np.abs(np.fft.rfftfreq(len(rest), length / len(times)) - frequency) * length
+    near, far = (apart > 1.5) & (apart < 5), (apart > 8) & (apart < min(25.0, 0.5 * frequency * length))
+    return float(power[near].mean() / (power[far].mean() or 1e-300)) if near.any() and far.any() else 1.0
+
+
+def _disturbed(signals: Signals, found: SpectralLine) -> bool:
+    """Whether a level changes, or something far larger than the oscillation happens, where it begins."""
+    if found.begin is None:
+        return False
+    step = float(signals.times[1] - signals.times[0])
+    period = max(2, round(1 / (found.frequency * step)))
+    at, end = found.first, found.last
+    around = slice(max(0, at - 2 * period), at + 2 * period)
+    before, after = slice(max(0, at - 4 * period), max(1, at - period)), slice(at + period, min(end, at + 5 * period))
+    for name, amplitude in found.amplitudes.items():
+        alike = (a for other, a in found.amplitudes.items() if other.rpartition(".")[2] == name.rpartition(".")[2])
+        if amplitude < _LEAST_PART * max(alike) or not name.endswith((".p", ".q")):
+            continue
+        x = signals.values[:, signals.names.index(name)]
+        size = float(np.abs(phasors(signals.times[at:end], x[at:end, None], [found.frequency]))[0])
+        noise = float(x[before].std())
+        shock = float(np.abs(x[around] - np.median(x[before])).max())
+        moved = abs(float(np.mean(x[after])) - float(np.mean(x[before])))
+        if shock > _SHOCK * size + 4 * noise or moved > size + 4 * noise:
+            return True
+    return False
+
+
 _SHOWN = 8
-_FEWEST_PERIODS = 5  # of an oscillation that is told
+_FEWEST_TOLD = 5  # of an oscillation that is told
 
 
 @dataclass(frozen=True)
@@ -40,7 +178,7 @@ class Located:
 def locate(measured: Measurements, models: UnitModels | None = None) -> list[Located]:
     """What is there; with the linear models of a case's units, these decide."""
     signals = signals_of(measured)
-    found = [one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_PERIODS]
+    found = [one for one in find_oscillations(signals) if one.periods(measured.interval) >= _FEWEST_TOLD]
     answers = []
     for one in found:
         evidence = evidence_of(signals, one)

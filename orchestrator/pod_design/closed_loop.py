@@ -3,6 +3,7 @@
 Gain and lead/lag are tunable and the controllers' signals are zero in steady state, so the operating point is the same
 for every setting: only the converters need be linearised again, and the rest of the system is kept."""
 
+import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
@@ -16,14 +17,46 @@ from orchestrator.analysis.examination import Examination, examine
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.linearization import Blocks, compose, continuous, where_given
 from orchestrator.analysis.modes import damping_ratio
+from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.pod_design.kept import KeptFigures, digest
 from orchestrator.pod_design.lead_lag import NO_COMPENSATION, LeadLag
-from orchestrator.points.store import Arrays
+from orchestrator.points.key import key_of
+from orchestrator.points.store import Arrays, PointStore
+from orchestrator.points.task import StudyCase
 
 _TUNED = ("enabled", "K", "T_S1", "T_S2")
+
+
+class KeptFigures:
+    """Figures of a design that are on the disk as soon as they are computed: the same design continues from there."""
+
+    def __init__(self, store: PointStore | None = None, mark: str = "") -> None:
+        self._store, self._mark = store, mark
+
+    def get(self, what: Mapping[str, Any], compute: Callable[[], Arrays]) -> Arrays:
+        if self._store is None:
+            return compute()
+        key = key_of({"design": self._mark, **what}, "orchestrator.pod_design.design")
+        found = self._store.load(key)
+        if found is not None:
+            return found[1]
+        arrays = compute()
+        self._store.save(key, {}, arrays)
+        return arrays
+
+
+def figures_of(prepared: PreparedScenario, store: PointStore | None) -> KeptFigures:
+    schedule = [prepared.schedule.name, *map(list, prepared.schedule.groups)]
+    return KeptFigures(store, StudyCase.of(prepared, step_size=prepared.step_size, schedule=schedule).mark)
+
+
+def digest(*arrays: Any) -> str:
+    hasher = hashlib.sha256()
+    for array in arrays:
+        hasher.update(array.tobytes())
+    return hasher.hexdigest()
 
 
 @dataclass(frozen=True)

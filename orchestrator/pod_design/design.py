@@ -21,9 +21,8 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.pod_design import lead_lag as leads
-from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
+from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting, figures_of
 from orchestrator.pod_design.guard import Naming, Surroundings, breach, surroundings
-from orchestrator.pod_design.kept import figures_of
 from orchestrator.pod_design.margins import Margins, compute_margins
 from orchestrator.pod_design.refinement import Judgement, Refinement, refine, sweep
 from orchestrator.pod_design.target import (

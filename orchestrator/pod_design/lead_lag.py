@@ -30,10 +30,6 @@ class LeadLag:
         return self.T_S2 / self.T_S1 if self.T_S1 else 1.0
 
     @property
-    def is_lead(self) -> bool:
-        return self.T_S1 > self.T_S2
-
-    @property
     def stage_angle_deg(self) -> float:
         """Largest angle of one stage, at ω = 1/√(T_S1·T_S2) [°]; negative for lag."""
         return math.degrees(math.asin((1 - self.filtering_ratio) / (1 + self.filtering_ratio)))

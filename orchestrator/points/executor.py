@@ -1,4 +1,4 @@
-"""What all executors have in common."""
+"""What all executors have in common, and the one that computes one task after another, in this process."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol, TypeVar
@@ -28,3 +28,14 @@ class Executor(Protocol):
     def close(self) -> None:
         """End the workers. Until then they serve several calls of `run`."""
         ...
+
+
+class Serial:
+    def run(
+        self, function: Callable[[Task], Result], tasks: Sequence[Task]
+    ) -> Iterator[tuple[int, Result | WorkerLostError]]:
+        for index, task in enumerate(tasks):
+            yield index, function(task)
+
+    def close(self) -> None:
+        """See `Executor.close`."""

@@ -14,10 +14,9 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cores import number_of_cores
 from orchestrator.errors import InputError
 from orchestrator.points.dask_cluster import DaskCluster
-from orchestrator.points.executor import Executor
+from orchestrator.points.executor import Executor, Serial
 from orchestrator.points.points import CountReport, Work
 from orchestrator.points.processes import Processes
-from orchestrator.points.serial import Serial
 from orchestrator.points.task import Task
 
 Asks = ParamSpec("Asks")

@@ -1,8 +1,9 @@
-"""What tables for a terminal have in common, with rich, and the table of an FMU's variables."""
+"""Tables and verdicts for a terminal, with rich, and the table of an FMU's variables."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
@@ -13,6 +14,26 @@ from orchestrator.fmi.values import as_text
 
 if TYPE_CHECKING:
     from orchestrator.fmi.description import FmuDescription, VariableInfo
+
+COLOURS = {True: "green", False: "red", None: "yellow"}  # of a verdict that is good, bad or not known
+
+
+@dataclass(frozen=True)
+class VerdictSentence:
+    """``word: text``, and whether that is good; None where it is not known."""
+
+    good: bool | None
+    word: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.word}: {self.text}"
+
+    def markup(self, subject: str = "") -> str:
+        """The sentence for a terminal, its word in colour; ``subject`` says of what it is."""
+        of = f" {escape(subject)}:" if subject else ""
+        return f"[bold {COLOURS[self.good]}]{self.word}[/]:{of} {escape(self.text)}"
+
 
 _ITEMS_SHOWN = 5  # how many of a long list are shown, largest first
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.coupling.rows import Block
+from orchestrator.coupling.recorder import Block
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.results.netcdf import DAMAGED, Attributes, join_netcdf, netcdf_image, stored_name
 from orchestrator.results.room import require_room

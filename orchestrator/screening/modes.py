@@ -6,13 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.analysis.critical_modes import DENSE, find_critical_modes, nearest_pairs
-from orchestrator.analysis.eigenvalue_count import GROWING, count_growing
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.missed_modes import missed
-from orchestrator.analysis.mode_refinement import RefinedModes, refine
+from orchestrator.analysis.mode_refinement import RefinedModes, missed, refine
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import ZERO, damping_ratio, find_spectrum
-from orchestrator.analysis.shifted_equations import ShiftedEquations
+from orchestrator.analysis.shifted_equations import GROWING, ShiftedEquations, count_growing
 from orchestrator.analysis.stability import grows
 from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError

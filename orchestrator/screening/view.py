@@ -14,8 +14,7 @@ from orchestrator.late import pd
 from orchestrator.operating_points.item import Status
 from orchestrator.report.cells import CELLS, Cell, CellLine, Cells
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, colour, paragraphs
+from orchestrator.report.html.elements import Figures, colour, document, paragraphs
 from orchestrator.report.notebook import page
 from orchestrator.report.table import Column, ColumnTable, Marked, damping
 from orchestrator.report.tables import eigenvalue_text

@@ -5,10 +5,10 @@ from collections import Counter
 import numpy as np
 
 from orchestrator.analysis.critical_modes import DENSE
-from orchestrator.analysis.eigenvalue_count import GROWING
+from orchestrator.analysis.shifted_equations import GROWING
 from orchestrator.analysis.stability import zeros_in_words
 from orchestrator.operating_points.item import Status
-from orchestrator.report.verdict import VerdictSentence
+from orchestrator.report.tables import VerdictSentence
 from orchestrator.screening.modes import UNSTABLE
 from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.stress import not_judged

@@ -12,8 +12,8 @@ import numpy as np
 from orchestrator.analysis.continuation import Eigenpair, pair_at, pairs_near
 from orchestrator.analysis.coupled_response import foreign_components
 from orchestrator.analysis.coupled_state import CoupledState
-from orchestrator.analysis.eigenvalue_shift import eigenvalue_shift
 from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearity import eigenvalue_shift
 from orchestrator.analysis.linearization import Blocks, continuous, where_given
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.periodic import model_of
@@ -27,10 +27,10 @@ from orchestrator.errors import AnalysisError, CaseError, CosimError, InputError
 from orchestrator.fmi.component import RealBatch
 from orchestrator.report.tables import first_few
 from orchestrator.sensitivities.derivative import Derivative, Shift, differentiate
-from orchestrator.sensitivities.limits_here import limits_that_act
 from orchestrator.sensitivities.parameters import SHARE, Parameter, parameters_of
 from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.study.modes import ModesResult, changed, modes_from, running
+from orchestrator.watch.limits import limits_that_act
 
 CRITICAL = "critical"  # stands for the least damped mode of the range
 _STAYS = 1e-13

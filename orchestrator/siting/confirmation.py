@@ -19,9 +19,8 @@ from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting
 from orchestrator.pod_design.guard import extremes
 from orchestrator.pod_design.lead_lag import LARGEST_TURN, NO_COMPENSATION, lead_lag_turning
-from orchestrator.siting.placing import STAGES, name_at
+from orchestrator.siting.placing import STAGES, name_at, response_of
 from orchestrator.siting.residues import SeenMode
-from orchestrator.siting.responses import response_of
 from orchestrator.study.modes import modes_from, running
 
 AGREES = 0.05  # A coupled shift that is farther than this part from the predicted one confirms nothing

@@ -22,9 +22,19 @@ from orchestrator.operating_points.outages import INTACT, read_outages
 from orchestrator.operating_points.preparation import ItemPreparation, failure
 from orchestrator.points.request import OfCase, of_frequencies, of_scenario, of_values
 from orchestrator.siting.confirmation import Confirmation, confirmed
-from orchestrator.siting.placing import OURS_MVA, converter, foreign, name_at, placed
+from orchestrator.siting.placing import (
+    ACTIVE,
+    OURS_MVA,
+    REACTIVE,
+    converter,
+    foreign,
+    ideal_support,
+    name_at,
+    placed,
+    response_of,
+    turned,
+)
 from orchestrator.siting.residues import SeenMode, Situation, situation_of
-from orchestrator.siting.responses import ACTIVE, REACTIVE, ideal_support, response_of, turned
 from orchestrator.study.modes import running
 
 PODS = {"pod_p": ACTIVE, "pod_q": REACTIVE}

@@ -13,8 +13,7 @@ from rich.table import Table
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.late import pd
 from orchestrator.points.code import code_hash
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, damping, table
+from orchestrator.report.html.elements import Figures, damping, document, table
 from orchestrator.report.html.network_map import network_map
 from orchestrator.report.notebook import page
 from orchestrator.report.tables import make_table, share_text
@@ -24,9 +23,8 @@ from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import made_folder, write_text
 from orchestrator.siting.confirmation import Confirmation
-from orchestrator.siting.placing import OURS_MVA
+from orchestrator.siting.placing import ACTIVE, OURS_MVA, REACTIVE
 from orchestrator.siting.residues import SeenMode
-from orchestrator.siting.responses import ACTIVE, REACTIVE
 from orchestrator.siting.study import DEVICE, DROOP, SiteResult, SupportShift
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}

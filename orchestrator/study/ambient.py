@@ -10,8 +10,7 @@ from typing import Any, Literal
 
 from orchestrator.analysis.ambient import AmbientMode
 from orchestrator.late import pd
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import colour, damping, table
+from orchestrator.report.html.elements import colour, damping, document, table
 from orchestrator.report.notebook import page
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table

@@ -1,7 +1,7 @@
 """The answer to what a study was run for, one line a scenario: verdict, the mode in question, one remark."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from rich.table import Table
@@ -10,8 +10,7 @@ from rich.text import Text
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Cause
 from orchestrator.errors import RunInterruptedError
-from orchestrator.report.tables import first_few, make_table, short
-from orchestrator.report.verdict import COLOURS
+from orchestrator.report.tables import COLOURS, first_few, make_table, short
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 
@@ -141,3 +140,26 @@ def _swing(result: ModesResult, mode: Mode) -> str:
     if all(sides):
         return f"{sides[0]} against {sides[1]}"
     return sides[0] or sides[1] or ", ".join(state for state, _ in mode.participation[:2])
+
+
+@dataclass(frozen=True)
+class EarlyEnd:
+    """Where a study ended before its time, and what is not there because of that."""
+
+    scenario: str
+    interrupted: bool
+    kept: bool = True
+    not_begun: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def word(self) -> str:
+        return "interrupted" if self.interrupted else "failed"
+
+    @property
+    def place(self) -> str:
+        """Where it ended, and what never began."""
+        rest = f"; never begun: {', '.join(self.not_begun.values())}" if self.not_begun else ""
+        return f"in {self.scenario}{'' if self.kept else ', of which nothing is kept'}{rest}"
+
+    def as_json(self) -> dict[str, Any]:
+        return {"word": self.word, "place": self.place, "not_begun": list(self.not_begun)}

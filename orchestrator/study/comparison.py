@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orchestrator.analysis.identification import TOLERANCE, IdentifiedMode, identify_modes, sampling
-from orchestrator.analysis.mode_doubts import COARSER, SHORTER, with_doubts, worth_showing
-from orchestrator.analysis.window_halves import WindowPart, part_of
+from orchestrator.analysis.mode_doubts import COARSER, SHORTER, WindowPart, part_of, with_doubts, worth_showing
 from orchestrator.cases.names import close_names
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade
@@ -22,8 +21,7 @@ from orchestrator.results.recording import FOLDER, TRAJECTORY, parts_of
 from orchestrator.results.signals import signal
 from orchestrator.results.staging import unfinished
 from orchestrator.safe_files import PARTIAL
-from orchestrator.study.common_times import common_times
-from orchestrator.study.measured import is_measured, measured_modes
+from orchestrator.study.measured import common_times, is_measured, measured_modes
 
 if TYPE_CHECKING:
     import xarray as xr

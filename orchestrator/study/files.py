@@ -19,12 +19,10 @@ from orchestrator.results.signals import relative_difference
 from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
 from orchestrator.safe_files import write_text
-from orchestrator.study.answers import of_run
-from orchestrator.study.early_end import EarlyEnd
-from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation
+from orchestrator.study.answers import EarlyEnd, of_run
+from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation, plot_signals
 from orchestrator.study.modes import ModesResult, modes_json
 from orchestrator.study.run import RunResult
-from orchestrator.study.signal_plots import plot_signals
 
 _LEAST_PARTICIPATION = 1e-3  # smaller factors are left out of the files
 

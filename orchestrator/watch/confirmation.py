@@ -4,13 +4,30 @@ Over a few periods two decaying oscillations that beat, or the harmonics that a 
 voltages and currents, look like one that grows. An eigenvalue belongs to the system: a true growth has one rate in
 every part of the response, while that of a beat changes from part to part."""
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.watch.oscillation import Oscillation, strongest_oscillation, without_trend
-from orchestrator.watch.swing import KEPT, Swing
+
+KEPT = 0.7  # A swing is decaying if its last third is smaller than this part of its middle third
+
+
+@dataclass(frozen=True)
+class Swing:
+    name: str
+    size: float  # root mean square in the last third without the trend, relative to ``scale``
+    scale: float  # 1 or the start's magnitude [the signal's unit]
+    response: tuple[Numbers, Numbers]  # times [s] since the event, and the signal at them
+    # times, signal: the same in the last three quarters
+    times: Numbers
+    signal: Numbers
+    # half of the rate at which the signal turns [Hz], counted at every communication step; only for signals that were
+    # followed between the looks
+    turns_hz: float | None = None
+
 
 STEADY = 0.05
 """An oscillation is sustained if the logarithm of its amplitude changes by less than this over the judged part."""

@@ -1,15 +1,20 @@
-"""Limits that stay active: the component, the beginning and the duration."""
+"""Limits that stay active (component, beginning, duration), those that act at a point, and a declared current."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Numbers
+from orchestrator.binding.misfits import of_dip
+from orchestrator.coupling.master import Master
 from orchestrator.coupling.system import ComponentPlan, System
-from orchestrator.watch.finding import Finding
-from orchestrator.watch.limit import BYPASS_TIME, Lead, Limit
-from orchestrator.watch.machine_limits import MACHINE_LIMITS
+from orchestrator.fmi.component import Component, RealBatch
+from orchestrator.fmi.port import BoundDescription
+from orchestrator.watch.finding import MISFIT, Finding
+from orchestrator.watch.limit import BYPASS_TIME, MACHINE_LIMITS, Lead, Limit
 from orchestrator.watch.seen import Seen
 from orchestrator.watch.settings import Settings
 
@@ -140,3 +145,53 @@ def _finding(
         message += "; what follows is not known: repeat with EMT models, whose names lack `_phasor`"
     figures = {"duration_s": duration, "stretches": float(stretches)}
     return Finding("active_limit", begin, name, limit.signal, message, end, figures, limit.represented)
+
+
+_CYCLE, LASTS = 0.02, 0.08
+"""Time [s] over which a current is averaged, and for which it is above its limit; what is shorter, a limit may need."""
+
+ABOVE = 1.05  # part of the declared current from which one is above it, as in `gfor fmu check`
+
+
+def above_declared(seen: Seen, system: System) -> Iterator[Finding]:
+    cycle = round(_CYCLE / seen.interval) if seen.interval else 0
+    for name, plan in system.components.items():
+        described = plan.description
+        if not cycle or not isinstance(described, BoundDescription) or described.port.current_limit is None:
+            continue
+        size = np.hypot(seen.last[f"{name}.i_re"], seen.last[f"{name}.i_im"]) * SYSTEM_BASE_MVA / plan.number("S_n")
+        limit, means = described.port.current_limit, np.convolve(size, np.full(cycle, 1 / cycle), "valid")
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], means > ABOVE * limit, [False]]).astype(np.int8)))
+        long = [(a, b) for a, b in edges.reshape(-1, 2) if (b - a + cycle - 1) * seen.interval > LASTS]
+        if long and long[0][0]:  # at rest it is told by itself
+            begin = float(seen.times[long[0][0] + cycle - 1])
+            misfit = of_dip(float(max(means[a:b].max() for a, b in long)), limit, begin)
+            yield Finding(MISFIT, begin, name, "i_re", misfit.sentence(name), None, misfit.figures)
+
+
+def told_of(findings: Sequence[Mapping[str, Any]], component: str) -> Mapping[str, Any] | None:
+    """Which of the findings, as JSON, tells that of a component; None where none does."""
+    return next(
+        (f for f in findings if f["kind"] == MISFIT and f.get("component") == component and "declared" in f), None
+    )
+
+
+def limits_that_act(master: Master) -> dict[str, tuple[str, ...]]:
+    found = {
+        name: tuple(limit.name for limit in limits_of(plan) if _acts(limit, plan, master.components[name]))
+        for name, plan in master.system.components.items()
+    }
+    return {name: limits for name, limits in found.items() if limits}
+
+
+def _acts(limit: Limit, plan: ComponentPlan, component: Component) -> bool:
+    if not limit.represented or (limit.enabled is not None and not plan.value(limit.enabled)):
+        return False
+    names = [limit.signal, *([] if limit.scale is None else [limit.scale])]
+    signal, *scales = RealBatch(component, names).read().tolist()
+    scale = scales[0] if scales else 1.0
+    high = 1.0 if limit.limit is None else plan.number(limit.limit) * scale
+    if limit.low is None:
+        return bool(abs(signal) >= AT_LIMIT * high)
+    low, room = plan.number(limit.low) * scale, (1 - AT_LIMIT) * max(abs(high), 1.0)
+    return bool(signal >= high - room or signal <= low + room)

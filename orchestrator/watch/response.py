@@ -10,12 +10,11 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch import oscillation as oscillations
 from orchestrator.watch import swing_findings
-from orchestrator.watch.confirmation import STEADY, change, doubt, irregular_doubt, rms
+from orchestrator.watch.confirmation import KEPT, STEADY, Swing, change, doubt, irregular_doubt, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
-from orchestrator.watch.machine_limits import is_inner
+from orchestrator.watch.limit import is_inner
 from orchestrator.watch.seen import Seen, is_derivative, unit
 from orchestrator.watch.stretches import Stretch
-from orchestrator.watch.swing import KEPT, Swing
 
 FEWEST_LOOKS = 60
 """Least number of looks in the judged part: the last three quarters of the time from one event to the next, or to the

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from orchestrator.watch.confirmation import STEADY, change, needed_end, rises, rms
+from orchestrator.watch.confirmation import KEPT, STEADY, Swing, change, needed_end, rises, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.watch.oscillation import Oscillation, too_fast
 from orchestrator.watch.stretches import Stretch
-from orchestrator.watch.swing import KEPT, Swing
 
 _PARTS, _SHORT = 40, 0.1
 """Largest number of pieces and their least length [s]. The oscillation is searched in the first piece."""

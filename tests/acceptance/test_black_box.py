@@ -10,7 +10,7 @@ from orchestrator.black_box.fitting import fit
 from orchestrator.black_box.frequency_response import Excitation, measure
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.study import certify
-from orchestrator.points.serial import Serial
+from orchestrator.points.executor import Serial
 
 EXCITATION = Excitation("pulse", lowest_hz=0.5, lines=50)
 

@@ -14,8 +14,8 @@ from orchestrator.coordinated_design import point
 from orchestrator.coordinated_design.point import PointModes, PointsRecord
 from orchestrator.coordinated_design.study import PointsDesignRequest, modes_at, plan_points_design
 from orchestrator.operating_points.item import Status
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening

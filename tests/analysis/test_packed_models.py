@@ -18,7 +18,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cli import main
 from orchestrator.errors import AnalysisError
 from orchestrator.fmi.linear_model import FOLDER, read_embedded_model
-from orchestrator.study.component_model import component_model
+from orchestrator.study.linear_model_files import component_model
 from orchestrator.study.modes import compute_modes, running
 
 MODEL = f"{FOLDER}/linear_model.json"

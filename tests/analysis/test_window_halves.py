@@ -3,7 +3,7 @@
 import pytest
 
 from orchestrator.analysis.identification import IdentifiedMode
-from orchestrator.analysis.window_halves import WindowPart
+from orchestrator.analysis.mode_doubts import WindowPart
 
 
 @pytest.mark.parametrize("amplitude", [0.01, 1.0, 100.0])

@@ -13,8 +13,8 @@ import numpy as np
 from orchestrator.analysis.threads import alone
 from orchestrator.cases.case import load_case
 from orchestrator.operating_points.item import Status
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening

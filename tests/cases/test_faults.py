@@ -8,7 +8,7 @@ from orchestrator.cli import main
 from orchestrator.coupling.events import NotANumber, Silence, UnitSwitching, WireFault, WireRecovery
 from orchestrator.coupling.imperfections import Bias, Delay, DropOut, Noise, Quantisation
 from orchestrator.errors import AnalysisError, CaseError
-from orchestrator.interop.masters import MASTERS
+from orchestrator.interop.rules import MASTERS
 from orchestrator.study.like import run_like
 from orchestrator.study.linear import linear_response
 from orchestrator.study.modes import compute_modes, running

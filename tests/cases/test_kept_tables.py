@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases import kept_tables as module
-from orchestrator.cases.kept_tables import LIBRARIES, kept_tables
-from orchestrator.cases.source_tables import SourceTables
+from orchestrator.cases.kept_tables import LIBRARIES, SourceTables, kept_tables
 from orchestrator.errors import InputError
 
 NUMBERS = np.array([[0.1 + 0.2, -0.0, np.inf], [np.nan, 5e-324, 1 / 3]])

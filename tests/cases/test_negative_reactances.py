@@ -5,10 +5,9 @@ import pytest
 
 from fmus.grid.network import Line, Load, Network
 from orchestrator.cases.case import load_case
-from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt
-from orchestrator.cases.flow_transformers import inner_buses, legs_of
-from orchestrator.cases.negative_reactances import without_negative_reactances, without_star_points
+from orchestrator.cases.flow_balance import FlowLine, FlowLoad, FlowShunt, inner_buses, legs_of
 from orchestrator.cases.network_data import network_data
+from orchestrator.cases.network_import import without_negative_reactances, without_star_points
 from orchestrator.cases.power_flow import FlowUnit, solve_power_flow
 from orchestrator.cases.schema import NetworkTable
 from tests.cases.test_switching import RING, watch

@@ -18,8 +18,7 @@ from fmus.toolchain.port_variables import RATED
 from fmus.toolchain.variables import Usual
 from gfor_fmu.usual import FORMING
 from orchestrator.cases.case import built_in_cases, load_case
-from orchestrator.cases.data_rules import RULES
-from orchestrator.cases.plausibility import question
+from orchestrator.cases.plausibility import RULES, question
 from orchestrator.cases.plausible_values import UnusualValue
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import CaseError

@@ -9,7 +9,7 @@ import pytest
 from fmus.toolchain.catalogue import model_names
 from fmus.toolchain.compiler import TARGETS
 from orchestrator.cli import build as command
-from orchestrator.cli.build_hosts import ENDINGS, HOSTS, with_port
+from orchestrator.cli.build import ENDINGS, HOSTS, with_port
 from orchestrator.fmi.description import read_description
 
 PAGE = Path(__file__).parents[2] / ".docs" / "how-to" / "use-in-another-tool.md"

@@ -12,7 +12,7 @@ from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.issue import WITH_VERDICT
 from orchestrator.certification.margins import margin_text
-from orchestrator.cli.certificate_screen import show
+from orchestrator.cli.certificate import show
 
 
 def row(name):

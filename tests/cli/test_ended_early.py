@@ -8,7 +8,7 @@ import xarray as xr
 
 import orchestrator as gfor_api
 from orchestrator.cli import run as command
-from orchestrator.coupling.progress import Progress
+from orchestrator.coupling.observers import Progress
 from orchestrator.results.manifest import ResultsWarning
 
 WORDS = ("run", "infinite_bus", "--scenario", "dip", "--stop", "3")

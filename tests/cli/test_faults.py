@@ -19,7 +19,7 @@ import xarray as xr
 
 from orchestrator.cases.case import load_case
 from orchestrator.cli import run as command
-from orchestrator.coupling.progress import Progress
+from orchestrator.coupling.observers import Progress
 from orchestrator.results import room
 from orchestrator.results.manifest import read_manifest
 

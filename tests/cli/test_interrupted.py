@@ -10,7 +10,7 @@ from orchestrator.cli import run as command
 from orchestrator.cli import study as study_command
 from orchestrator.cli.checkpoints import Checkpoints
 from orchestrator.cli.interrupted import is_interrupt
-from orchestrator.coupling.progress import Progress
+from orchestrator.coupling.observers import Progress
 from orchestrator.points.store import PointStore
 from orchestrator.points.study import PointStudy
 from orchestrator.study import run as study

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.cli import run as command
-from orchestrator.coupling.progress import Progress
+from orchestrator.coupling.observers import Progress
 from orchestrator.errors import AnalysisError
 from orchestrator.study import run as study
 from orchestrator.study.run import run_scenario

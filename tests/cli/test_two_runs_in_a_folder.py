@@ -13,7 +13,7 @@ import xarray as xr
 
 from orchestrator.api.case import load
 from orchestrator.cli import run as command
-from orchestrator.coupling.progress import Progress
+from orchestrator.coupling.observers import Progress
 from orchestrator.errors import InputError
 from orchestrator.results.lock import LOCK, held
 

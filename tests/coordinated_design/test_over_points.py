@@ -11,12 +11,12 @@ import scipy.linalg
 from orchestrator.analysis.continuation import ModesMeetError
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.case import load_case
-from orchestrator.coordinated_design import following, open_loops, point, ranking, study
+from orchestrator.coordinated_design import following, open_loops, point, study
 from orchestrator.coordinated_design.following import with_followed_names
 from orchestrator.coordinated_design.objective import Aim, RatedPoint, growth
 from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointsRecord
-from orchestrator.coordinated_design.search import SettingSearch
+from orchestrator.coordinated_design.search import SettingSearch, ranked
 from orchestrator.coordinated_design.settings import SettingSpace
 from orchestrator.coordinated_design.study import (
     PointsDesignRequest,
@@ -29,8 +29,8 @@ from orchestrator.coordinated_design.words import remarks, verdict_sentence
 from orchestrator.errors import InputError
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import lead_lag_turning
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from tests.screening.five_machines import five_machines
 
@@ -353,7 +353,7 @@ def test_converters_are_ranked_by_what_a_controller_there_gives(planned, store):
     plan = planned("pod_p", "pod_q")
     found = modes_at(plan, plan.off, plan.candidates, Work(Serial(), store))[:1]
     stages = dict.fromkeys(plan.candidates, 2)
-    first, second = ranking.ranked(plan.candidates, stages, rated_of(plan, found), 400.0, 3.6, 0)
+    first, second = ranked(plan.candidates, stages, rated_of(plan, found), 400.0, 3.6, 0)
     assert (first.place, second.place) == (P, Q)
     assert first.worst is None
     assert first.shift == pytest.approx(abs(rated_of(plan, found)[0].residues()[P]))

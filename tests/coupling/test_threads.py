@@ -22,9 +22,8 @@ from orchestrator.coupling.events import ParameterChange
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import gauss_seidel, jacobi
-from orchestrator.coupling.sharing import best_number, shares
+from orchestrator.coupling.sharing import Trial, best_number, shares
 from orchestrator.coupling.system import System
-from orchestrator.coupling.trial import Trial
 from orchestrator.errors import ComponentError, NotFiniteError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent

@@ -8,8 +8,8 @@ from orchestrator.cases.case import load_case
 from orchestrator.interactions.request import InteractionsRequest
 from orchestrator.interactions.study import plan_interactions, run_interactions
 from orchestrator.interactions.view import Interactions
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from tests.pages.markdown import ROOT, blocks
 

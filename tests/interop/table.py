@@ -3,8 +3,7 @@
 import re
 from pathlib import Path
 
-from orchestrator.interop.masters import MASTERS
-from orchestrator.interop.rules import MasterRules
+from orchestrator.interop.rules import MASTERS, MasterRules
 from tests.interop.measurement import Outcome
 from tests.interop.systems import KINDS, SYSTEMS
 

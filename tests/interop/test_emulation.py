@@ -16,8 +16,7 @@ from orchestrator.coupling.schedule import FirstInputs, jacobi
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import probe_system
 from orchestrator.interop.emulation import emulate
-from orchestrator.interop.masters import MASTERS
-from orchestrator.interop.rules import LastLabel, Steps
+from orchestrator.interop.rules import MASTERS, LastLabel, Steps
 from tests.interop import drivers, table
 from tests.interop.jobs import job_of, write_ssp
 

@@ -3,8 +3,8 @@
 import pytest
 
 from orchestrator.interop.candidates import SIGNALS
-from orchestrator.interop.masters import MASTERS
 from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.interop.rules import MASTERS
 from orchestrator.interop.which_master import identify
 from tests.interop import table
 from tests.interop.measurement import measure, run_probes, why_not

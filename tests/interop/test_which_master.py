@@ -8,8 +8,8 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import EXTRAPOLATIONS, SIGNALS, candidates, probe_system
-from orchestrator.interop.masters import MASTERS
 from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.interop.rules import MASTERS
 from orchestrator.interop.which_master import PROPERTIES, identify
 from tests.interop import drivers
 from tests.interop.jobs import job_of, write_ssp

@@ -42,7 +42,7 @@ def test_the_lead_lag_is_centred_and_leads_for_positive_angles(phase, centre):
         return
     filters = lead_lag(phase, centre, 3)
     assert 1 / math.sqrt(filters.T_S1 * filters.T_S2) == pytest.approx(centre)
-    assert filters.is_lead == (0 <= phase < 180)
+    assert (filters.T_S1 > filters.T_S2) == (0 <= phase < 180)
     assert filters.filtering_ratio == pytest.approx(filters.T_S2 / filters.T_S1)
     assert abs(filters.stage_angle_deg) * 3 == pytest.approx(abs(compensation_deg(phase)), abs=1e-6)
 

@@ -8,7 +8,7 @@ import scipy.linalg
 
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.errors import AnalysisError
-from orchestrator.pod_design.loop_margins import loop_margins
+from orchestrator.pod_design.margins import loop_margins
 
 
 def model(A):

@@ -10,9 +10,8 @@ import pytest
 from fmus.toolchain.extras import MissingLibraryError
 from orchestrator.errors import CosimError, ErrorKind, InputError
 from orchestrator.points.dask_cluster import TLS_FILES, DaskCluster
-from orchestrator.points.executor import WorkerLostError
+from orchestrator.points.executor import Serial, WorkerLostError
 from orchestrator.points.processes import Processes
-from orchestrator.points.serial import Serial
 from orchestrator.points.study import choose_executor
 from tests.points.small_tasks import always_die, die_once, double, fail, sleepy_double, waits
 

@@ -20,9 +20,9 @@ from orchestrator.errors import (
 from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.preparation import failure
 from orchestrator.points.codec import packed, unpacked
+from orchestrator.points.executor import Serial
 from orchestrator.points.failure import Failure
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening

@@ -11,8 +11,8 @@ from orchestrator.cases.case import load_case
 from orchestrator.coupling.schedule import jacobi
 from orchestrator.coupling.step_awareness import other_step
 from orchestrator.errors import InputError
-from orchestrator.study.component_model import component_model
 from orchestrator.study.linear import linear_model
+from orchestrator.study.linear_model_files import component_model
 from orchestrator.study.modes import compute_modes, running
 from orchestrator.study.run import run_scenario
 from tests.support.exact import exact_continuous

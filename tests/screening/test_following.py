@@ -4,13 +4,11 @@ import numpy as np
 import pytest
 
 from orchestrator.analysis.critical_modes import DENSE
-from orchestrator.analysis.eigenvalue_count import count_growing
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.missed_modes import missed
-from orchestrator.analysis.mode_refinement import RefinedModes, refine
+from orchestrator.analysis.mode_refinement import RefinedModes, missed, refine
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import find_spectrum
-from orchestrator.analysis.shifted_equations import ShiftedEquations
+from orchestrator.analysis.shifted_equations import ShiftedEquations, count_growing
 from orchestrator.analysis.slope_linearization import _Point, linearize_slopes
 from orchestrator.cases.case import load_case
 from orchestrator.screening.modes import CriticalRegion, find_modes_here

@@ -23,8 +23,8 @@ from orchestrator.operating_points.outages import read_outages
 from orchestrator.operating_points.points_file import questions_about, read_points
 from orchestrator.operating_points.preparation import ItemPreparation
 from orchestrator.points.dask_cluster import DaskCluster
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening import modes, study
 from orchestrator.screening.request import ScreeningRequest

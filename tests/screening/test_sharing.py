@@ -15,8 +15,8 @@ from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.outages import what_remains
 from orchestrator.operating_points.preparation import ItemPreparation
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening

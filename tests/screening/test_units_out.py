@@ -9,8 +9,8 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import AnalysisError
 from orchestrator.operating_points.item import Status
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.screening import modes
 from orchestrator.screening.request import ScreeningRequest

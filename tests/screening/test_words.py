@@ -9,8 +9,8 @@ import pytest
 import orchestrator as face
 from orchestrator.cases.case import load_case
 from orchestrator.operating_points.item import Status
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.report.html.chapters import _screening
 from orchestrator.screening.record import ItemRecord

@@ -7,8 +7,7 @@ from orchestrator.analysis.linearization import Blocks, compose
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
 from orchestrator.siting.confirmation import same_mode
-from orchestrator.siting.placing import converter, name_at, placed
-from orchestrator.siting.responses import response_of
+from orchestrator.siting.placing import converter, name_at, placed, response_of
 from orchestrator.siting.study import SiteRequest, find_sites
 from orchestrator.siting.view import remarks
 from orchestrator.study.modes import running

@@ -11,7 +11,7 @@ from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
 from orchestrator.siting import residues, study
-from orchestrator.siting.responses import ideal_support
+from orchestrator.siting.placing import ideal_support
 from orchestrator.siting.study import SiteRequest, find_sites
 from orchestrator.siting.view import answer, remarks
 from orchestrator.study.modes import running

@@ -6,8 +6,8 @@ import xarray as xr
 
 from orchestrator.api.identification import identify
 from orchestrator.errors import AnalysisError, InputError
-from orchestrator.study.common_times import common_times
 from orchestrator.study.comparison import compare, most_different, open_trajectory
+from orchestrator.study.measured import common_times
 
 LABELS = ("one", "two")
 

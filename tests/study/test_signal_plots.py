@@ -7,7 +7,7 @@ from orchestrator.cases.case import BUILT_IN, load_case
 from orchestrator.cases.schema import PlotTable
 from orchestrator.errors import InputError
 from orchestrator.results.signals import signal
-from orchestrator.study import signal_plots
+from orchestrator.study import mode_plots
 from orchestrator.study.run import run_scenario
 
 TEXT = (BUILT_IN / "two_area_rms" / "case.toml").read_text(encoding="utf-8")
@@ -23,10 +23,10 @@ def run(tmp_path, solver, stop=0.2):
 def test_a_panel_without_its_signal_says_so_and_a_plot_without_any_is_left_out(tmp_path, monkeypatch):
     result = run(tmp_path, 'record = ["sg1.omega", "sg2.omega"]')
     kept = {}
-    monkeypatch.setattr(signal_plots, "save_figure", lambda figure, path: kept.setdefault(path.stem, figure))
+    monkeypatch.setattr(mode_plots, "save_figure", lambda figure, path: kept.setdefault(path.stem, figure))
     drawn, shown = {}, {}
     for table in result.modes.prepared.case.table.plots:
-        drawn[table.name] = signal_plots.plot_signals(table, [result], tmp_path / f"{table.name}.png")
+        drawn[table.name] = mode_plots.plot_signals(table, [result], tmp_path / f"{table.name}.png")
         shown[table.name] = [panel.signal for panel in table.panels]
     assert set(kept) == {name for name, whether in drawn.items() if whether}
     assert set(drawn.values()) == {True, False}
@@ -58,10 +58,10 @@ def test_a_panel_shows_the_magnitude_of_a_current_beside_its_parts(tmp_path, mon
     assert found.values == pytest.approx(expected, rel=1e-12)
     assert found.attrs["units"] == recorded["gfor.i_re"].attrs["units"]
     kept = {}
-    monkeypatch.setattr(signal_plots, "save_figure", lambda figure, path: kept.setdefault("figure", figure))
+    monkeypatch.setattr(mode_plots, "save_figure", lambda figure, path: kept.setdefault("figure", figure))
     panel = {"signal": "|gfor.i|", "also": ["gfor.i_re", "gfor.i_im"], "label": "i [pu]"}
     table = PlotTable.model_validate({"name": "i", "title": "I", "panels": [panel]})
-    assert signal_plots.plot_signals(table, [result], tmp_path / "i.png")
+    assert mode_plots.plot_signals(table, [result], tmp_path / "i.png")
     (axis,) = kept["figure"].axes
     assert [line.get_label() for line in axis.lines] == ["|gfor.i|", "gfor.i_re", "gfor.i_im"]
     assert axis.lines[0].get_ydata() == pytest.approx(expected)

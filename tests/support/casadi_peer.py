@@ -83,7 +83,7 @@ def made():
 
 def functions(model):
     """All functions of a model from which code is written, by name."""
-    from fmus.toolchain.elimination import plan_elimination
+    from fmus.toolchain.elimination_plan import plan_elimination
     from fmus.toolchain.kernel import kernel_functions
     from fmus.toolchain.native_source import derivative_functions
 

@@ -8,8 +8,8 @@ import pytest
 
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
+from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep.axes import parse_vary
 from orchestrator.sweep.limit import HALVINGS, Ending, ParameterLimit, Until, search

@@ -14,10 +14,10 @@ from orchestrator.cases.case import Case, load_case
 from orchestrator.errors import ErrorKind, InputError
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.points.dask_cluster import DaskCluster
+from orchestrator.points.executor import Serial
 from orchestrator.points.failure import Failure
 from orchestrator.points.points import Work
 from orchestrator.points.processes import Processes
-from orchestrator.points.serial import Serial
 from orchestrator.points.store import PointStore
 from orchestrator.sweep import sweep as sweep_module
 from orchestrator.sweep.axes import _axis, parse_vary, resolve

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from orchestrator.coupling.events import ParameterChange
-from orchestrator.watch.confirmation import doubt
+from orchestrator.watch.confirmation import Swing, doubt
 from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
 from orchestrator.watch.seen import Seen
-from orchestrator.watch.swing import Swing
 from orchestrator.watch.watch import judged
 from tests.watch.seen import seen_of, system
 

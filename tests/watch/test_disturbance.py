@@ -9,7 +9,7 @@ from orchestrator.coupling.imperfections import Noise, Quantisation
 from orchestrator.coupling.system import Connection, Endpoint
 from orchestrator.study.files import summary_of
 from orchestrator.study.run import run_scenario
-from orchestrator.watch.disturbance import disturbances
+from orchestrator.watch.undisturbed import disturbances
 from orchestrator.watch.watch import judged
 from tests.watch.seen import seen_of, system
 

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Protocol
 
-from fmus.synchronous_generator.declarations import require_between, time_constant
+from fmus.synchronous_generator.declarations import require_between, require_rising, saturated_part, time_constant
 from fmus.synchronous_generator.machine import Start
-from fmus.synchronous_generator.saturation import require_rising, saturated_part
 from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, if_else, logic_and, sqrt

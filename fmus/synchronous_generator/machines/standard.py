@@ -12,10 +12,10 @@ that the slow winding of the q axis is missing."""
 from dataclasses import replace
 
 from fmus.synchronous_generator.conversion import AxisData
+from fmus.synchronous_generator.declarations import require_rising, saturated_part
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.base import Common, declare_common, reactance, time
 from fmus.synchronous_generator.machines.windings import Saturation, WoundAxis, declare_wound_machine
-from fmus.synchronous_generator.saturation import require_rising, saturated_part
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr, if_else

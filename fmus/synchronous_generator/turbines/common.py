@@ -1,4 +1,11 @@
-"""Parts that governors and turbines share: their parameters, the reference and the check of their start."""
+"""Parts that governors and turbines share: parameters, reference and the check of their start; and no governor.
+
+Without one, mechanical power or mechanical torque is constant:
+
+    constant_power   P_m = P_ref, so the torque falls with speed, T_m = P_m/w
+    constant_torque  T_m = P_ref, so P_m = T_m·w
+
+Between them lies a damping of P_0 per unit of speed: 1/(4H)·P_0 of the swing's decay."""
 
 from collections.abc import Callable
 from functools import partial
@@ -40,3 +47,15 @@ require_within = partial(
     require_between,
     rule="so the turbine cannot give its power; change the limit, the rating S_n, or the generator's active power",
 )
+
+
+def constant_power(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
+    """Declare it and return the mechanical power [pu, S_n]."""
+    with m.scope("governor"):
+        return power_reference(m, P_m_0)
+
+
+def constant_torque(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
+    """Declare it and return the mechanical power [pu, S_n]."""
+    with m.scope("governor"):
+        return power_reference(m, P_m_0) * w

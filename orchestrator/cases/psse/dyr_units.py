@@ -1,15 +1,88 @@
-"""Units of a case from the machines of a RAW file and their records in a DYR file."""
+"""Units of a case from the machines of a RAW file and their records in a DYR file.
+
+Parts of machines without a record are what [units] chooses for them, else what PSS/E assumes."""
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from fmus.synchronous_generator.dyr_fields import MACHINE_VARIANTS
 from orchestrator.cases.network_data import bus_name
+from orchestrator.cases.plausible_values import UnusualValue
 from orchestrator.cases.psse.dyr import machine_models
 from orchestrator.cases.psse.dyr_records import read_dyr
 from orchestrator.cases.psse.raw import Machine
 from orchestrator.cases.unit_row import UnitRow, checked
+from orchestrator.errors import InputError
+
+_WITHOUT = {"exciter": "manual", "governor": "constant_power", "stabilizer": "none"}
+"""What PSS/E assumes where there is no record."""
+
+_CONSTANT = {"exciter": "field voltage", "governor": "mechanical power"}  # what is constant without the part
+_OTHERS = 2  # machines with a record from which on a machine without one is questioned
+_CONDENSER = 0.01  # active power [pu of the rating] below which a machine needs no governor
+
+
+def with_choices(rows: Sequence[UnitRow], replaced: Collection[str], chosen: Mapping[str, str]) -> list[UnitRow]:
+    """The units with the parts that ``[units]`` chooses: the machine's variant, and what has no record."""
+    found, acted = [], set[str]()
+    for row in rows:
+        own = {} if row.label in replaced or row.converter else {k: n for k, n in chosen.items() if _fits(k, n, row)}
+        acted |= {*own}
+        found.append(replace(row, parts={**row.parts, **own}) if own else row)
+    machines = [row for row in rows if row.label not in replaced and not row.converter]
+    for kind in (kind for kind in chosen if kind not in acted and machines):
+        raise InputError(f"{kind} = {chosen[kind]!r} in [units] acts on no machine: {_reason(kind, machines)}")
+    return found
+
+
+def _fits(kind: str, name: str, row: UnitRow) -> bool:
+    """Whether a choice is for this machine: no record says otherwise, and the machine can have the part."""
+    if kind == "machine":
+        return row.parts.get("machine") == MACHINE_VARIANTS.get(name, name)
+    classical = row.parts.get("machine") == "classical" and kind in ("exciter", "stabilizer")
+    return kind not in row.parts and not classical
+
+
+def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
+    if kind != "machine":
+        return "the DYR file has a record of it for every machine that can have one; remove the key"
+    names = sorted({row.parts["machine"] for row in machines})
+    variants = [variant for variant, of in MACHINE_VARIANTS.items() if of in names]
+    there = f"; beside its own name a record may become {', '.join(map(repr, variants))}" if variants else ""
+    return (
+        f"the records of the DYR file say what each machine is ({', '.join(names)}){there}; correct or remove the key"
+    )
+
+
+def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValue]:
+    """Ask about machines without an exciter or a governor where others have one."""
+    for kind, quantity in _CONSTANT.items():
+        able = [row for row in rows if _can_have(kind, row)]
+        without = [row for row in able if kind not in row.parts and not row.partial]
+        if not without or len(able) - len(without) < _OTHERS:
+            continue
+        text = (
+            f"no record of {'an' if kind == 'exciter' else 'a'} {kind}, where {len(able) - len(without)} of "
+            f"{len(able)} machines have one: the {quantity} is constant; add the record, or choose a part in [units], "
+            f"such as {kind} = {next(row.parts[kind] for row in able if kind in row.parts)!r}"
+        )
+        yield from (UnusualValue(f"sg{row.label}.{kind}", place, text) for row in without)
+
+
+def _can_have(kind: str, row: UnitRow) -> bool:
+    if row.converter is not None or row.parts.get("machine") == "classical":
+        return False
+    return kind != "governor" or abs(row.p_mw) > _CONDENSER * row.rating_mva
+
+
+def completed(rows: Sequence[UnitRow], replaced: Collection[str]) -> list[UnitRow]:
+    """The units with what PSS/E assumes for every part that nothing says; a record that is left out stays open."""
+    return [
+        row if row.converter or row.partial or row.label in replaced else replace(row, parts={**_WITHOUT, **row.parts})
+        for row in rows
+    ]
 
 
 def rows_of_machines(machines: Sequence[Machine], place: str) -> list[UnitRow]:

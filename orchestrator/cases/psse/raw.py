@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cases.network_sources import SourceTables
-from orchestrator.cases.psse.changes import leave_out
-from orchestrator.cases.psse.records import RawFile, Record, read_records
+from orchestrator.cases.psse.records import RawFile, Record, leave_out, read_records
 from orchestrator.cases.psse.transformers import Transformer, star, transformers
 from orchestrator.cases.source_changes import Changes
 from orchestrator.errors import Problem

@@ -10,7 +10,7 @@ from orchestrator.binding.misfits import NO_LIMIT
 from orchestrator.certification.codes.bench_case import PLANT
 from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.certification.codes.row import Band, Bounded, Judge, RowFinding
-from orchestrator.watch.declared_current import ABOVE, LASTS, told_of
+from orchestrator.watch.limits import ABOVE, LASTS, told_of
 
 CODE, READING = "code", "reading"
 CURRENT = "current"  # name of the criterion that every row has, whatever its code asks

@@ -10,8 +10,7 @@ from typing import Any
 from orchestrator.certification.codes.sensitivity import MarginSensitivity
 from orchestrator.certification.codes.what_it_takes import ChangePlan, ConfirmedChange, CriterionNeeds
 from orchestrator.certification.margins import margin_text
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import table
+from orchestrator.report.html.elements import document, table
 from orchestrator.report.tables import PlainTable, make_table
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text

@@ -14,8 +14,7 @@ from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED,
 from orchestrator.certification.environment import environment
 from orchestrator.certification.form import CODE
 from orchestrator.certification.margins import margin_of
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures, table
+from orchestrator.report.html.elements import Figures, document, table
 
 
 def code_responses(certificate: CodeCertificate) -> xr.Dataset:

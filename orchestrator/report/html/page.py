@@ -1,18 +1,21 @@
-"""The page as a whole."""
+"""The page as a whole, its first page, and what changed since an older one."""
 
+import json
 import re
 import warnings
 from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from html import escape
 from pathlib import Path
+from typing import Any
 
 from orchestrator.errors import InputError
 from orchestrator.report.html import sections, studies
 from orchestrator.report.html.chapters import Chapter, chapters_of, of_run, of_sweep
 from orchestrator.report.html.chapters import sections as sections_of
-from orchestrator.report.html.document import document
-from orchestrator.report.html.elements import Figures
-from orchestrator.report.html.first_page import changes, first_page, kept_answers, origins
+from orchestrator.report.html.elements import Figures, document, held_data, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
+from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, ResultsWarning
 from orchestrator.safe_files import write_text
 
@@ -115,3 +118,117 @@ def _of_run(run: Results, figures: Figures) -> Sections:
     if run.step_sizes:
         content.append(("Communication step", sections.step_sizes(run)))
     return content
+
+
+_OPEN, _LONGEST = 4, 110
+"""What was not judged on the first page, and the characters of each."""
+
+
+def first_page(chapters: Sequence[Chapter]) -> str:
+    rows = []
+    for one in chapters:
+        shade = {True: "good", False: "bad", None: "soft"}[one.good]
+        open_ = (
+            "<br>".join(escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN]) or "nothing that is known of"
+        )
+        more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
+        answer = f'<span class="{shade}">{escape(one.answer)}</span>'
+        asked = f'{escape(one.question)}<br><span class="soft">{escape(str(one.source))}</span>'
+        rows.append([asked, answer, escape(short(one.sure, 3 * _LONGEST)), open_ + more])
+    return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
+
+
+def origins(chapters: Sequence[Chapter]) -> str:
+    """Of each result when it was made, by which version and code, from what, and the command that makes it again."""
+    rows = [[escape(cell) for cell in _made(source)] for source in dict.fromkeys(one.source for one in chapters)]
+    columns = ["Results", "Made", "Version", "Code", "Inputs (SHA-256)", "Command that makes them again"]
+    return table("Where every chapter comes from", columns, rows, left=6)
+
+
+def _made(source: Path) -> list[str]:
+    folder = source if source.is_dir() else source.parent
+    own = _tables(source) if source.suffix == ".json" else {}
+    content: dict[str, Any] = _tables(folder / MANIFEST)
+    match own.get("made"):
+        case dict(said):
+            content = said
+        case str(date):  # a certificate's
+            content = {"date": date, "made_by": own.get("environment", {}), "inputs": own.get("files", {})}
+            content |= {"code": content["made_by"].get("Commit", ""), "command": f"gfor verify {folder}"}
+    versions = content.get("made_by", {}).get("gfor-cosim")
+    inputs = ", ".join(f"{name} {str(of)[:8]}" for name, of in content.get("inputs", {}).items() if of)
+    date = content.get("date") or f"{datetime.fromtimestamp(source.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"
+    figures = f"gfor-cosim {versions}" if versions else "", str(content.get("code", ""))[:12], inputs
+    return [str(source), date, *(text or "not recorded" for text in (*figures, content.get("command")))]
+
+
+def _tables(file: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def changes(old: Path, before: Sequence[Chapter] | None, chapters: Sequence[Chapter]) -> str:
+    """``before``: the chapters of older results; None where ``old`` is an older page."""
+    then = _by_name(_answers(before) if before is not None else _kept(old), _answers(chapters))
+    now = _by_name(_answers(chapters), _answers(chapters))
+    rows = []
+    for key in dict.fromkeys([*then, *now]):
+        was, is_now = then.get(key), now.get(key)
+        if was != is_now:
+            cells = (key[0], key[1] or "its folder", was or "not there", is_now or "not there any more")
+            rows.append([escape(cell) for cell in (*cells, _moved(was or "", is_now or ""))])
+    if not rows:
+        return f"<p>No answer differs from {escape(old.name)}.</p>"
+    columns = ["Question", "Of", "Before", "Now", "Figures that moved"]
+    return table(f"Answers that differ from {old.name}", columns, rows, left=5)
+
+
+def _moved(before: str, now: str) -> str:
+    """The figures that differ between two answers that are alike but for them."""
+    number = r"(?<![\w.])[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
+    if re.sub(number, "#", before) != re.sub(number, "#", now):
+        return ""
+    pairs = zip(re.findall(number, before), re.findall(number, now), strict=True)
+    moved = [(a, b, float(b.replace("−", "-")) - float(a.replace("−", "-"))) for a, b in pairs if a != b]
+    return ", ".join(f"{a} to {b} ({by:+.4g})" for a, b, by in moved)
+
+
+def _kept(page: Path) -> list[dict[str, str]]:
+    try:
+        found = re.search(r'id="answers">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL)
+        kept: list[dict[str, str]] | None = json.loads(found[1]) if found else None
+    except (OSError, ValueError) as error:
+        raise InputError(f"--against {page}: it cannot be read: {error}; give a page of `gfor report`") from error
+    if kept is None:
+        raise InputError(f"--against {page}: it is no page of `gfor report`; give one that an earlier call wrote")
+    return kept
+
+
+def _answers(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
+    return [
+        {"question": one.question, "source": "" if one.source.is_dir() else one.source.name, "answer": one.answer,
+         "folder": (one.source if one.source.is_dir() else one.source.absolute().parent).name}
+        for one in chapters
+    ]  # fmt: skip
+
+
+def _by_name(answers: Sequence[dict[str, str]], others: Sequence[dict[str, str]]) -> dict[tuple[str, str, int], str]:
+    """Answers by question, file and place: first those of folders that the others have as well, at the same place."""
+    found: dict[tuple[str, str, int], str] = {}
+    known = [(x["question"], x["source"], x.get("folder")) for x in others]
+    named = [((x["question"], x["source"], x.get("folder")), x["answer"]) for x in answers]
+    for key, answer in sorted(named, key=lambda one: one[0] not in known):
+        alike = [x for x in known if x[:2] == key[:2]]
+        place = alike.index(key) if key in alike else 0
+        while (*key[:2], place) in found:
+            place += 1
+        found[*key[:2], place] = answer
+    return found
+
+
+def kept_answers(chapters: Sequence[Chapter]) -> str:
+    """The answers as data in the page, for `changes` of a later one."""
+    return held_data("answers", _answers(chapters))

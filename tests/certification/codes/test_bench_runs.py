@@ -16,7 +16,7 @@ from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.files import save
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.verification import read_certificate, verify_files
-from orchestrator.points.serial import Serial
+from orchestrator.points.executor import Serial
 
 pytestmark = pytest.mark.slow
 

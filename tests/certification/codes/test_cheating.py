@@ -5,7 +5,7 @@ import pytest
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.request import CertificationRequest
-from orchestrator.points.serial import Serial
+from orchestrator.points.executor import Serial
 from tests.certification.codes.reactance_source import write_source
 
 pytestmark = pytest.mark.slow

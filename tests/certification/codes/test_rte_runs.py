@@ -16,7 +16,7 @@ from orchestrator.certification.files import save
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.verification import read_certificate, verify_files
 from orchestrator.errors import ComponentError
-from orchestrator.points.serial import Serial
+from orchestrator.points.executor import Serial
 from tests.certification.codes.reactance_source import write_source
 from tests.certification.codes.wrong_droop import write_wrong
 

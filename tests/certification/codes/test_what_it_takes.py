@@ -12,7 +12,7 @@ from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.needs_record import confirmed_text, plan_text, remarks_of, save_needs
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import InputError
-from orchestrator.points.serial import Serial
+from orchestrator.points.executor import Serial
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,15 @@
-"""AC1A: a field-controlled alternator with a rotating rectifier, uncontrolled, and rate feedback.
+"""AC1A and AC4A: alternators with rectifiers.
 
-V_ref + V_S − v_m − V_F → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A), held within V_AMIN and V_AMAX → V_RMIN ≤ V_R ≤ V_RMAX
-T_E·dV_E/dt = V_R − V_FE,  V_E ≥ 0,  V_FE = (K_E + S_E(V_E))·V_E + K_D·I_FD
-E_fd = V_E·F_EX(K_C·I_FD/V_E),  V_F = s·K_F/(1+sT_F)·V_FE"""
+AC1A is field-controlled, with a rotating rectifier, uncontrolled, and rate feedback:
+
+    V_ref + V_S − v_m − V_F → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A), held within V_AMIN and V_AMAX → V_RMIN ≤ V_R ≤ V_RMAX
+    T_E·dV_E/dt = V_R − V_FE,  V_E ≥ 0,  V_FE = (K_E + S_E(V_E))·V_E + K_D·I_FD
+    E_fd = V_E·F_EX(K_C·I_FD/V_E),  V_F = s·K_F/(1+sT_F)·V_FE
+
+AC4A has a controlled rectifier:
+
+    V_IMIN ≤ V_ref + V_S − v_m ≤ V_IMAX → (1+sT_C)/(1+sT_B) → K_A/(1+sT_A) = E_fd,
+    held within V_RMIN and V_RMAX − K_C·I_FD"""
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
@@ -53,3 +60,22 @@ def ac1a(
         V_A = limited_low_pass(m, "amplifier", K_A * error, T_A, A_low, A_high, V_R0)
         m.derivative(x, held_at_limits(x, (clamp(V_A, R_low, R_high) - V_FE) / T_E, 0.0, _MOST))
         return measured.close(V_E * rectifier(K_C * I_fd / fmax(V_E, _LEAST)))
+
+
+def ac4a(
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
+    """Declare it and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.015, "Amplifier; 0 leaves the lag out")
+        I_high, I_low = gain(m, "V_IMAX", 10.0, "Upper limit of the error"), gain(m, "V_IMIN", -10.0, "Lower one")
+        high, low = gain(m, "V_RMAX", 5.64, "Upper ceiling of E_fd"), gain(m, "V_RMIN", -4.53, "Lower ceiling of E_fd")
+        K_C = gain(m, "K_C", 0.0, "Rectifier loading factor", 0)
+        V_I0 = start.E_fd / K_A
+        require_within(m, V_I0, I_low, I_high, ("exciter.V_IMIN", "exciter.V_IMAX"))
+        require_within(m, start.E_fd, low, high - K_C * start.E_fd, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        measured = Measurement(m, start, terminal_voltage, I_fd)
+        error = clamp(measured.error(V_I0, v_s), I_low, I_high)
+        compensated = lead_lag_stage(m, error, V_I0, lead=1.0)
+        ceiling = fmax(high - K_C * I_fd, low)
+        return measured.close(limited_low_pass(m, "amplifier", K_A * compensated, T_A, low, ceiling, start.E_fd))

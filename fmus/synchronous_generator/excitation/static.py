@@ -1,0 +1,175 @@
+"""ST1A and ST4B, rectifiers fed from the machine's terminal, and SEXS, the simplified exciter of stability programs.
+
+SEXS is a lead/lag and a lag that stops at its limits:
+
+    V_ref + V_S − v_m → (1+sT_A)/(1+sT_B) → K/(1+sT_E) = E_fd, held within E_MIN and E_MAX
+
+ST1A is controlled, with a limiter of the field current:
+
+    V_IMIN ≤ V_ref + V_S − v_m − V_F ≤ V_IMAX → (1+sT_C)/(1+sT_B) → (1+sT_C1)/(1+sT_B1)
+    → K_A/(1+sT_A) = V_A, held within V_AMIN and V_AMAX → V_A − K_LR·(I_FD − I_LR), only above I_LR = E_fd,
+    v_t·V_RMIN ≤ E_fd ≤ v_t·V_RMAX − K_C·I_FD,   V_F = s·K_F/(1+sT_F)·E_fd
+
+ST4B has two PI controllers; the standard's source from the stator current (K_I, X_L, θ_P) is left out, and an
+integrator stops while its output is at a limit:
+
+    V_ref + V_S − v_m → K_PR + K_IR/s within V_RMIN and V_RMAX → 1/(1+sT_A) → − K_G·E_fd
+    → K_PM + K_IM/s within V_MMIN and V_MMAX = V_M
+    E_fd = V_M·V_B,  V_B = min(V_E·F_EX(K_C·I_FD/V_E), V_BMAX),  V_E = K_P·v_t
+
+Two fixed-point passes take the ceilings' v_t, because it depends, behind the transformer, weakly on E_fd."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fmus.synchronous_generator.excitation.common import (
+    Measurement,
+    TerminalVoltage,
+    gain,
+    lead_lag_stage,
+    rate_feedback,
+    rectifier,
+    require_within,
+    time,
+)
+from fmus.synchronous_generator.machine import Start
+from fmus.toolchain.blocks import (
+    BYPASS_TIME,
+    clamp,
+    close_limited_low_pass,
+    lead_lag,
+    limited_low_pass,
+    limited_proportional_integral,
+    low_pass_or_nothing,
+)
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
+
+
+def st1a(
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
+    """Declare it and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.0, "Amplifier; 0 leaves the lag out")
+        I_high, I_low = gain(m, "V_IMAX", 999.0, "Upper limit of the error"), gain(m, "V_IMIN", -999.0, "Lower one")
+        A_high, A_low = gain(m, "V_AMAX", 999.0, "Upper limit of V_A"), gain(m, "V_AMIN", -999.0, "Lower limit of V_A")
+        high = gain(m, "V_RMAX", 6.43, "Upper ceiling of E_fd at v_t = 1")
+        low = gain(m, "V_RMIN", -6.0, "Lower ceiling of E_fd at v_t = 1")
+        K_C = gain(m, "K_C", 0.0, "Rectifier loading factor", 0)
+        K_LR = gain(m, "K_LR", 0.0, "Gain of the field current's limiter; 0 leaves it out", 0)
+        I_LR = gain(m, "I_LR", 0.0, "Field current where the limiter starts")
+
+        def relieved(field_current: Expr) -> Expr:
+            return K_LR * fmax(field_current - I_LR, 0)
+
+        def held(signal: Expr, v_t: Expr) -> Expr:
+            floor = v_t * low
+            return clamp(signal - relieved(I_fd), floor, fmax(v_t * high - K_C * I_fd, floor))
+
+        V_A0 = start.E_fd + relieved(start.E_fd)
+        V_I0 = V_A0 / K_A
+        require_within(m, V_I0, I_low, I_high, ("exciter.V_IMIN", "exciter.V_IMAX"))
+        require_within(m, V_A0, A_low, A_high, ("exciter.V_AMIN", "exciter.V_AMAX"))
+        ceiling = start.v_t * high - K_C * start.E_fd
+        require_within(m, start.E_fd, start.v_t * low, ceiling, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        measured = Measurement(m, start, terminal_voltage, I_fd)
+        amplifier = m.state("amplifier", V_A0, "pu", "first-order lag with limits", base="E_fd")
+        V_F, K_F = rate_feedback(m, held(clamp(amplifier, A_low, A_high), measured.nearly), start.E_fd)
+        m.require(if_else(logic_and(K_F > 0, T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0")
+        error = clamp(measured.error(V_I0, v_s) - V_F, I_low, I_high)
+        error = lead_lag_stage(m, error, V_I0)
+        error = lead_lag_stage(m, error, V_I0, mark="1")
+        V_A = close_limited_low_pass(m, amplifier, K_A * error, T_A, A_low, A_high)
+        E_fd = held(V_A, terminal_voltage(held(V_A, measured.nearly)))
+        return measured.close(E_fd)
+
+
+@dataclass(frozen=True)
+class _Inner:
+    """The inner controller: gains, limits, and its value in steady state."""
+
+    K_G: Expr
+    K_PM: Expr
+    K_IM: Expr
+    low: Expr
+    high: Expr
+    at_start: Expr
+
+
+def st4b(
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
+    """Declare it and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        K_PR = gain(m, "K_PR", 3.15, "Proportional gain", 0)
+        K_IR = m.parameter("K_IR", 3.15, "1/s", "Integral gain", minimum=1e-6)
+        high, low = gain(m, "V_RMAX", 1.0, "Upper limit of V_R"), gain(m, "V_RMIN", -0.87, "Lower limit of V_R")
+        T_A = time(m, "T_A", 0.02, "Bridge; 0 leaves the lag out")
+        source = _source(m)
+        inner = _inner(m, start.E_fd / source(start.v_t, start.E_fd))
+        V_A0 = if_else(inner.K_IM > 0, 0, inner.at_start / fmax(inner.K_PM, 1e-9)) + inner.K_G * start.E_fd
+        require_within(m, V_A0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        measured = Measurement(m, start, terminal_voltage, I_fd)
+        error = measured.error(0.0, v_s)
+        V_R = limited_proportional_integral(m, "regulator", error, K_PR, K_IR, low, high, V_A0)
+        V_A = low_pass_or_nothing(m, "bridge", V_R, T_A, V_A0)
+        x = m.state("inner", if_else(inner.K_IM > 0, inner.at_start, 0), "pu", "integrator with limits", base="E_fd")
+
+        def field_voltage(v_t: Expr) -> Expr:
+            V_B = source(v_t, I_fd)
+            free = (inner.K_PM * V_A + x) / (1 + V_B * inner.K_PM * inner.K_G)
+            return V_B * clamp(free, inner.low, inner.high)
+
+        E_fd = field_voltage(terminal_voltage(field_voltage(measured.nearly)))
+        rest = V_A - inner.K_G * E_fd
+        free = inner.K_PM * rest + x
+        outward = logic_or(logic_and(free > inner.high, rest > 0), logic_and(free < inner.low, rest < 0))
+        without = -x / BYPASS_TIME  # no integrator, and no eigenvalue of 0
+        m.derivative(x, if_else(inner.K_IM > 0, if_else(outward, 0, inner.K_IM * rest), without))
+        return measured.close(E_fd)
+
+
+def _source(m: ModelBuilder) -> Callable[[Expr, Expr], Expr]:
+    """V_B [pu] of |v_t| and field current."""
+    K_P = gain(m, "K_P", 6.5, "Potential source gain", 0.1)
+    K_C = gain(m, "K_C", 0.08, "Rectifier loading factor", 0)
+    V_BMAX = gain(m, "V_BMAX", 8.0, "Upper limit of V_B", 0.1)
+
+    def V_B(v_t: Expr, field_current: Expr) -> Expr:
+        V_E = fmax(K_P * v_t, 1e-3)
+        return fmin(V_E * rectifier(K_C * field_current / V_E), V_BMAX)
+
+    return V_B
+
+
+def _inner(m: ModelBuilder, V_M0: Expr) -> _Inner:
+    inner = _Inner(
+        gain(m, "K_G", 0.0, "Feedback of E_fd", 0),
+        gain(m, "K_PM", 1.0, "Proportional gain of the inner controller", 0),
+        m.parameter("K_IM", 0.0, "1/s", "Integral gain of the inner controller", minimum=0),
+        gain(m, "V_MMIN", -0.87, "Lower limit of V_M"),
+        gain(m, "V_MMAX", 1.0, "Upper limit of V_M"),
+        V_M0,
+    )
+    m.require(inner.K_PM + inner.K_IM - 1e-9, "exciter: one of K_PM and K_IM must exceed 0")
+    require_within(m, V_M0, inner.low, inner.high, ("exciter.V_MMIN", "exciter.V_MMAX"))
+    return inner
+
+
+def sexs(
+    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
+) -> tuple[Expr, Expr]:
+    """Declare it and return (E_fd, |v_t|) [pu]."""
+    with m.scope("exciter"):
+        K = gain(m, "K", 100.0, "Gain", 1e-3)
+        T_A = time(m, "T_A", 1.0, "Lead")
+        T_B = time(m, "T_B", 10.0, "Lag; 0 leaves the stage out")
+        T_E = time(m, "T_E", 0.05, "Exciter; 0 leaves the lag out")
+        low, high = gain(m, "E_MIN", 0.0, "Lower ceiling of E_fd"), gain(m, "E_MAX", 5.0, "Upper ceiling of E_fd")
+        m.require(if_else(logic_and(T_B <= 0, T_A > 0), -1, 1), "exciter.T_B = 0 needs exciter.T_A = 0 as well")
+        require_within(m, start.E_fd, low, high, ("exciter.E_MIN", "exciter.E_MAX"))
+        measured = Measurement(m, start, terminal_voltage, I_fd)
+        error = measured.error(start.E_fd / K, v_s)
+        compensated = lead_lag(m, "lead_lag", error, T_A, T_B, start.E_fd / K)
+        return measured.close(limited_low_pass(m, "amplifier", K * compensated, T_E, low, high, start.E_fd))

@@ -1,0 +1,154 @@
+"""GAST, TGOV1, IEEEG1 and HYGOV: governors with gas, steam and water turbines.
+
+GAST has a gas turbine with a limit of its exhaust's temperature:
+
+    low value of P_ref − (w − 1)/R and A_T + K_T·(A_T − T_exh)
+    → 1/(1+sT_1), held within V_MIN and V_MAX → 1/(1+sT_2) → fuel
+    P_m = fuel − D_turb·(w − 1),   T_exh = fuel/(1+sT_3)
+
+TGOV1 has a steam turbine with a reheater:
+
+    P_ref − (w − 1)/R → 1/(1+sT_1), held within V_MIN and V_MAX → (1+sT_2)/(1+sT_3) → − D_t·(w − 1) = P_m
+
+IEEEG1 has limits, a valve that moves at a limited rate, and up to four stages of a steam turbine; both shafts of a
+cross-compound unit drive this one machine, so the fractions of a pair add up:
+
+    (w − 1) → K·(1+sT_2)/(1+sT_1) → P_ref − … − P_GV → 1/T_3, U_c ≤ rate ≤ U_o → 1/s = P_GV within P_MIN and P_MAX
+    P_GV → 1/(1+sT_4) → 1/(1+sT_5) → 1/(1+sT_6) → 1/(1+sT_7), tapped after each with K_1+K_2, K_3+K_4, K_5+K_6, K_7+K_8
+
+HYGOV has a transient droop, and a penstock with inelastic water; in steady state h = 1 and g = q = P_m/A_t + q_NL:
+
+    R·(c_ref − c) − (w − 1) → 1/(1+sT_f) → (1+sT_r)/(r·T_r·s) = c, held within G_MIN and G_MAX
+    T_g·dg/dt = c − g, at most VELM per second
+    h = (q/g)²,  T_W·dq/dt = 1 − h,  P_m = A_t·h·(q − q_NL) − D_turb·g·(w − 1)"""
+
+from fmus.synchronous_generator.turbines.common import SOURCE, power, power_reference, require_within, time
+from fmus.toolchain.blocks import (
+    clamp,
+    held_at_limits,
+    lead_lag,
+    limited_low_pass,
+    limited_proportional_integral,
+    low_pass,
+    low_pass_or_nothing,
+)
+from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.symbols import Expr, fmax, fmin, if_else, logic_and
+
+_LEAST_GATE = 1e-3
+"""Smallest gate [pu] that the flow is divided by."""
+
+
+def hygov(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
+    """Declare governor and turbine and return the mechanical power [pu, S_n]."""
+    with m.scope("governor"):
+        R = power(m, "R", 0.05, "Permanent droop", 1e-4)
+        r = power(m, "r", 0.3, "Transient droop", 1e-4)
+        T_r = time(m, "T_r", 5.0, "Reset of the transient droop", 1e-2)
+        T_f = time(m, "T_f", 0.05, "Filter", 1e-3)
+        T_g = time(m, "T_g", 0.5, "Gate's servo", 1e-3)
+        VELM = m.parameter("VELM", 0.2, "pu/s", "Fastest movement of the gate", minimum=1e-6, source=SOURCE)
+        high, low = power(m, "G_MAX", 1.0, "Gate, fully open"), power(m, "G_MIN", 0.0, "Gate, closed", 0)
+        T_W = time(m, "T_W", 1.0, "Water's inertia", 1e-2)
+        A_t = m.parameter("A_t", 1.2, "1", "Gain of the turbine", minimum=0.1, source=SOURCE)
+        D_turb = power(m, "D_turb", 0.5, "Damping of the turbine", 0)
+        q_NL = power(m, "q_NL", 0.08, "Flow at no load", 0)
+
+        def gate_for(P: Expr) -> Expr:
+            return P / A_t + q_NL
+
+        g_0 = gate_for(P_m_0)
+        require_within(m, g_0, low, high, ("governor.G_MIN", "governor.G_MAX"))
+        wanted = gate_for(power_reference(m, P_m_0))
+        c = m.algebraic("c")
+        filtered = m.state("filtered", 0.0, "pu", "Error through the filter", base="S_n")
+        m.derivative(filtered, (R * (wanted - c) - (w - 1) - filtered) / T_f)
+        m.close(c, limited_proportional_integral(m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low, high, g_0))
+        x = m.state("gate", g_0, "pu", "Gate", base="S_n")
+        m.derivative(x, clamp((c - x) / T_g, -VELM, VELM))
+        gate = fmax(x, _LEAST_GATE)
+        q = m.state("q", g_0, "pu", "Flow", base="S_n")
+        h = (q / gate) ** 2
+        m.derivative(q, (1 - h) / T_W)
+        return A_t * h * (q - q_NL) - D_turb * gate * (w - 1)
+
+
+def gast(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
+    """Declare governor and turbine and return the mechanical power [pu, S_n]."""
+    with m.scope("governor"):
+        R = power(m, "R", 0.05, "Droop", 1e-4)
+        T_1 = time(m, "T_1", 0.4, "Governor; 0 leaves the lag out")
+        T_2 = time(m, "T_2", 0.1, "Combustion", 1e-3)
+        T_3 = time(m, "T_3", 3.0, "Measurement of the exhaust's temperature", 1e-3)
+        A_T = power(m, "A_T", 1.0, "Load limit at the ambient temperature")
+        K_T = m.parameter("K_T", 2.0, "1", "Gain of the temperature's limiter", minimum=0, source=SOURCE)
+        high, low = power(m, "V_MAX", 1.0, "Valve, fully open"), power(m, "V_MIN", -0.05, "Valve, closed")
+        D_turb = power(m, "D_turb", 0.0, "Damping of the turbine", 0)
+        require_within(m, P_m_0, low, high, ("governor.V_MIN", "governor.V_MAX"))
+        m.require(
+            A_T - P_m_0,
+            "governor.A_T: the operating point of the power flow lies at or above the turbine's load limit; raise A_T "
+            "or the rating S_n, or lower the generator's active power",
+        )
+        exhaust = m.state("exhaust", P_m_0, "pu", "Measured temperature of the exhaust", base="S_n")
+        wanted = fmin(power_reference(m, P_m_0) - (w - 1) / R, A_T + K_T * (A_T - exhaust))
+        valve = limited_low_pass(m, "valve", wanted, T_1, low, high, P_m_0)
+        fuel = low_pass(m, "combustion", valve, T_2, P_m_0)
+        m.derivative(exhaust, (fuel - exhaust) / T_3)
+        return fuel - D_turb * (w - 1)
+
+
+def tgov1(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
+    """Declare governor and turbine and return the mechanical power [pu, S_n].
+
+    ``w``: rotor speed [pu, f_n]; ``P_m_0``: mechanical power at the operating point [pu, S_n]."""
+    with m.scope("governor"):
+        R = power(m, "R", 0.05, "Droop", 1e-4)
+        T_1 = time(m, "T_1", 0.5, "Valve; 0 leaves the lag out")
+        high, low = power(m, "V_MAX", 1.0, "Valve, fully open"), power(m, "V_MIN", 0.0, "Valve, closed")
+        T_2 = time(m, "T_2", 3.0, "Reheater, lead: T_3 times the high-pressure part")
+        T_3 = time(m, "T_3", 10.0, "Reheater; 0 leaves the stage out")
+        D_t = power(m, "D_t", 0.0, "Damping of the turbine", 0)
+        m.require(if_else(logic_and(T_3 <= 0, T_2 > 0), -1, 1), "governor.T_3 = 0 needs governor.T_2 = 0 as well")
+        require_within(m, P_m_0, low, high, ("governor.V_MIN", "governor.V_MAX"))
+        valve = limited_low_pass(m, "valve", power_reference(m, P_m_0) - (w - 1) / R, T_1, low, high, P_m_0)
+        return lead_lag(m, "reheater", valve, T_2, T_3, P_m_0) - D_t * (w - 1)
+
+
+_STAGES = ("steam_chest", "reheater", "crossover", "last_stage")
+_TIMES = (0.3, 7.0, 0.6, 0.0)
+_FRACTIONS = (0.3, 0.0, 0.3, 0.0, 0.4, 0.0, 0.0, 0.0)
+
+
+def ieeeg1(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
+    """Declare governor and turbine and return the mechanical power [pu, S_n]."""
+    with m.scope("governor"):
+        K = power(m, "K", 20.0, "Gain, 1/droop", 0)
+        T_1, T_2 = time(m, "T_1", 0.0, "Controller, lag; 0 leaves it out"), time(m, "T_2", 0.0, "Controller, lead")
+        T_3 = time(m, "T_3", 0.1, "Valve's servo", 1e-3)
+        U_o = m.parameter("U_o", 1.0, "pu/s", "Fastest opening of the valve", minimum=1e-6, source=SOURCE)
+        U_c = m.parameter("U_c", -10.0, "pu/s", "Fastest closing of the valve", maximum=-1e-6, source=SOURCE)
+        high, low = power(m, "P_MAX", 1.0, "Valve, fully open"), power(m, "P_MIN", 0.0, "Valve, closed")
+        T = [
+            time(m, f"T_{k}", value, f"Stage {k - 3} of the turbine; 0 leaves it out")
+            for k, value in enumerate(_TIMES, 4)
+        ]
+        part = [
+            m.parameter(f"K_{k}", value, "1", f"Turbine fraction K_{k}", minimum=0, maximum=1, source=SOURCE)
+            for k, value in enumerate(_FRACTIONS, 1)
+        ]
+        m.require(if_else(logic_and(T_1 <= 0, T_2 > 0), -1, 1), "governor.T_1 = 0 needs governor.T_2 = 0 as well")
+        fractions = sum(part, Expr(0))
+        m.require(fractions - 1e-3, "governor: at least one turbine fraction K_1 to K_8 must exceed 0")
+        valve_0 = P_m_0 / fmax(fractions, 1e-3)
+        require_within(m, valve_0, low, high, ("governor.P_MIN", "governor.P_MAX"))
+        control = lead_lag(m, "controller", K * (w - 1), T_2, T_1)
+        x = m.state("gate", valve_0, "pu", "Valve", base="S_n")
+        valve = clamp(x, low, high)
+        rate = clamp((power_reference(m, valve_0) - control - valve) / T_3, U_c, U_o)
+        m.derivative(x, held_at_limits(x, rate, low, high))
+        signal, total = valve, Expr(0)
+        for stage, name in enumerate(_STAGES):
+            signal = low_pass_or_nothing(m, name, signal, T[stage], valve_0)
+            total += (part[2 * stage] + part[2 * stage + 1]) * signal
+        return total
