@@ -121,6 +121,13 @@ def number_in(given: Any, unit: str, argument: str, rule: str) -> float:
         raise InputError(f"{argument} is a number beyond 1e308; give {rule.removeprefix('give ')}") from error
 
 
+def number_between(given: Any, unit: str, argument: str, least: float, most: float, rule: str) -> float:
+    number = number_in(given, unit, argument, rule)
+    if not least <= number <= most:
+        raise InputError(f"{argument} = {given!r}; it must be {rule}")
+    return number
+
+
 def as_number(text: str) -> float:
     try:
         return float(text)

@@ -17,8 +17,11 @@ def file_hash(path: Path | None) -> str | None:
     return None if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def made_folder(path: Path, label: str = "", what: str = "results cannot be written there") -> Path:
+def made_folder(given: str | Path, label: str = "", what: str = "results cannot be written there") -> Path:
     """A folder, made where it is missing, before anything is computed for it."""
+    if not isinstance(given, str | Path) or not given:
+        raise InputError(f"{label or 'folder'} = {given!r}; give the path of a folder")
+    path = Path(given)
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -36,9 +36,13 @@ class StateSpace:
         """Deviations of the outputs, shape (k, p), after a step of the inputs at t = 0.
 
         ``times``: [s], not before 0 and in equal distances; of a step map, multiples of its step."""
-        u = np.asarray(change, dtype=float)
-        distance = times[1] - times[0] if len(times) > 1 else 0.0
-        A, B = self._over(distance)
+        u, times = (np.atleast_1d(np.asarray(one, dtype=float)) for one in (change, times))
+        if u.shape != (len(self.inputs),):
+            raise InputError(f"change = {change!r}; give one number for each input: {', '.join(self.inputs)}")
+        distances = np.diff(times) if len(times) > 1 else np.zeros(1)
+        if times.ndim != 1 or not times.size or times[0] < -1e-9 or np.ptp(distances) > 1e-9:
+            raise InputError("times: give one or more, from 0 on and in equal distances, such as np.arange(0, 5, 0.01)")
+        A, B = self._over(distances[0])
         x, rows = self._over(times[0])[1] @ u, []
         for _ in times:
             rows.append(self.C @ x + self.D @ u)

@@ -106,6 +106,8 @@ def admittance(
     if method not in METHODS:
         raise InputError(f"method = {method!r}; choose from {', '.join(METHODS)}")
     low, high = frequency_range(frequencies)
+    if not low:
+        raise InputError(f"frequencies = {frequencies!r}; the lowest must be above 0 Hz, such as 0.05")
     require_fitting()
     description = bound_fmu(path_of(fmu, "fmu"), binding_path(binding))
     given = values_for(description, plain(values))

@@ -83,6 +83,10 @@ def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "
     return Case(load_case(case, trust_fmus=trusted))
 
 
+class NoSuchAttributeError(InputError, AttributeError):
+    """A case has nothing of that name."""
+
+
 class _Late:
     """A method of `studies`, which is imported where one is first asked for: it takes a second, and `load` none."""
 
@@ -164,7 +168,9 @@ class Case:
         def __getattr__(self, name: str) -> Any:
             room = rooms().get(name)
             if room is None or name.startswith("_"):
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+                scenario = None if name.startswith("_") else import_module("orchestrator.api.scenario").Scenario
+                of = f"; it belongs to a scenario: case.scenario(…).{name}" if hasattr(scenario, name) else ""
+                raise NoSuchAttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{of}")
             from orchestrator.api.studies import of_study  # noqa: PLC0415 - as `_Late`
 
             return MethodType(of_study(name, study_in(room)), self)

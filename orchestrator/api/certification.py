@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.api.progress import shown_progress
+from orchestrator.asked import number_in
 from orchestrator.asked import path as path_of
 from orchestrator.cases.given import binding_path, plain
 from orchestrator.errors import InputError
@@ -113,9 +114,12 @@ def certify(
         raise InputError(f"pod = {pod!r}; choose from {', '.join(PODS)}")
     file, given = path_of(fmu, "fmu"), plain(values)
     target = None if into is None else path_of(into, "into")
-    chosen = REACTANCES if reactances is None else tuple(reactances)
-    issue = issue_of(code, file, binding_path(binding), given, declared=declared or {}, pod=pod, reactances=chosen,
-                     black_box=black_box)  # fmt: skip
+    rule = "line reactances in pu, such as (0.1, 0.2)"
+    if isinstance(reactances, str) or not isinstance(reactances, Iterable | None):
+        raise InputError(f"reactances = {reactances!r}; give {rule}")
+    chosen = REACTANCES if reactances is None else tuple(number_in(x, "pu", "reactances", rule) for x in reactances)
+    issue = issue_of(code, file, binding_path(binding), given, declared=plain(declared, "declared"), pod=pod,
+                     reactances=chosen, black_box=black_box)  # fmt: skip
     if target is not None:
         check_target(file, target)
     usual = Path("results") / f"certify_{file.stem}{'' if code == NTS631 else f'_{code}'}"

@@ -35,6 +35,8 @@ def catalogue_model(name: str, parts: Mapping[str, str] | None = None) -> Model:
         raise InputError(
             f"model {name!r} is built from the [network] table of a case file, by `gfor run` or `gfor modes`"
         )
+    if not isinstance(parts, Mapping | None):
+        raise InputError(f"parts = {parts!r}; give models by part, such as {{'machine': 'genrou', 'exciter': 'sexs'}}")
     chosen, known = dict(parts or {}), parts_of(name)
     unknown = [part for part in chosen if part not in known]
     if unknown:

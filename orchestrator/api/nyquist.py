@@ -5,6 +5,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from orchestrator.api.case import Case
+from orchestrator.asked import number_in
+from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.port import start_of
 from orchestrator.cases.given import case_values, plain
@@ -15,14 +18,13 @@ from orchestrator.immittance.scan_files import ENDINGS
 from orchestrator.immittance.study import CutRequest, CutResult, study_cut
 from orchestrator.immittance.view import Nyquist
 from orchestrator.sensitivities.parameters import Parameter, parameters_in
-from orchestrator.units import to_unit
 
 _FMU = "device."  # before the names of an FMU's own parameters
 
 
 def nyquist(
-    device: str | Path, network: str | Path | None = None, *, frequency: float | str = 50.0, compensation: float = 0.0,
-    angle: float | None = None, voltage: float | str | None = None, bus: str | None = None,
+    device: str | Path | Case, network: str | Path | Case | None = None, *, frequency: float | str = 50.0,
+    compensation: float = 0.0, angle: float | None = None, voltage: float | str | None = None, bus: str | None = None,
     components: Sequence[str] = (), scenario: str | None = None, values: Mapping[str, Any] | None = None,
     scr: float | None = None, x_r: float = 10.0, rating: float | str | None = None,
 ) -> Nyquist:  # fmt: skip
@@ -71,13 +73,19 @@ def nyquist(
     >>> gfor.nyquist("two_area", components=["gfor"], scenario="gfor").verdict
     'stable'
     """
-    rated = None if rating is None else to_unit(rating, "MVA")
+    rated = None if rating is None else number_in(rating, "MVA", "rating", "a rating in MVA, such as 100")
+    share = number_in(compensation, "", "compensation", "a share in percent, such as 30") / 100
     return Asked(
-        str(device), None if network is None else str(network), scenario, plain(values),
-        frequency=to_unit(frequency, "Hz"), compensation=compensation / 100, angle=angle, bus=bus,
-        components=tuple(components), scr=scr, x_r=x_r, rating_mva=rated,
-        kilovolt=None if voltage is None else to_unit(voltage, "kV"),
+        _place(device, "device"), None if network is None else _place(network, "network"), scenario, plain(values),
+        trust_fmus=any(isinstance(one, Case) and one.file.trust_fmus for one in (device, network)),
+        frequency=number_in(frequency, "Hz", "frequency", "one in Hz, such as 50"), compensation=share, angle=angle,
+        bus=bus, components=tuple(components), scr=scr, x_r=x_r, rating_mva=rated,
+        kilovolt=None if voltage is None else number_in(voltage, "kV", "voltage", "a voltage in kV, such as 230"),
     ).judged()  # fmt: skip
+
+
+def _place(given: str | Path | Case, argument: str) -> str:
+    return str(given.file.path if isinstance(given, Case) else path_of(given, argument))
 
 
 class Asked:

@@ -74,8 +74,8 @@ class Modes:
     def __len__(self) -> int:
         return len(self.result.modes)
 
-    def __getitem__(self, index: int) -> Mode:
-        return self.result.modes[index]
+    def __getitem__(self, index: int | str) -> Mode:
+        return self.named[index] if isinstance(index, str) else self.result.modes[index]
 
     def table(self) -> pd.DataFrame:
         """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states."""
@@ -120,7 +120,7 @@ class Modes:
         """Write what ``gfor modes --out`` leaves into a folder."""
         from orchestrator.study.files import write_modes  # noqa: PLC0415 - plots: a second to import
 
-        place = made_folder(Path(folder), "folder")
+        place = made_folder(folder, "folder")
         write_modes([self.result], place)
         return place
 
@@ -290,7 +290,7 @@ class Run:
         from orchestrator.results.storage import save_netcdf  # noqa: PLC0415 - as below
         from orchestrator.study.files import save_run, save_study  # noqa: PLC0415 - plots: a second to import
 
-        place, run_id, name = made_folder(Path(folder), "folder"), new_run_id(), self.result.modes.prepared.name
+        place, run_id, name = made_folder(folder, "folder"), new_run_id(), self.result.modes.prepared.name
         scenario = ScenarioFolder(place, name, run_id)
         save_netcdf(self.result.dataset, scenario.path / TRAJECTORY)
         save_run(self.result, scenario, csv=False)
@@ -315,9 +315,7 @@ class Run:
         """
         from orchestrator.study.mode_plots import draw_signal  # noqa: PLC0415 - a second to import
 
-        if signal is not None and not isinstance(signal, str):
-            raise InputError(f"signal = {signal!r}; give one signal, 'a.b' or 'a.b - c.d', and plot each with its ax")
-        expression = signal or self._first_plotted()
+        expression = self._first_plotted() if signal is None else signal
         unit = self.signal(expression).attrs.get("units") or self.dataset[expression.split(" - ")[0].strip()].units
         axes = axes_or_new(ax, 7.2, 3.2)
         draw_signal(axes, [self.result], expression, first=curves_on(axes))

@@ -14,7 +14,7 @@ from orchestrator.api.linear import LinearSystem
 from orchestrator.api.methods import method
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
-from orchestrator.asked import Names, flag, whole_number
+from orchestrator.asked import Names, flag, number_between, whole_number
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
@@ -299,7 +299,7 @@ class Scenario:
 
     steps = method("Scenario.steps", StepsRequest, steps_of)
 
-    def strengths(self, converter_current: float = 0.0, rating: float | None = None) -> list[BusStrength]:
+    def strengths(self, converter_current: float = 0.0, rating: float | str | None = None) -> list[BusStrength]:
         """Short-circuit power of every bus, with the short-circuit ratio of the converters there.
 
         Parameters
@@ -321,7 +321,11 @@ class Scenario:
         >>> weakest.bus, round(weakest.s_sc_mva)
         ('bus_12', 2751)
         """
-        return ShortCircuit.of(self.prepared).strengths(converter_current, rating)
+        rule = "a converter's current in pu of its rating, from 0 to 10: 1.1 is 110 %"
+        current = number_between(converter_current, "pu", "converter_current", 0.0, 10.0, rule)
+        rule = "a rating above 0 in MVA, such as 100 or '100 MVA'"
+        rated = None if rating is None else number_between(rating, "MVA", "rating", 1e-6, 1e6, rule)
+        return ShortCircuit.of(self.prepared).strengths(current, rated)
 
     def linearize(
         self, inputs: Names = (), outputs: Names = (), *, continuous: bool = False, black_box: bool = False

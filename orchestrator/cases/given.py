@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import hashlib
 import re
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.asked import Value, number_in, path, plain_value
+from orchestrator.asked import Value, number_between, number_in, path, plain_value
 from orchestrator.errors import InputError
 from orchestrator.late import pd
 
@@ -41,7 +42,10 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
     flat = flatten(values)
     if twice := given_twice(flat):
         raise InputError(f"{argument}: {twice[0]!r} is given twice, flat and nested; give it once")
-    return {".".join(path): plain_value(value) for path, value in flat}
+    found = {".".join(path): plain_value(value) for path, value in flat}
+    if several := [name for name, value in found.items() if hasattr(value, "__len__") and not isinstance(value, str)]:
+        raise InputError(f"{argument}: {several[0]} is given several values; give one, or vary it with case.sweep(…)")
+    return found
 
 
 def case_values(values: Mapping[str, Any] | None, argument: str = "values") -> dict[str, Value]:
@@ -90,6 +94,9 @@ def kept(given: Any, name: str, argument: str) -> Path:
         table = given if hasattr(given, "to_csv") else pd.DataFrame.from_dict(given, orient="index")
     if not hasattr(table, "columns"):
         raise InputError(f"{argument}: a {type(given).__name__} has no columns; give a DataFrame, a row each")
+    if table is given and (gaps := [str(name) for name in table if table[name].isna().any()]):
+        warnings.warn(f"question: {argument}: {', '.join(gaps)}: the case's value is taken at NaN; is it meant?",
+                      stacklevel=2)  # fmt: skip
     named = {"time", "name"} & set(table.columns)
     return keep(table.to_csv(index=not named, index_label=None if named else "name"), name)
 
@@ -109,19 +116,12 @@ def in_seconds(time: Time | None, argument: str) -> float | None:
     """A time [s]; None for None."""
     if time is None:
         return None
-    number = number_in(time, "s", argument, "a time above 0 and finite, such as 5.0 or '200 us'")
-    if not 0 < number < float("inf"):
-        raise InputError(f"{argument} = {time!r}; it must be a time above 0 and finite, such as 5.0 or '200 us'")
-    return number
+    return number_between(time, "s", argument, 5e-324, 1e308, "a time above 0 and finite, such as 5.0 or '200 us'")
 
 
 def moment(time: Any, argument: str) -> float:
     """A time on the axis of a run [s], which begins at 0."""
-    rule = "a time of 0 or later and finite, such as 2.0 or '500 ms'"
-    number = number_in(time, "s", argument, rule)
-    if not 0 <= number < float("inf"):
-        raise InputError(f"{argument} = {time!r}; it must be {rule}")
-    return number
+    return number_between(time, "s", argument, 0.0, 1e308, "a time of 0 or later and finite, such as 2.0 or '500 ms'")
 
 
 def in_megabytes(given: Any, argument: str, least: float) -> float:

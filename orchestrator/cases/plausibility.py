@@ -5,7 +5,7 @@ A question is a warning: the case runs. It is answered by the key ``meant`` of t
 
 import fnmatch
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from orchestrator.cases.build_choices import PARTS
@@ -161,18 +161,28 @@ def question_loading(draft: Draft) -> None:
     question(draft, (d for d in _overloaded(draft) if d.place not in asked))
 
 
-def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
-    for name, plan in draft.system.components.items():
+def overloads(plans: Mapping[str, ComponentPlan], meant: Iterable[str]) -> dict[str, float]:
+    """Units whose operating point exceeds their rating, with what it asks for [pu of the rating]."""
+    found = {}
+    for name, plan in plans.items():
         P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
         if P is None or Q is None or S_n is None or any(unit_of(plan, v) != "pu" for v in ("P_0", "Q_0")):
             continue
         apparent = abs(P) if plan.kind == "machine" else math.hypot(P, Q)
-        if apparent > _FULL:
-            text = (
-                f"the operating point, P_0 = {P:.4g} pu and Q_0 = {Q:.4g} pu, asks for {apparent:.3g} pu of "
-                f"S_n = {S_n:g} MVA, more than the rating of the {plan.kind}"
-            )
-            yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
+        if apparent > _FULL and not any(fnmatch.fnmatchcase(f"{name}.S_n", pattern) for pattern in meant):
+            found[name] = apparent
+    return found
+
+
+def _overloaded(draft: Draft) -> Iterator[UnusualValue]:
+    for name, apparent in overloads(draft.system.components, draft.given.case.meant).items():
+        plan = draft.system.components[name]
+        P, Q, S_n = (value_of(plan, v) for v in ("P_0", "Q_0", "S_n"))
+        text = (
+            f"the operating point, P_0 = {P:.4g} pu and Q_0 = {Q:.4g} pu, asks for {apparent:.3g} pu of "
+            f"S_n = {S_n:g} MVA, more than the rating of the {plan.kind}"
+        )
+        yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
 
 
 # -- one value ---------------------------------------------------------------------------------------

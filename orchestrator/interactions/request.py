@@ -1,6 +1,6 @@
 """What is asked of a study of interactions."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -17,13 +17,17 @@ RANGE_HZ = (0.1, 100.0)
 """Frequencies of the modes that are compared [Hz]: swings, and what converters' controls do up to twice the rated
 frequency, as their network's frame turns with it."""
 
-_DEVICES = FieldKind(
-    "[NAME=]FILE", str, lambda given, argument: {name: path_of(file, argument) for name, file in given.items()},
-    several=True,
-)  # fmt: skip
-_BINDINGS = FieldKind(
-    "[NAME=]FILE", str, lambda given, argument: {name: binding_path(file) for name, file in given.items()}, several=True
-)
+
+def _files(read: Callable[[Any, str], Any]) -> FieldKind:
+    def check(given: Any, argument: str) -> dict[str, Any]:
+        if given and not isinstance(given, Mapping):
+            raise InputError(f"{argument} = {given!r}; give files by name, such as {{'vendor': 'vendor.fmu'}}")
+        return {name: read(file, argument) for name, file in dict(given or {}).items()}
+
+    return FieldKind("[NAME=]FILE", str, check, several=True)
+
+
+_DEVICES, _BINDINGS = _files(path_of), _files(lambda given, _: binding_path(given))
 
 
 @dataclass(frozen=True)

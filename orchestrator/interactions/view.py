@@ -104,7 +104,7 @@ class Interactions:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write tables, ``interactions.json`` and the page ``interactions.html`` into a folder; give their paths."""
-        judgement, place = self.judgement, made_folder(Path(folder))
+        judgement, place = self.judgement, made_folder(folder)
         tables = {
             MODES: modes_table(judgement).records(),
             PAIRS: [_pair(pair) for pair in judgement.pairs],

@@ -9,6 +9,7 @@ import numpy as np
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
+from orchestrator.cases.plausibility import overloads
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.service import without_units
@@ -104,6 +105,13 @@ class ItemPreparation:
     def warnings(self, prepared: PreparedScenario) -> tuple[str, ...]:
         """Questions that the scenario without the item's values does not raise."""
         return tuple(str(question) for question in prepared.questions if str(question) not in self._asked)
+
+    def overloads(self, prepared: PreparedScenario) -> dict[str, float]:
+        """Units beyond their rating [pu of it], and further than without the item's values."""
+        meant = self._case.table.meant
+        before = overloads(self.base.system.components, meant)
+        found = overloads(prepared.system.components, meant)
+        return {name: load for name, load in found.items() if load > before.get(name, 0.0) + 0.01}
 
     def _prepare(self, values: Mapping[str, Value], dispatch: Dispatch | None = None) -> PreparedScenario:
         case = replace(self._case, sharing=SharingRule.SLACK)  # what a point has out of service is in its generation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from itertools import zip_longest
 from pathlib import Path
@@ -21,6 +22,8 @@ from orchestrator.report.notebook import page
 from orchestrator.results.manifest import made_now
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import write_text
+
+_OPTION = re.compile(r"--([a-z][a-z-]+)")  # Python's keyword is spelt like it
 
 
 class ControllerDesign:
@@ -49,6 +52,11 @@ class ControllerDesign:
     def warnings(self) -> tuple[str, ...]:
         """What is to be borne in mind of the design."""
         return self.result.warnings
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in one sentence, with the bound where the gain stands at one."""
+        return _OPTION.sub(lambda found: found[1].replace("-", "_"), verdict(self.result))
 
     def table(self) -> pd.DataFrame:
         """The mode before and after: eigenvalue [1/s, rad/s] and damping ratio, beside the required one."""
@@ -92,13 +100,13 @@ class ControllerDesign:
         return file
 
     def __repr__(self) -> str:
-        said = "met" if self.met else "not met"
-        return f"<ControllerDesign {self.result.request.controller} for {self.result.case}: requirement {said}>"
+        said = "requirement met" if self.met else f"requirement not met: {self.verdict}"
+        return f"<ControllerDesign {self.result.request.controller} for {self.result.case}: {said}>"
 
     def _repr_html_(self) -> str:
         setting = [f"{name} = {value}" for name, value in self.parameters.items()]
-        lines = [self.result.stability.sentence(), *(f"warning: {text}" for text in self.warnings), ", ".join(setting)]
-        return page(repr(self).strip("<>"), lines, self.table())
+        lines = [self.verdict, self.result.stability.sentence(), *(f"warning: {text}" for text in self.warnings)]
+        return page(repr(self).strip("<>").partition(": the")[0], [*lines, ", ".join(setting)], self.table())
 
 
 def parameter_file_path(given: str | Path, argument: str = "path") -> Path:

@@ -131,7 +131,8 @@ class _Worker:
             prepared = self._preparation.prepared(item)
             warnings = self._preparation.warnings(prepared.scenario)
             found = self._modes(prepared.scenario, neighbour, warnings, count=count)
-            found.record = replace(found.record, text=prepared.text)
+            beyond = self._preparation.overloads(prepared.scenario)
+            found.record = replace(found.record, text=prepared.text, beyond=beyond)
             return found
         except Exception as error:  # an error that nobody expected must neither end the other points nor be hidden
             kind, text, lasting = failure(error, item)

@@ -16,6 +16,7 @@ class ItemRecord:
     status: Status
     text: str = ""
     warnings: tuple[str, ...] = ()
+    beyond: dict[str, float] = field(default_factory=dict)  # units beyond their rating [pu of it]
     residual: float = float("nan")
     # whether no mode grows; None where that is not known: nothing was computed, growth was not ``counted``, or a limit
     # is so close that the linear model is doubtful

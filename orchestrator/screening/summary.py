@@ -76,6 +76,17 @@ class Summary:
         self.modes = self._modes()
 
     @property
+    def beyond(self) -> str:
+        """At how many items a unit is beyond its rating, and which one most; "" where none is."""
+        worst = [max((load, name, item.point.name, item.outage.name) for name, load in item.record.beyond.items())
+                 for item in self.result.items if item.record.beyond]  # fmt: skip
+        if not worst:
+            return ""
+        load, unit, *at = max(worst)
+        number = f"at {len(worst)} of {len(self.result.items)} a unit is beyond its rating"
+        return f"{number}, most {unit} with {100 * load:.3g} % ({', '.join(at)})"
+
+    @property
     def stable(self) -> bool | None:
         """Whether nothing grows anywhere; None where an item has no verdict, or is missing, and none grows."""
         if self.unstable:

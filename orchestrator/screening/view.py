@@ -77,7 +77,7 @@ class Screening:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write ``items.csv``, ``modes.csv``, ``screening.json``, ``cells.json`` and the page ``screening.html``."""
-        place = made_folder(Path(folder))
+        place = made_folder(folder)
         with staged(place, new_run_id()) as staging:
             items_table(self.summary).save(staging / ITEMS)
             _every_mode(self.summary).save(staging / MODES)
@@ -262,6 +262,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "slowest_growth_counted": summary.slowest,
         "nothing_restores": [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free],
         "counts": {str(status): number for status, number in summary.counts.items()},
+        "beyond_rating": summary.beyond or None,
         "unstable": [_where(item) for item in summary.unstable],
         "failures": [_where(item) | {"status": str(item.record.status), "why": item.record.text}
                      for item in summary.failures()],

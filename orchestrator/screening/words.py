@@ -28,7 +28,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
             if one.item.record.stable is False:
                 worst = one.item
                 break
-        lost = f"; {text}" if (text := not_judged(summary)) else ""
+        lost = "".join(f"; {text}" for text in (not_judged(summary), summary.beyond) if text)
         text = f"{_count(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}{lost}"
         return VerdictSentence(False, "UNSTABLE", text)
     computed = summary.counts[Status.COMPUTED]
@@ -39,6 +39,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
         tail += (
             f"; at {_count(len(summary.free), 'item')}, first at {where(first)}, {zeros_in_words(first.record.zeros)}"
         )
+    tail += f"; {summary.beyond}" if summary.beyond else ""
     if summary.stable:
         text = f"nothing grows at any of {total} points and outages{_but_slowly(summary)}{tail}"
         return VerdictSentence(True, "stable", text)

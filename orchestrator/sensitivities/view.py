@@ -51,7 +51,7 @@ class Sensitivities:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write ``sensitivities.csv`` and ``sensitivities.json``; give their paths."""
-        place = made_folder(Path(folder), "folder")
+        place = made_folder(folder, "folder")
         with staged(place, new_run_id()) as staging:
             save_table(rows_of(self.result), staging / "sensitivities.csv")
             save_json(self.as_json(), staging / "sensitivities.json")

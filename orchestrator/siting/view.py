@@ -76,7 +76,7 @@ class Siting:
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write ``site.json``, ``buses.csv`` and the page ``site.html``, which has a map, into a folder."""
-        place = made_folder(Path(folder), "folder")
+        place = made_folder(folder, "folder")
         with held(place), staged(place, new_run_id()) as staging:
             save_json(self.as_json(), staging / "site.json")
             save_table(rows(self.result), staging / "buses.csv")

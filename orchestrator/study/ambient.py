@@ -130,7 +130,7 @@ class AmbientModes:
 
     def save(self, folder: str | Path) -> None:
         """Write ``ambient.json``, ``.csv``, ``.png`` and ``.html``."""
-        with staged(made_folder(Path(folder), "folder"), new_run_id()) as staging:
+        with staged(made_folder(folder, "folder"), new_run_id()) as staging:
             save_json(self.as_json(), staging / "ambient.json")
             save_table(self.table().to_dict("records"), staging / "ambient.csv", [*self.table()])
             self.save_picture(staging / "ambient.png")

@@ -97,6 +97,8 @@ def require_numbers(curve: xr.DataArray, expression: str, label: str) -> None:
 
 
 def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
+    if not isinstance(expression, str):
+        raise InputError(f"signal = {expression!r}; give one signal, 'a.b' or the difference 'a.b - c.d' of two")
     found = signal(dataset, expression)
     if found is None:
         known = list(map(str, dataset.data_vars))

@@ -93,7 +93,7 @@ class ParameterSweep:
         """Write ``sweep.nc``, ``sweep.csv``, ``cells.json`` and the plots, as ``gfor sweep`` does; give their paths."""
         from orchestrator.sweep.plots import save_sweep_plots  # noqa: PLC0415 - a second to import
 
-        place = made_folder(Path(folder))
+        place = made_folder(folder)
         with staged(place, new_run_id()) as staging:
             tables = save_sweep(self.samples, staging)
             plots = save_sweep_plots(self.samples, staging)

@@ -222,11 +222,68 @@ def fmu(tmp_path_factory):
         (lambda case: case.scenario("gfor").run(recording="rec"), "recording = 'rec'; give a RecordingFolder"),
         (lambda case: case.scenario("gfor").run(federates="gfor"), r"federates = 'gfor'; give Federates"),
         (lambda _: gfor.read_linear_model(None), "fmu = None; give the path of a file"),
+        (lambda case: case.scenario("gfor", {"grid.X_L": np.array([0.1, 0.2])}), r"grid.X_L is given several values"),
+        (lambda _: gfor.certify(__file__, "miso", declared=1.1), r"declared = 1.1; give values by name"),
+        (lambda _: gfor.certify(__file__, reactances="0.1"), "reactances = '0.1'; give line reactances in pu"),
+        (lambda _: gfor.certify(__file__, reactances=0.1), "reactances = 0.1; give line reactances in pu"),
+        (lambda _: gfor.certify(__file__, reactances=[None]), "reactances = None; give line reactances in pu"),
+        (lambda _: gfor.build("synchronous_generator", parts="genrou"), "parts = 'genrou'; give models by part"),
+        (lambda case: case.interactions("gfor", devices="a.fmu"), "devices = 'a.fmu'; give files by name"),
+        (lambda case: case.interactions("gfor", bindings="a.toml"), "bindings = 'a.toml'; give files by name"),
+        (lambda _: gfor.admittance(__file__, frequencies=(0, 10)), r"\(0, 10\); the lowest must be above 0"),
+        (lambda _: gfor.nyquist(3), "device = 3; give the path of a file"),
+        (lambda case: gfor.nyquist(case, frequency="x"), "frequency: 'x' is not a number"),
+        (lambda case: gfor.nyquist(case, compensation=None), "compensation = None; give a share"),
+        (lambda case: gfor.nyquist(case, rating="5 kV"), "rating: '5 kV' is in kV"),
+        (lambda case: gfor.nyquist(case, voltage=np.array([1, 2])), "voltage = .*; give a voltage in kV"),
+        (lambda case: case.modes(), r"it belongs to a scenario: case.scenario\(…\).modes"),
+        (lambda case: case.run(), r"it belongs to a scenario: case.scenario\(…\).run"),
     ],
 )
 def test_an_argument_of_another_kind_is_named(case, call, words):
     with pytest.raises(InputError, match=words):
         call(case)
+
+
+@pytest.mark.parametrize("nothing", [None, ["grid.v"], 3])
+def test_a_signal_is_one_name(run, nothing):
+    with pytest.raises(InputError, match=r"signal = .*; give one signal"):
+        run.signal(nothing)
+    with pytest.raises(InputError, match=r"folder = .*; give the path of a folder"):
+        run.save(None)
+
+
+@pytest.mark.parametrize("current", [-1, 110, np.nan, "1.1 MW", True, None])
+def test_a_current_and_a_rating_are_in_their_range(current):
+    scenario = gfor.load("infinite_bus").scenario("dip")  # refused before its power flow is asked for, which it lacks
+    with pytest.raises(
+        InputError, match=r"converter_current.* a converter's current in pu|converter_current: '1.1 MW'"
+    ):
+        scenario.strengths(current)
+    with pytest.raises(InputError, match=r"rating.* a rating above 0 in MVA|rating: 'x'"):
+        scenario.strengths(1.1, rating={110: 0, -1: -1, None: "x"}.get(current, np.nan))
+
+
+def test_a_mode_is_found_by_its_name():
+    modes = gfor.load("two_area").scenario("gfor").modes()
+    assert modes["electromechanical"] == modes.named["electromechanical"]
+    with pytest.raises(InputError, match="has no mode named 'inter'"):
+        modes["inter"]
+
+
+def test_nyquist_takes_a_case(case):
+    assert gfor.nyquist(case, components=["gfor"], scenario="gfor").verdict == "stable"
+
+
+def test_a_step_response_is_of_all_inputs_at_equal_distances():
+    model = gfor.load("infinite_bus").scenario("load_step").linearize(["gfor.droop.delta_P_ref"], ["gfor.omega"])
+    times = np.arange(0.0, 0.1, 0.01)
+    assert np.array_equal(model.step_response(0.01, times), model.step_response([0.01], list(times)))
+    with pytest.raises(InputError, match=r"give one number for each input: gfor.droop.delta_P_ref"):
+        model.step_response([0.01, 0.0], times)
+    for wrong in ([0.0, 0.01, 0.03], [], [-1.0, 0.0]):
+        with pytest.raises(InputError, match="equal distances"):
+            model.step_response(0.01, wrong)
 
 
 def test_what_was_recorded_cannot_be_written_over(run):

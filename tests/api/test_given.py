@@ -12,6 +12,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.cases.case import BUILT_IN
+from orchestrator.cases.given import kept
 from orchestrator.errors import InputError
 
 
@@ -52,6 +53,11 @@ def test_points_are_tables_and_mappings():
     assert table["least_damping_percent"].dropna().is_monotonic_increasing
     with pytest.raises(InputError, match=r"points\.csv, line 1: column 'grid\.X_l'"):
         case.screen({"short": {"grid.X_l": 0.1}}, scenario="gfor")
+
+
+def test_a_gap_in_a_table_of_points_is_asked_about():
+    with pytest.warns(UserWarning, match="question: points: load: the case's value is taken at NaN"):
+        kept(pd.DataFrame({"load": [np.nan, 0.9], "hours": [1.0, 2.0]}), "points.csv", "points")
 
 
 def test_a_point_without_values_is_the_case_as_it_is():

@@ -6,6 +6,7 @@ import pytest
 from orchestrator.coordinated_design.objective import Aim
 from orchestrator.coordinated_design.point import PointModes
 from orchestrator.coordinated_design.verdict import PointsVerdict, judged
+from orchestrator.coordinated_design.words import verdict_sentence
 from orchestrator.operating_points.item import Status
 from orchestrator.operating_points.outages import Outage
 from orchestrator.operating_points.points_file import OperatingCase
@@ -45,3 +46,10 @@ def test_a_design_that_harms_another_mode_is_not_met(beside, left, met, wanted):
 def test_the_least_damped_of_all_modes_decides():
     assert verdict([(0.86, 0.053), (0.93, 0.053)], [(0.86, 0.062), (0.93, 0.198)], 0.1).met is False
     assert verdict([(0.86, 0.053), (0.93, 0.053)], [(0.86, 0.11), (0.93, 0.198)], 0.1).met is True
+
+
+@pytest.mark.parametrize(("after", "unmoved"), [((0.934, 0.0901), False), ((0.942, 0.0720), True)])
+def test_a_mode_that_gained_two_points_of_damping_was_moved(after, unmoved):
+    found = verdict([(0.942, 0.0719)], [after], 0.09)
+    assert found.limiting.unmoved is unmoved
+    assert ("which these controllers hardly move" in verdict_sentence(found)) is unmoved

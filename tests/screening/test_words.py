@@ -1,15 +1,18 @@
 """What is said of growth beside the critical modes, of warnings, and of the scenario."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import orchestrator as face
 from orchestrator.cases.case import load_case
 from orchestrator.operating_points.item import Status
 from orchestrator.points.executor import Serial
 from orchestrator.points.points import Work
 from orchestrator.points.store import PointStore
+from orchestrator.report.html.chapters import _screening
 from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.request import ScreeningRequest
 from orchestrator.screening.study import plan_screening, run_screening
@@ -66,6 +69,21 @@ def test_a_warning_names_its_first_point(screened):
     items = [replace(item, record=replace(item.record, warnings=("a limit is close",))) for item in screened.items]
     (text,) = remarks(Summary(replace(screened, items=items)))
     assert text == "at 2 of 2, first at in, intact: a limit is close"
+
+
+def test_units_beyond_their_rating_are_in_the_verdict_and_the_report():
+    """Where nothing grows, a steady state that no plant bears is no answer."""
+    found = face.load("two_area").screen({"usual": {}, "heavy": {"gfor.P_mw": 1600}}, scenario="gfor")
+    usual, heavy = (item.record for item in found.result.items)
+    assert usual.beyond == {}
+    assert heavy.beyond == {"gfor": pytest.approx(1600 / found.result.plan.prepared.values["gfor.S_n"], rel=0.05)}
+    said = f"at 1 of 2 a unit is beyond its rating, most gfor with {100 * heavy.beyond['gfor']:.3g} % (heavy, intact)"
+    assert found.stable
+    assert found.verdict.endswith(f"; {said}")
+    assert found.as_json()["beyond_rating"] == said
+    assert _screening(Path("screening.json"), found.as_json()).not_judged == [said]
+    calm = replace(found.result, items=found.result.items[:1])
+    assert "rating" not in verdict_sentence(Summary(calm))
 
 
 def test_what_was_searched_in_the_range_alone_is_not_stable(screened):

@@ -138,7 +138,8 @@ def _screening(file: Path, c: Content) -> Chapter:
     if worst := min((m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None):
         answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
                    f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}")  # fmt: skip
-    lost = [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
+    lost = [c["beyond_rating"]] if c.get("beyond_rating") else []
+    lost += [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
     counted = "growth was counted at all frequencies" if c["counted_at_all_frequencies"] else (
         "growth outside of the range was counted at some points only")  # fmt: skip
     return Chapter(
