@@ -22,7 +22,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.certification.anew import chosen_points
 from orchestrator.certification.case_file import CASE, FMU, WITH
-from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.files import JSON, read_record
 from orchestrator.certification.form import NORM
 from orchestrator.certification.issue import NTS631

@@ -1,19 +1,20 @@
 """The report on a damping test as one HTML page, with every figure that a person needs to check it by hand."""
 
-from collections.abc import Iterator, Mapping
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 from html import escape
+from pathlib import Path
 
+from orchestrator.analysis.linear_model import PACKED
 from orchestrator.binding.binding import read_table
-from orchestrator.certification import texts
 from orchestrator.certification.case_file import BINDING, FMU, WITH, WITHOUT
 from orchestrator.certification.environment import environment
-from orchestrator.certification.figures import commands
+from orchestrator.certification.figures import commands, parameter_rows
 from orchestrator.certification.judgement import LOWERED, PointVerdict, TimeVerdict
-from orchestrator.certification.parameters import parameter_rows
-from orchestrator.certification.point import FREQUENCY
+from orchestrator.certification.point import CONVERTER, FREQUENCY, PointResult
 from orchestrator.certification.report_criteria import before, eigenvalues, responses, verdict
-from orchestrator.certification.request import missing_reactances
+from orchestrator.certification.request import REACTANCES, missing_reactances
 from orchestrator.certification.study import Certification
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 from orchestrator.fmi.origin import read_origin
@@ -22,6 +23,34 @@ from orchestrator.fmi.values import Scalar, as_text
 from orchestrator.report.html.document import document
 from orchestrator.report.html.elements import Figures, damping, number, table
 from orchestrator.report.linearised import exceptions_in_words
+
+PODS = {"none": "none", "p": "POD-P", "q": "POD-Q", "pq": "POD-P and POD-Q"}
+
+_TEXTS: dict[str, str] = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+STUDY, INTEGRITY = _TEXTS["study"], _TEXTS["integrity"]
+
+
+def reading(pod: str) -> str:
+    """The rules as they were applied, with the decisions where the norm leaves a choice."""
+    watched = "by_frequency" if "p" in pod.removeprefix("none") else "by_power"
+    return _TEXTS["reading"].format(watched=_TEXTS[watched])
+
+
+def converter_model(points: Iterable[PointResult]) -> str:
+    known = [p for p in points if p.modes is not None]
+    boxes = [p for p in known if p.identified is not None]
+    if boxes:
+        orders = ", ".join(dict.fromkeys(str(p.identified) for p in boxes))
+        error = max(p.fit_errors.get(CONVERTER, 0.0) for p in boxes)
+        return (
+            f"Black box: a model identified at its port, of order {orders}; largest relative fitting error {error:.1e}"
+        )
+    if any(p.linearised.get(CONVERTER) == PACKED for p in known):
+        return (
+            "The model packed in the FMU stands for the converter in the modes; it was compared with its own response"
+        )
+    return "White box: the FMU's own states were perturbed" if known else "Modes of the converter are not known"
+
 
 _LINE = '<span class="blank"></span>'  # A line to be filled in by hand
 
@@ -49,9 +78,9 @@ def converter(c: Certification, hashes: Hashes) -> str:
         "Rating": _rating(c), "Voltage": _voltage(c),
         "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
         "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",
-        "Damping controllers": f"{texts.PODS[c.pod]}: {c.controllers.source}",
+        "Damping controllers": f"{PODS[c.pod]}: {c.controllers.source}",
         "Watched in time": signal_name(c.signal),
-        "In the modes": texts.converter_model(c.points[WITH, v.X_L] for v in c.verdicts),
+        "In the modes": converter_model(c.points[WITH, v.X_L] for v in c.verdicts),
         "Linear models": exceptions_in_words(c.linearised, c.fit_errors)
         or ("all by perturbing the running FMUs" if c.linearised else "not recorded"),
     }  # fmt: skip
@@ -124,7 +153,7 @@ def provenance(c: Certification, hashes: Hashes) -> str:
     return (
         f"{machine}{files}<p>Steady states hold to {worst:.1e} pu in one communication step. Any point can be computed "
         f"again in the folder of this page; the case file holds every value that was set. For X_L = {X_L:g} pu:</p>"
-        f"<ul>{listed}</ul>{texts.INTEGRITY}"
+        f"<ul>{listed}</ul>{INTEGRITY}"
         f"<details data-print><summary>Case file</summary><pre>{text}</pre></details>"
     )
 
@@ -136,7 +165,7 @@ def page(certification: Certification, hashes: Mapping[str, str | None], made: d
     figures = Figures()
     content = [
         ("For whom and by whom", details(certification)),
-        ("What was tested", converter(certification, hashes) + texts.STUDY),
+        ("What was tested", converter(certification, hashes) + STUDY),
         ("Result at every line reactance", _overview(certification)),
         ("Dampings that the converter lowers", _lowered(certification)),
         ("Stability at all frequencies", _stability(certification)),
@@ -145,7 +174,7 @@ def page(certification: Certification, hashes: Mapping[str, str | None], made: d
         ("Acceptance tests of the FMU", acceptance(certification)),
         ("Parameters of the FMU", parameters(certification)),
         ("Binding", binding(certification, hashes)),
-        ("How the norm was read", texts.reading(certification.pod)),
+        ("How the norm was read", reading(certification.pod)),
         ("Provenance", provenance(certification, hashes)),
     ]
     return document(title(certification), "Norma técnica de supervisión 631, section 5.10", _findings(certification),
@@ -155,7 +184,7 @@ def page(certification: Certification, hashes: Mapping[str, str | None], made: d
 def title(c: Certification) -> str:
     word = _TITLES[c.verdict]
     if c.missing:
-        word += f" ({texts.count(c.missing)})"
+        word += f" ({len(REACTANCES) - len(c.missing)} of {len(REACTANCES)})"
     if c.refused:
         word += ", acceptance tests failed"
     return f"Damping test of {c.description.model_name!r}: {word}"
@@ -167,8 +196,8 @@ def _findings(c: Certification) -> str:
     items.append(f"Eigenvalue criterion: {_where([v for v in c.verdicts if v.judged and not v.eigenvalues_accepted])}")
     bad = [v for v in c.verdicts if v.judged and (v.time is None or not v.time.accepted)]
     items.append(f"Time-domain criterion on {signal_name(c.signal)}: {_where(bad)}")
-    items.append(escape(texts.converter_model(c.points[WITH, v.X_L] for v in c.verdicts)))
-    items.append(f"Damping controllers: {texts.PODS[c.pod]} ({escape(c.controllers.source)})")
+    items.append(escape(converter_model(c.points[WITH, v.X_L] for v in c.verdicts)))
+    items.append(f"Damping controllers: {PODS[c.pod]} ({escape(c.controllers.source)})")
     checked = "not run" if c.acceptance is None else "no check failed" if c.acceptance.trusted else "FAILED"
     items.append(f"Acceptance tests of the FMU (gfor fmu check): {checked}")
     items += _least_and_growth(c)

@@ -11,7 +11,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.case import Case, load
 from orchestrator.certification.case_file import CASE
 from orchestrator.certification.certificate import Certificate
-from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row_pictures import pictures_of
 from orchestrator.certification.files import JSON, RESPONSES, read_record

@@ -31,9 +31,6 @@ _NAMED, _LITTLE = 4, 5e-3  # buses and devices that take part, in a line, and wh
 Report = Callable[[str], None]
 
 
-def _silent(text: str) -> None: ...
-
-
 class Nyquist:
     """What was found at a cut. `nyquist` makes it.
 
@@ -61,7 +58,7 @@ class Nyquist:
         return self.result.judgement.reasons
 
     def retune(
-        self, parameters: Sequence[str] = (), *, distance: float = GOAL, report: Report = _silent
+        self, parameters: Sequence[str] = (), *, distance: float = GOAL, report: Report = lambda text: None
     ) -> list[Retuned]:
         """Follow the distance from −1 over parameters of the device, and find the least change of each that is enough.
 

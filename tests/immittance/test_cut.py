@@ -14,8 +14,8 @@ from orchestrator.immittance.cut import cut_of
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.participation import critical
 from orchestrator.immittance.sides import Sampled, Together
+from orchestrator.immittance.strength import critical
 
 
 @pytest.mark.parametrize(

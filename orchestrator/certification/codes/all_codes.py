@@ -7,9 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from orchestrator.certification.codes import criteria as c
 from orchestrator.certification.codes import rte
-from orchestrator.certification.codes.declared import Declaration, checked
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps, voltage, weakening
-from orchestrator.certification.codes.row import CodeRow, GridCode, Judge
+from orchestrator.certification.codes.row import CodeRow, Declaration, GridCode, Judge, checked
 
 RATIOS = (10.0, 3.0, 2.0, 1.5, 1.25)
 """Short-circuit ratios, down from 20: MISO BPM-015 r32 appendix H, AEMO's test framework of January 2024."""

@@ -10,7 +10,7 @@ import orchestrator as gfor
 from orchestrator.certification.anew import ROWS, chosen_rows
 from orchestrator.certification.codes import bench_point
 from orchestrator.certification.codes.all_codes import CODES, ERCOT
-from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.files import save
 from orchestrator.certification.request import CertificationRequest
