@@ -5,10 +5,10 @@ No check runs here and no verdict is made here: code of the FMU can change whate
 import ctypes
 import gc
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
-from orchestrator.acceptance.allocations import memory_in_use, open_files
 from orchestrator.fmi.binary import absent_functions, load, unload
 from orchestrator.fmi.bound import BoundComponent
 from orchestrator.fmi.component import Component
@@ -18,6 +18,41 @@ from orchestrator.fmi.isolation_worker import Worker
 from orchestrator.fmi.loaded import LoadedComponent
 from orchestrator.fmi.mailbox import DIED, Served
 from orchestrator.fmi.port import BoundDescription, PortMap, without_binding
+
+_MALLINFO2 = ["arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"]
+
+
+class _MallocInfo(ctypes.Structure):
+    _fields_ = tuple((name, ctypes.c_size_t) for name in _MALLINFO2)
+
+
+def memory_in_use() -> int | None:
+    """Bytes that are allocated now; the resident size where the C library does not tell, None where nothing does.
+
+    Garbage of Python is freed before, so that it does not matter when Python would have done so."""
+    gc.collect()
+    try:
+        info = ctypes.CDLL(None).mallinfo2
+        info.restype = _MallocInfo
+        now = info()
+        # An interpreter keeps small objects in blocks of its own, which malloc does not see.
+        return int(now.uordblks + now.hblkhd) + 32 * sys.getallocatedblocks()
+    except (AttributeError, OSError, TypeError):
+        pass
+    if sys.platform == "linux":
+        import resource  # noqa: PLC0415 - only where it exists
+
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    return None
+
+
+def open_files() -> int:
+    """Files that this process has open; 0 where the platform does not tell."""
+    try:
+        return len(list(Path("/proc/self/fd").iterdir()))
+    except OSError:
+        return 0
+
 
 _MOST = 256  # instances at the same time
 

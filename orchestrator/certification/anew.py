@@ -17,8 +17,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.cases.case import load_case
 from orchestrator.certification.case_file import BINDING, CASE, FMU, WITH, WITHOUT, lay_files
 from orchestrator.certification.codes.all_codes import code_for
-from orchestrator.certification.codes.bench_case import case_name, write_row
-from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
+from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, case_name, compute_row, write_row
 from orchestrator.certification.codes.row import CodeRow, GridCode
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import RESPONSES

@@ -13,7 +13,7 @@ import xarray as xr
 from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.case_file import BINDING, CASE, FMU
 from orchestrator.certification.certificate import Certificate, Judged
-from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.codes.record import code_json, code_page, code_responses
 from orchestrator.certification.figures import certification_json, responses_dataset
 from orchestrator.certification.report import page

@@ -1,26 +1,161 @@
 """The report on a damping test as one HTML page, with every figure that a person needs to check it by hand."""
 
-from collections.abc import Iterator, Mapping
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 from html import escape
+from pathlib import Path
 
-from orchestrator.certification import texts
-from orchestrator.certification.case_file import WITH, WITHOUT
+from orchestrator.analysis.linear_model import PACKED
+from orchestrator.binding.binding import read_table
+from orchestrator.certification.case_file import BINDING, FMU, WITH, WITHOUT
+from orchestrator.certification.environment import environment
+from orchestrator.certification.figures import commands, parameter_rows
 from orchestrator.certification.judgement import LOWERED, PointVerdict, TimeVerdict
+from orchestrator.certification.point import CONVERTER, FREQUENCY, PointResult
 from orchestrator.certification.report_criteria import before, eigenvalues, responses, verdict
-from orchestrator.certification.report_document import (
-    acceptance,
-    binding,
-    converter,
-    details,
-    parameters,
-    provenance,
-    signal_name,
-)
-from orchestrator.certification.request import missing_reactances
+from orchestrator.certification.request import REACTANCES, missing_reactances
 from orchestrator.certification.study import Certification
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
+from orchestrator.fmi.origin import read_origin
+from orchestrator.fmi.port import BoundDescription
+from orchestrator.fmi.values import Scalar, as_text
 from orchestrator.report.html.elements import Figures, damping, document, number, table
+from orchestrator.report.linearised import exceptions_in_words
+
+PODS = {"none": "none", "p": "POD-P", "q": "POD-Q", "pq": "POD-P and POD-Q"}
+
+_TEXTS: dict[str, str] = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
+STUDY, INTEGRITY = _TEXTS["study"], _TEXTS["integrity"]
+
+
+def reading(pod: str) -> str:
+    """The rules as they were applied, with the decisions where the norm leaves a choice."""
+    watched = "by_frequency" if "p" in pod.removeprefix("none") else "by_power"
+    return _TEXTS["reading"].format(watched=_TEXTS[watched])
+
+
+def converter_model(points: Iterable[PointResult]) -> str:
+    known = [p for p in points if p.modes is not None]
+    boxes = [p for p in known if p.identified is not None]
+    if boxes:
+        orders = ", ".join(dict.fromkeys(str(p.identified) for p in boxes))
+        error = max(p.fit_errors.get(CONVERTER, 0.0) for p in boxes)
+        return (
+            f"Black box: a model identified at its port, of order {orders}; largest relative fitting error {error:.1e}"
+        )
+    if any(p.linearised.get(CONVERTER) == PACKED for p in known):
+        return (
+            "The model packed in the FMU stands for the converter in the modes; it was compared with its own response"
+        )
+    return "White box: the FMU's own states were perturbed" if known else "Modes of the converter are not known"
+
+
+_LINE = '<span class="blank"></span>'  # A line to be filled in by hand
+
+Hashes = Mapping[str, str | None]
+
+
+def details(c: Certification) -> str:
+    rows = [[label, escape(text).replace("\n", "<br>") or _LINE] for label, text in c.details.rows()]
+    rows += [[f"Signature of the {who}", _LINE] for who in ("tester", "applicant")]
+    return table("Filled in from the file of --details, or by hand", ["", ""], rows, left=2)
+
+
+def signal_name(signal: str) -> str:
+    return "the frequency at bus 2" if signal == FREQUENCY else "SG1's active power"
+
+
+def converter(c: Certification, hashes: Hashes) -> str:
+    origin = read_origin(c.description.path)
+    values = {**c.request.values, **c.controllers.settings, **c.request.study_values}
+    given = {
+        "FMU": c.request.fmu.name, "Model": c.description.model_name, "Description": origin.description,
+        "Author": origin.author, "Version": origin.version, "Made by": origin.generation_tool,
+        "Made on": origin.generated, "Copyright": origin.copyright, "License": origin.license,
+        "FMI": f"{origin.fmi_version}, co-simulation", "Guid": c.description.guid, "SHA-256": hashes[FMU],
+        "Rating": _rating(c), "Voltage": _voltage(c),
+        "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
+        "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",
+        "Damping controllers": f"{PODS[c.pod]}: {c.controllers.source}",
+        "Watched in time": signal_name(c.signal),
+        "In the modes": converter_model(c.points[WITH, v.X_L] for v in c.verdicts),
+        "Linear models": exceptions_in_words(c.linearised, c.fit_errors)
+        or ("all by perturbing the running FMUs" if c.linearised else "not recorded"),
+    }  # fmt: skip
+    rows = [[escape(name), escape(str(value)) or '<span class="soft">not said</span>'] for name, value in given.items()]
+    return table("The converter", ["", ""], rows, left=2)
+
+
+def _rating(c: Certification) -> str:
+    used = float(c.values.get("converter.S_n", 0.0))
+    if isinstance(c.description, BoundDescription):
+        return f"{c.description.port.rating:g} MVA by the binding; {used:g} MVA in the study"
+    info = c.description.variables.get("S_n")
+    return f"{info.start if info else '?'} MVA by the FMU; {used:g} MVA in the study"
+
+
+def _voltage(c: Certification) -> str:
+    if c.request.binding is None:
+        return "per unit of the bus; the FMU has no rated voltage"
+    given = read_table(c.request.binding).rating.V_n
+    return f"{given} (V_n of the binding)" if given is not None else "per unit of the bus; the binding gives no V_n"
+
+
+def parameters(c: Certification) -> str:
+    rows = [
+        [escape(r.name), _text(r.start), f"<b>{_text(r.used)}</b>" if r.changed_by else _text(r.used),
+         escape(r.unit), escape(r.changed_by or "–"), escape(r.description)] for r in parameter_rows(c)
+    ]  # fmt: skip
+    columns = ["Parameter", "In the file", "Used", "Unit", "Changed by", "Description"]
+    changed = sum(1 for r in parameter_rows(c) if r.changed_by)
+    return table(f"All {len(rows)} parameters by the FMU's own names, {changed} of them given a value", columns, rows)
+
+
+def _text(value: Scalar | None) -> str:
+    if value is None:
+        return "–"
+    return escape(as_text(value) if not isinstance(value, float) else f"{value:.12g}")
+
+
+def binding(c: Certification, hashes: Hashes) -> str:
+    if c.request.binding is None:
+        return "<p>None: the FMU has the variables of our port.</p>"
+    text = escape(c.request.binding.read_text(encoding="utf-8"))
+    return f"<p>{escape(c.request.binding.name)}, SHA-256 {hashes[BINDING]}</p><pre>{text}</pre>"
+
+
+def acceptance(c: Certification) -> str:
+    if c.acceptance is None:
+        return "<p>They were not run (--no-check).</p>"
+    marks = {"fail": "bad", "pass": "good"}
+    rows = [
+        [escape(r["check"]), f'<span class="{marks.get(r["verdict"], "soft")}">{escape(r["verdict"])}</span>',
+         escape(f"{r['fault']}: {r['evidence']}" if r["fault"] else r["evidence"])] for r in c.acceptance.checks
+    ]  # fmt: skip
+    said = "No check failed." if c.acceptance.trusted else f"FAILED: {', '.join(c.acceptance.faults)}."
+    style = "good" if c.acceptance.trusted else "bad"
+    listed = table("gfor fmu check", ["Check", "Verdict", "What was seen"], rows, left=3)
+    return f'<p class="{style}">{escape(said)}</p>{listed}'
+
+
+def provenance(c: Certification, hashes: Hashes) -> str:
+    machine = table("Computed on", ["", ""], [[escape(k), escape(v)] for k, v in environment().items()], left=2)
+    files = table("SHA-256 of the files beside this page", ["File", "SHA-256"],
+                  [[escape(name), str(value)] for name, value in hashes.items()], left=2)  # fmt: skip
+    worst = max((p.residual for p in c.points.values()), default=float("nan"))
+    X_L = c.verdicts[0].X_L if c.verdicts else 0.1
+    having = c.points[WITH, X_L]
+    again = commands(X_L, WITH, identified=having.identified is not None)
+    listed = "".join(f"<li>{name}: <code>{escape(text)}</code></li>" for name, text in again.items())
+    text = escape(c.case.read_text(encoding="utf-8"))
+    return (
+        f"{machine}{files}<p>Steady states hold to {worst:.1e} pu in one communication step. Any point can be computed "
+        f"again in the folder of this page; the case file holds every value that was set. For X_L = {X_L:g} pu:</p>"
+        f"<ul>{listed}</ul>{INTEGRITY}"
+        f"<details data-print><summary>Case file</summary><pre>{text}</pre></details>"
+    )
+
 
 _TITLES = {PASSES: "passed", FAILS: "failed", INCOMPLETE: "incomplete"}
 
@@ -29,7 +164,7 @@ def page(certification: Certification, hashes: Mapping[str, str | None], made: d
     figures = Figures()
     content = [
         ("For whom and by whom", details(certification)),
-        ("What was tested", converter(certification, hashes) + texts.STUDY),
+        ("What was tested", converter(certification, hashes) + STUDY),
         ("Result at every line reactance", _overview(certification)),
         ("Dampings that the converter lowers", _lowered(certification)),
         ("Stability at all frequencies", _stability(certification)),
@@ -38,7 +173,7 @@ def page(certification: Certification, hashes: Mapping[str, str | None], made: d
         ("Acceptance tests of the FMU", acceptance(certification)),
         ("Parameters of the FMU", parameters(certification)),
         ("Binding", binding(certification, hashes)),
-        ("How the norm was read", texts.reading(certification.pod)),
+        ("How the norm was read", reading(certification.pod)),
         ("Provenance", provenance(certification, hashes)),
     ]
     return document(title(certification), "Norma técnica de supervisión 631, section 5.10", _findings(certification),
@@ -48,7 +183,7 @@ def page(certification: Certification, hashes: Mapping[str, str | None], made: d
 def title(c: Certification) -> str:
     word = _TITLES[c.verdict]
     if c.missing:
-        word += f" ({texts.count(c.missing)})"
+        word += f" ({len(REACTANCES) - len(c.missing)} of {len(REACTANCES)})"
     if c.refused:
         word += ", acceptance tests failed"
     return f"Damping test of {c.description.model_name!r}: {word}"
@@ -60,8 +195,8 @@ def _findings(c: Certification) -> str:
     items.append(f"Eigenvalue criterion: {_where([v for v in c.verdicts if v.judged and not v.eigenvalues_accepted])}")
     bad = [v for v in c.verdicts if v.judged and (v.time is None or not v.time.accepted)]
     items.append(f"Time-domain criterion on {signal_name(c.signal)}: {_where(bad)}")
-    items.append(escape(texts.converter_model(c.points[WITH, v.X_L] for v in c.verdicts)))
-    items.append(f"Damping controllers: {texts.PODS[c.pod]} ({escape(c.controllers.source)})")
+    items.append(escape(converter_model(c.points[WITH, v.X_L] for v in c.verdicts)))
+    items.append(f"Damping controllers: {PODS[c.pod]} ({escape(c.controllers.source)})")
     checked = "not run" if c.acceptance is None else "no check failed" if c.acceptance.trusted else "FAILED"
     items.append(f"Acceptance tests of the FMU (gfor fmu check): {checked}")
     items += _least_and_growth(c)

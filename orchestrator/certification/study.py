@@ -8,11 +8,10 @@ from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.certification.case_file import BASE, WITH, WITHOUT, write_case
-from orchestrator.certification.certificate import Certificate
+from orchestrator.certification.certificate import Certificate, refusing
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
 from orchestrator.certification.judgement import PointVerdict, judge, watched
 from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult, compute_point
-from orchestrator.certification.refusal import refusing
 from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances, rated_frequency
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because
 from orchestrator.errors import InputError

@@ -12,7 +12,7 @@ import xarray as xr
 
 from orchestrator.certification.case_file import BINDING, CASE, FMU
 from orchestrator.certification.codes.all_codes import CODES, code_for
-from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, figures_of, read_record, seal_of
 from orchestrator.certification.form import NORM, check_form
 from orchestrator.certification.rebuilt import case_faults, rebuilt

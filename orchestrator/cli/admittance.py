@@ -15,7 +15,7 @@ from orchestrator.cli.case_arguments import add_excitation_arguments, excitation
 from orchestrator.cli.terminal import make_console, print_json, said_stages
 from orchestrator.errors import InputError
 from orchestrator.immittance.measured import as_scan
-from orchestrator.immittance.ztool import write_ztool
+from orchestrator.immittance.scan_files import write_ztool
 from orchestrator.report.tables import make_table
 from orchestrator.safe_files import made_folder
 

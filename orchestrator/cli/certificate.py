@@ -17,7 +17,7 @@ from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.certificate import Certificate, Judged
 from orchestrator.certification.codes import frequency_domain
 from orchestrator.certification.codes.certificate import CodeCertificate
-from orchestrator.certification.codes.declared import checked
+from orchestrator.certification.codes.row import checked
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.files import JSON, save

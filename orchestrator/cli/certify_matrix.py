@@ -12,8 +12,8 @@ from orchestrator.cases.devices import Device
 from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.codes.all_codes import BY_DECLARATION
 from orchestrator.certification.codes.certificate import CodeCertificate
-from orchestrator.certification.codes.declared import checked
 from orchestrator.certification.codes.frequency_domain import stiffness_in_words
+from orchestrator.certification.codes.row import checked
 from orchestrator.certification.issue import NTS631
 from orchestrator.certification.matrix import FIGURES, NOT_TESTED, CertificateMatrix, MatrixCell
 from orchestrator.certification.matrix_record import READING, in_words, matrix_json, save_matrix

@@ -9,7 +9,7 @@ from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.errors import CosimError, InputError
 from orchestrator.federation.choice import TO_JOIN
 from orchestrator.federation.federate import OwnFederate
-from orchestrator.federation.ports import require_broker
+from orchestrator.federation.layout import require_broker
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

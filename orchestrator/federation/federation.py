@@ -27,8 +27,7 @@ from orchestrator.federation import frames
 from orchestrator.federation.choice import PROTOCOL, Federates
 from orchestrator.federation.component import FederatedComponent
 from orchestrator.federation.frames import Door, Frames
-from orchestrator.federation.layout import Layout, Part, make_layout
-from orchestrator.federation.ports import broker_port, require_broker
+from orchestrator.federation.layout import Layout, Part, broker_port, make_layout, require_broker
 from orchestrator.fmi.component import Component
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import compile_adapters, open_component

@@ -17,8 +17,7 @@ from orchestrator.cases.facts import rated_frequency
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
-from orchestrator.immittance.sides import Exact
-from orchestrator.immittance.together import Behind, Rows, SideBySide, Unit
+from orchestrator.immittance.sides import Behind, Exact, Rows, Together, Unit
 from orchestrator.study.modes import running
 
 _PORT = ("v_re", "v_im"), ("i_re", "i_im")
@@ -31,7 +30,7 @@ class Cut:
 
     devices: tuple[str, ...]
     # device, network: admittance of the devices, with currents into them, and impedance of the rest at their buses.
-    device: Exact | SideBySide
+    device: Exact | Together
     network: Exact | Behind
     modes_stable: bool | None
     # voltages, currents: at the operating point, by device; currents out of it.
@@ -172,7 +171,7 @@ class _Opened:
         v, i = (np.concatenate([x[at[0]] for at in self._ports]) for x in (self._v, self._i))
         alone = self._settled("the network", net, i, self.C[v], self.D[v])
         units = tuple(self._unit(*unit, mine) for unit in own)
-        together = SideBySide(", ".join(devices), units, 2 * len(mine))
+        together = Together(", ".join(devices), units, 2 * len(mine))
         at = [tuple(d for d in self._ports[k] if d in devices) for k in mine]
         device = units[0].side if len(units) == len(mine) == 1 else together
         every = list(range(len(self._ports)))
@@ -181,7 +180,7 @@ class _Opened:
             return device, alone, units, at
         closed = self._open([self._given[k] for d in devices for k in self._v[d]])[0]
         kept = np.setdiff1d(np.arange(len(closed)), np.concatenate([states for _, states in own]))
-        others = SideBySide("the others", rest, 2 * len(every))
+        others = Together("the others", rest, 2 * len(every))
         poles = np.linalg.eigvals(closed[np.ix_(kept, kept)]).astype(complex)
         return device, Behind("the network", alone, others, _rows(mine), poles), units, at
 

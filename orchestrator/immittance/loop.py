@@ -8,8 +8,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from orchestrator.arrays import Complex, Numbers, Vector
-from orchestrator.immittance.sides import ON_AXIS, Known, Side
-from orchestrator.immittance.together import SideBySide, Unit
+from orchestrator.immittance.sides import ON_AXIS, Known, Side, Together, Unit
 
 _STEP = np.deg2rad(25.0)  # largest turn of det(1 + L) from one point of the path to the next
 _AT_A_BUS = np.deg2rad(60.0)  # the same of the loop at one bus of several
@@ -118,7 +117,7 @@ class CutLoop:
 
     @property
     def units(self) -> tuple[Unit, ...]:
-        return self.device.units if isinstance(self.device, SideBySide) else ()
+        return self.device.units if isinstance(self.device, Together) else ()
 
     @property
     def fastest(self) -> float:

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from orchestrator.immittance.judgement import CutJudgement
 from orchestrator.immittance.retune import Retuned
+from orchestrator.immittance.sides import named
 from orchestrator.immittance.study import CutResult
-from orchestrator.immittance.together import named
 from orchestrator.report.plot_style import STYLE, add_legend, colour, save_figure
 
 _PANELS = 4  # parameters in a picture

@@ -21,11 +21,10 @@ from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judg
 from orchestrator.immittance.loop import NO_MODES, CutLoop, SeriesCapacitors, common_range
 from orchestrator.immittance.margins import NyquistMargins, margins_json
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.participation import Critical, critical
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
-from orchestrator.immittance.strength import SourceBehind, converters_scr, short_circuit_mva
+from orchestrator.immittance.strength import Critical, SourceBehind, converters_scr, critical, short_circuit_mva
 
 
 @dataclass(frozen=True)
@@ -178,7 +177,8 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
         scans["device"] = _side(request, "device", request.device, cut, report)
     if isinstance(request.network, Path):
         scans["network"] = _side(request, "network", request.network, None, report)
-    unit = PER_UNIT if cut is not None else _common_unit(scans.values())
+    units = {scan.unit for scan in scans.values()} if cut is None else {PER_UNIT}
+    unit = units.pop() if len(units) == 1 else SIEMENS
     scans = {side: _in_unit(scan, unit, request.kilovolt) for side, scan in scans.items()}
     known = _in_one_frame(request, scans, cut)
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
@@ -248,11 +248,6 @@ def _source(request: CutRequest, rating: float | None, base: float | None) -> So
         raise InputError(f"--scr: a scan states no rating; give {missing}, to which the short-circuit ratio relates")
     X = base / (request.scr * rating) / math.hypot(1.0, 1 / request.x_r)
     return SourceBehind(f"a source of SCR {request.scr:g}", X / request.x_r, X, 2 * np.pi * request.frequency)
-
-
-def _common_unit(scans: Any) -> str:
-    units = {scan.unit for scan in scans}
-    return units.pop() if len(units) == 1 else SIEMENS
 
 
 def _in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:

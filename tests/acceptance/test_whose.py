@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from fmus.toolchain.compiler import host_platform
-from orchestrator.acceptance.checks.faults import REMEDIES
+from orchestrator.acceptance.checks.base import REMEDIES
 from orchestrator.acceptance.runner import _REFUSED, check_fmu
 from orchestrator.errors import ComponentError, HostileFmuError
 from orchestrator.fmi.archive import extract

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.black_box.frequency_response import FrequencyResponse
-from orchestrator.black_box.stiffness import stiffness
+from orchestrator.certification.codes.frequency_domain import stiffness
 
 OMEGA_B = 2 * np.pi * 50
 STEP = 1e-6

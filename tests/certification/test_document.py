@@ -15,11 +15,11 @@ from orchestrator.acceptance.checks.base import failed, passed
 from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.certification import study as study_module
-from orchestrator.certification import texts
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.environment import environment
 from orchestrator.certification.judgement import judge
 from orchestrator.certification.point import POWER, PointResult
+from orchestrator.certification.report import converter_model
 from orchestrator.errors import CaseError, InputError
 from orchestrator.report.pdf import find_browser
 from tests.certification.fabricated import rings
@@ -123,7 +123,7 @@ def test_a_damping_that_is_lowered_is_remarked_and_modes_beside_are_listed():
     ]  # fmt: skip
     assert found.eigenvalues_accepted
     assert [m.frequency_hz for m in found.neighbours] == pytest.approx([0.07, 2.0])
-    assert texts.converter_model([having]) == (
+    assert converter_model([having]) == (
         "Black box: a model identified at its port, of order 5; largest relative fitting error 3.0e-04"
     )
 

@@ -11,9 +11,7 @@ from dataclasses import replace
 import pytest
 
 import orchestrator as gfor
-from orchestrator.certification.codes.all_codes import CODES
-from orchestrator.certification.codes.ercot import ERCOT
-from orchestrator.certification.codes.fingrid import FINGRID
+from orchestrator.certification.codes.all_codes import CODES, ERCOT, FINGRID
 from orchestrator.certification.inside import FOLDER, taken_out
 from tests.pages.markdown import ROOT, blocks
 

@@ -25,8 +25,7 @@ from orchestrator.federation import federation as processes
 from orchestrator.federation.choice import Federates
 from orchestrator.federation.component import FederatedComponent
 from orchestrator.federation.frames import JOIN, Door, Frames, call
-from orchestrator.federation.layout import make_layout
-from orchestrator.federation.ports import broker_port
+from orchestrator.federation.layout import broker_port, make_layout
 from orchestrator.study.run import run_scenario
 from tests.coupling.small_fmus import small_fmu
 

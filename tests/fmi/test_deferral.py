@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.cli import info
 from orchestrator.errors import ResultsError
-from orchestrator.fmi import deferral
+from orchestrator.fmi import interrupts as deferral
 from orchestrator.fmi.interrupts import calls
 
 LIBRARY = """

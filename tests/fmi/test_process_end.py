@@ -4,7 +4,7 @@ import signal
 
 import pytest
 
-from orchestrator.acceptance.checks.faults import REMEDIES
+from orchestrator.acceptance.checks.base import REMEDIES
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.messages import FLOODED
 from orchestrator.fmi.process_end import ProcessFault, fault_of_exit, last_line

@@ -9,7 +9,7 @@ import orchestrator as gfor
 from orchestrator.cli import main
 from orchestrator.errors import InputError
 from orchestrator.immittance.scan import PortPoint, Scan
-from orchestrator.immittance.ztool import write_ztool
+from orchestrator.immittance.scan_files import write_ztool
 from tests.immittance.plants import OMEGA, Line, constant_power, is_stable
 
 F = np.unique(np.concatenate([np.geomspace(0.5, 1000, 250), np.linspace(40, 60, 60)]))

@@ -14,9 +14,8 @@ from orchestrator.immittance.cut import cut_of
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.participation import critical
-from orchestrator.immittance.sides import Sampled
-from orchestrator.immittance.together import SideBySide
+from orchestrator.immittance.sides import Sampled, Together
+from orchestrator.immittance.strength import critical
 
 
 @pytest.mark.parametrize(
@@ -115,8 +114,8 @@ def test_what_a_device_does_to_the_distance_is_what_more_of_it_does():
 
 def test_a_loop_that_is_not_of_the_system_is_seen_by_the_modes(monkeypatch):
     """With a device left out, all is stable as well, but det(1 + L) is of another system; no margin is told then."""
-    sides = SideBySide.at
-    monkeypatch.setattr(SideBySide, "at", lambda self, s: sides(replace(self, units=self.units[1:]), s))
+    sides = Together.at
+    monkeypatch.setattr(Together, "at", lambda self, s: sides(replace(self, units=self.units[1:]), s))
     found = gfor.nyquist("two_area", scenario="gfor").as_json()
     assert found["verdict"] == "not known"
     assert "det(1 + L) is not that of the eigenvalues and poles" in found["reasons"][0]

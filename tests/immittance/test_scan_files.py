@@ -7,8 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.immittance.scan import PortPoint, Scan, check_sign, other_q_axis
-from orchestrator.immittance.scan_files import read_scan
-from orchestrator.immittance.ztool import write_ztool
+from orchestrator.immittance.scan_files import read_scan, write_ztool
 from tests.immittance.plants import Line, constant_power
 
 F = np.geomspace(1, 500, 120)

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from orchestrator.acceptance.checks.faults import REMEDIES
+from orchestrator.acceptance.checks.base import REMEDIES
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cli import main

@@ -6,9 +6,7 @@ from orchestrator.acceptance.checks import (
     evenness,
     extremes,
     file,
-    initialisation,
     instances,
-    late,
     loading,
     points,
     port,
@@ -23,8 +21,8 @@ from orchestrator.acceptance.checks import (
 )
 
 MODULES = (
-    *(file, loading, running, initialisation, instances, state, sampling, timing, tuning),
-    *(port, late, points, signs, evenness, ride_through, aftermath, extremes, resources),
+    *(file, loading, running, instances, state, sampling, timing, tuning),
+    *(port, points, signs, evenness, ride_through, aftermath, extremes, resources),
 )
 """Importing them enters their checks."""
 

@@ -1,14 +1,20 @@
 """What a check is, and what it answers."""
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
-from orchestrator.acceptance.checks.faults import REMEDIES
 from orchestrator.acceptance.checks.subject import Subject
+from orchestrator.binding import misfits
 from orchestrator.errors import UnsupportedFmuError
+
+_OWN: dict[str, str] = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
+
+REMEDIES = _OWN | misfits.REMEDIES
 
 
 class Verdict(StrEnum):

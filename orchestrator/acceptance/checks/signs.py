@@ -200,7 +200,9 @@ def _answer(
     time: Numbers = np.arange(steps, dtype=np.float64) * h
     found, ways = [], []
     names = subject.inputs
-    windows = [slice(round(a / h), max(round(a / h) + 1, round(b / h))) for a, b in _windows(steps * h)]
+    end = steps * h
+    spans = _EARLY, (0.7 * end, 0.8 * end), (0.9 * end, end)
+    windows = [slice(round(a / h), max(round(a / h) + 1, round(b / h))) for a, b in spans]
     shown = subject.outputs.index("omega") if _shows_omega(subject) else None
     for sign in _SIGNS:
         with subject.running(point=point if subject.starts else None) as running:
@@ -245,10 +247,6 @@ def _swing(power: Complex) -> tuple[float, int]:
 
 def _apart(a: complex, b: complex) -> float:
     return max(abs(b.real - a.real), abs(b.imag - a.imag))
-
-
-def _windows(end: float) -> tuple[tuple[float, float], ...]:
-    return _EARLY, (0.7 * end, 0.8 * end), (0.9 * end, end)
 
 
 def _wrong(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.DroopAnswer) -> tuple[str, str] | None:

@@ -162,10 +162,6 @@ class Subject:
         """Random numbers for one purpose: equal ones whenever they are asked for."""
         return np.random.default_rng((self.seed, crc32(purpose.encode())))
 
-    def in_a_new_process(self) -> None:
-        """End its process: the next instance is the first of another one."""
-        self.process().close()
-
     # -- stimuli ---------------------------------------------------------------------------------
 
     @property

@@ -1,21 +1,96 @@
 """One row of a code, run on the test bench. It can run in another process."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import tomli_w
 
 from orchestrator.analysis.device_start import misfits_of
 from orchestrator.arrays import Numbers
+from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import Case
 from orchestrator.cases.schema import Value
-from orchestrator.certification.codes.bench_case import BENCH
+from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.codes.programme import RATING_MVA, BenchProgramme
+from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import ComponentError, CosimError, ErrorKind
+from orchestrator.fmi.description import FmuDescription
+from orchestrator.fmi.port import BoundDescription
 from orchestrator.points.failure import Failure, failure_kept
 from orchestrator.points.task import Kept, Task, computed
+from orchestrator.safe_files import write_text
 from orchestrator.study.modes import running
 from orchestrator.watch.watch import Watch
+
+PLANT, DUPLICATE, BENCH = "converter", "duplicate", "bench"
+
+CAPACITANCE = 0.05
+"""Capacitance at the connection point [pu of the plant's rating]: a voltage must not jump between two FMUs."""
+
+RECORDED = ("v_re", "v_im", "v", "p", "q", "duplicate.p", "duplicate.q", "source.p", "source.q")
+"""Outputs of the bench that are recorded."""
+
+STEP, INTERVAL = 1e-4, 1e-3  # communication step, and interval of the record [s]
+
+
+def case_name(row: str) -> str:
+    return f"row_{row}.toml"
+
+
+def write_row(
+    request: CertificationRequest, row: str, title: str, programme: BenchProgramme, f_n: float, folder: Path
+) -> Path:
+    description = bound_fmu(request.fmu, request.binding)
+    own = dict(request.values)
+    components: dict[str, Any] = {PLANT: _plant(request, description, own, RATING_MVA, programme.power, f_n)}
+    if programme.duplicate is not None:
+        components[DUPLICATE] = _plant(request, description, own, RATING_MVA / 2, programme.duplicate, f_n)
+    components[BENCH] = _bench(programme, f_n)
+    ports = [(PLANT, "")] + ([(DUPLICATE, "duplicate.")] if programme.duplicate is not None else [])
+    connections = []
+    for name, prefix in ports:
+        connections += [{"from": f"{BENCH}.v_{part}", "to": f"{name}.v_{part}"} for part in ("re", "im")]
+        connections += [{"from": f"{name}.i_{part}", "to": f"{BENCH}.{prefix}i_{part}"} for part in ("re", "im")]
+    table = {
+        "name": row, "title": title, "source": "written by gfor certify",
+        "solver": {"step_size": f"{STEP:g} s", "stop_time": f"{programme.stop:g} s",
+                   "record_interval": f"{INTERVAL:g} s", "record": [f"{BENCH}.{name}" for name in RECORDED],
+                   "groups": [[name for name, _ in ports], [BENCH]]},
+        "components": components, "connections": connections,
+        "events": [{"type": "parameter_change", "time": f"{c.time!r} s", "component": BENCH,
+                    "parameter": c.parameter, "value": c.value} for c in programme.changes],
+    }  # fmt: skip
+    path = folder / case_name(row)
+    write_text(path, tomli_w.dumps(table))
+    return path
+
+
+def _plant(
+    request: CertificationRequest, description: FmuDescription, own: Mapping[str, Value], rating: float,
+    power: float, f_n: float,
+) -> dict[str, Any]:  # fmt: skip
+    values: dict[str, Any] = {"S_n": rating, "P_0": power, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
+    bound = description.port.start if isinstance(description, BoundDescription) else {}
+    known = {name: value for name, value in values.items() if name in description.variables or name in bound}
+    made: dict[str, Any] = {"fmu": FMU, "parameters": known | dict(own)}
+    return made | ({"binding": BINDING} if request.binding else {})
+
+
+def _bench(programme: BenchProgramme, f_n: float) -> dict[str, Any]:
+    Z = programme.impedance
+    power = programme.power + (programme.duplicate or 0.0) / 2
+    made: dict[str, Any] = {
+        "model": "test_bench", "native": True,
+        "parameters": {"P_0": power, "f_n": f_n, "X_0": Z.imag, "R_0": Z.real, "B": CAPACITANCE,
+                       "load.P": RATING_MVA * programme.load[0], "load.Q": programme.load_mvar},
+    }  # fmt: skip
+    if programme.duplicate is None:
+        made["inputs"] = {"duplicate.i_re": 0.0, "duplicate.i_im": 0.0}
+    return made
 
 
 @dataclass

@@ -7,12 +7,10 @@ from pathlib import Path
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.case import load_case
 from orchestrator.certification.case_file import lay_files
-from orchestrator.certification.certificate import Certificate
-from orchestrator.certification.codes.bench_case import write_row
-from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row
+from orchestrator.certification.certificate import Certificate, refusing
+from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, compute_row, write_row
 from orchestrator.certification.codes.row import CodeRow, GridCode
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
-from orchestrator.certification.refusal import refusing
 from orchestrator.certification.request import CertificationRequest, rated_frequency
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 from orchestrator.points.executor import Executor

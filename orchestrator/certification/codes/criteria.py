@@ -7,7 +7,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.binding.misfits import NO_LIMIT
-from orchestrator.certification.codes.bench_case import PLANT
+from orchestrator.certification.codes.bench_point import PLANT
 from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.certification.codes.row import Band, Bounded, Judge, RowFinding
 from orchestrator.watch.limits import ABOVE, LASTS, told_of

@@ -8,18 +8,57 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.arrays import Complex, Numbers
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
-from orchestrator.black_box.frequency_response import Excitation, measure
-from orchestrator.black_box.stiffness import Stiffness, stiffness
+from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
 from orchestrator.cases.values import convert
-from orchestrator.certification.codes.bench_case import STEP
+from orchestrator.certification.codes.bench_point import STEP
 from orchestrator.certification.codes.programme import RATING_MVA, jumps
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.report.plot_style import STYLE, colour, save_figure
 from orchestrator.results.storage import save_json, save_table
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Powers that a device feeds in, over changes of the voltage at its terminals."""
+
+    frequencies: Numbers  # of the change [Hz], shape (f,)
+    # p_theta, q_v: P over the angle [pu/rad], and Q over the relative change of the magnitude [pu], shape (f,)
+    p_theta: Complex
+    q_v: Complex
+    # p_v, q_theta: the same crosswise [pu, pu/rad], shape (f,)
+    p_v: Complex
+    q_theta: Complex
+    p_omega: Complex  # P over the frequency of the voltage [pu/pu], shape (f,)
+
+    def least(self, values: Complex, low: float, high: float) -> tuple[float, float]:
+        """Least size of one of them in a band, and its frequency [Hz]."""
+        inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
+        if not len(inside):
+            raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
+        at = inside[int(np.argmin(np.abs(values[inside])))]
+        return float(abs(values[at])), float(self.frequencies[at])
+
+
+def stiffness(response: FrequencyResponse, voltage: complex, omega_b: float) -> Stiffness:
+    """Change the basis of a measured response.
+
+    With S = v·i* and i = Y·v in real and imaginary parts, a change dv gives dS = dv·i* + v·(Y·dv)*. A change of the
+    angle is dv = j·v·dθ, one of the magnitude dv = v·dV/V."""
+    Y = response.continuous()
+    current = complex(*response.operating_point)
+    by_voltage = np.array([[current.real, current.imag], [-current.imag, current.real]])
+    by_current = np.array([[voltage.real, voltage.imag], [voltage.imag, -voltage.real]])
+    powers = by_voltage + by_current @ Y
+    turned, longer = (np.array([change.real, change.imag]) for change in (1j * voltage, voltage))
+    (p_theta, q_theta), (p_v, q_v) = (powers @ turned).T, (powers @ longer).T
+    p_omega = p_theta * omega_b / (2j * np.pi * response.frequencies)
+    return Stiffness(response.frequencies, p_theta, q_v, p_v, q_theta, p_omega)
+
 
 FIGURES_CSV, FIGURES_JSON, FIGURES_PNG = "frequency.csv", "frequency.json", "frequency.png"
 POWER = 0.5  # active power at which it is measured [pu]

@@ -9,7 +9,6 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.certification.codes import criteria as c
-from orchestrator.certification.codes.declared import Declaration
 from orchestrator.certification.codes.envelope import (
     CEILING,
     DEMAND,
@@ -25,7 +24,7 @@ from orchestrator.certification.codes.envelope import (
 )
 from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
 from orchestrator.certification.codes.programme import FIRST, BenchChange, BenchProgramme, ramps
-from orchestrator.certification.codes.row import Band, Bounded, CodeRow, GridCode, Judge, RowFinding
+from orchestrator.certification.codes.row import Band, Bounded, CodeRow, Declaration, GridCode, Judge, RowFinding
 
 DECLARED = (
     Declaration("X_eff", "effective reactance up to the connection point", "pu of the rating", 0.01, 2.0),

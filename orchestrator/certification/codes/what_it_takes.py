@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.certification.codes.bench_case import DUPLICATE, PLANT, case_name
+from orchestrator.certification.codes.bench_point import DUPLICATE, PLANT, case_name
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.change_point import (
     ChangedCriterion,

@@ -9,10 +9,9 @@ import pytest
 import orchestrator as gfor
 from orchestrator.certification.anew import ROWS, chosen_rows
 from orchestrator.certification.codes import bench_point
-from orchestrator.certification.codes.all_codes import CODES
-from orchestrator.certification.codes.bench_case import case_name
+from orchestrator.certification.codes.all_codes import CODES, ERCOT
+from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.codes.certificate import certify_code
-from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.files import save
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.verification import read_certificate, verify_files

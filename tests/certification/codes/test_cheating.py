@@ -2,8 +2,8 @@
 
 import pytest
 
+from orchestrator.certification.codes.all_codes import ERCOT
 from orchestrator.certification.codes.certificate import certify_code
-from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.points.executor import Serial
 from tests.certification.codes.reactance_source import write_source

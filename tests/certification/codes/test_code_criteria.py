@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 
 from orchestrator.certification.codes import criteria as c
-from orchestrator.certification.codes.all_codes import CODES
+from orchestrator.certification.codes.all_codes import AREAS, CODES, MISO, longest
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.measured import MeasuredRow, over_a_period
-from orchestrator.certification.codes.miso import MISO
-from orchestrator.certification.codes.nogrr245 import longest
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps, weakening
 from orchestrator.certification.codes.row_verdict import judge_row
-from orchestrator.certification.codes.tr331 import AREAS
 from orchestrator.certification.verdict import verdict_of
 
 TIMES = np.arange(0, 11, 1e-3)

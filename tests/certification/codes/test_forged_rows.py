@@ -10,8 +10,7 @@ import xarray as xr
 
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.certification.codes.all_codes import CODES
-from orchestrator.certification.codes.bench_case import case_name
-from orchestrator.certification.codes.bench_point import BenchResult
+from orchestrator.certification.codes.bench_point import BenchResult, case_name
 from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, save, seal_of

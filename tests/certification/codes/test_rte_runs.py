@@ -8,9 +8,8 @@ import pytest
 import orchestrator as gfor
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.certification.codes import bench_point, frequency_domain
-from orchestrator.certification.codes.all_codes import code_for
+from orchestrator.certification.codes.all_codes import ERCOT, code_for
 from orchestrator.certification.codes.certificate import certify_code
-from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.frequency_domain import asked_stiffness, measure_stiffness
 from orchestrator.certification.files import save
 from orchestrator.certification.request import CertificationRequest

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from orchestrator.certification.codes.all_codes import ERCOT
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.change_point import ChangedCriterion, ChangeResult, margins_with_time, mark_of
-from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 from orchestrator.certification.codes.sensitivity import MOST, sensitivity_of
 from orchestrator.sensitivities.parameters import Parameter

@@ -6,9 +6,8 @@ import pytest
 
 import orchestrator as gfor_api
 from orchestrator.certification.codes import what_it_takes as w
-from orchestrator.certification.codes.all_codes import CODES
+from orchestrator.certification.codes.all_codes import CODES, ERCOT
 from orchestrator.certification.codes.certificate import certify_code
-from orchestrator.certification.codes.ercot import ERCOT
 from orchestrator.certification.codes.needs_record import confirmed_text, plan_text, remarks_of, save_needs
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.errors import InputError
