@@ -9,7 +9,6 @@ from typing import Any
 from orchestrator.asked import as_number, asked_of, read_whole
 from orchestrator.coupling.schedule import check_tolerance
 from orchestrator.errors import InputError
-from orchestrator.points import study
 from orchestrator.points.executor import Executor
 from orchestrator.units import read_value, to_unit
 
@@ -138,4 +137,6 @@ def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
 def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:
     if options.scheduler is not None and options.workers is not None:
         raise InputError("--workers and --scheduler exclude each other; a Dask cluster brings its own workers")
+    from orchestrator.points import study  # noqa: PLC0415 - imports the reading of cases
+
     return study.choose_executor(options.workers, options.scheduler, imports, options.tls)

@@ -77,7 +77,7 @@ def values_of(folder):
             continue
         if path.suffix == ".nc":
             with xr.open_dataset(path) as data:
-                attributes = {key: value for key, value in data.attrs.items() if key != "run"}
+                attributes = {key: value for key, value in data.attrs.items() if key not in ("run", "date")}
                 found[name] = attributes, {str(n): data[n].values.tobytes() for n in data.variables}
         elif path.name == "summary.json":
             found[name] = json.loads(path.read_text(encoding="utf-8"))
