@@ -1,4 +1,7 @@
-"""Frequency response of a device on the test bench, by multi-sine or by pulses, each value with a bound."""
+"""Frequency response of a device on the test bench, by multi-sine or by pulses, each value with a bound.
+
+The device is seen at communication points: u[k] holds over step k, and y[k] is read at its end. Its response is
+M(z) = Σ m[k]·z^(−k−1) at z = e^(jωH), where m is the response to u = 1, 0, 0, …"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,8 +13,47 @@ from numpy.typing import NDArray
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.black_box.bench import Bench, Runs
-from orchestrator.black_box.excitation import line_response, multisine, odd_lines, pulse_response
 from orchestrator.errors import AnalysisError
+
+_CHUNK = 4096
+
+
+def odd_lines(lowest_hz: float, highest_hz: float, count: int) -> NDArray[np.int64]:
+    """About ``count`` odd multiples of the lowest frequency up to the highest, spread over its logarithm.
+
+    Even multiples stay silent, so that a quadratic part of the device does not reach the excited ones."""
+    last = int((highest_hz / lowest_hz * (1 + 1e-9) - 1) // 2)  # the largest odd multiple is 2·last + 1
+    wanted = (np.geomspace(1.0, 2 * last + 1, count) - 1) / 2
+    return np.asarray(2 * np.unique(np.round(wanted).astype(np.int64)) + 1)
+
+
+def multisine(lines: NDArray[np.int64], period: int, amplitude: float) -> Numbers:
+    """One period of a sum of cosines of equal size. Schroeder's phases keep its peak low.
+
+    ``lines``: multiples of the base frequency; ``amplitude``: largest magnitude of the sum."""
+    n = np.arange(len(lines))
+    spectrum = np.zeros(period // 2 + 1, dtype=complex)
+    spectrum[lines] = np.exp(-1j * np.pi * n * (n + 1) / len(lines))
+    signal = np.fft.irfft(spectrum, period)
+    return np.asarray(signal * (amplitude / np.abs(signal).max()))
+
+
+def line_response(u: Numbers, y: Numbers, lines: NDArray[np.int64]) -> Complex:
+    """M at the excited lines from whole periods, shape (f, p)."""
+    delay = np.exp(-2j * np.pi * lines / len(u))  # y[k] is read one step after u[k] begins
+    return np.asarray(np.fft.rfft(y, axis=0)[lines] / np.fft.rfft(u)[lines][:, None] * delay[:, None])
+
+
+def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Complex:
+    """M at any frequencies [Hz] from the response to a pulse of one step, shape (f, p)."""
+    total = np.zeros((len(frequencies), m.shape[1]), dtype=complex)
+    turn = -2j * np.pi * np.asarray(frequencies)[:, None] * step_size
+    within = np.exp(turn * (np.arange(_CHUNK) + 1)[None, :])
+    for first in range(0, len(m), _CHUNK):
+        part = m[first : first + _CHUNK]
+        total += np.exp(turn * first) * (within[:, : len(part)] @ part)
+    return total
+
 
 METHODS = ("multisine", "pulse")
 _MOST_SECONDS = 400.0  # time after which a response must have settled [s]
@@ -189,3 +231,41 @@ def _check_returned(bench: Bench, column: int, away: float, size: float) -> None
             "unstable at an ideal bus, or at the edge of a limit: check the signs of its controls and its operating "
             "point; a black box is identified only where it is stable at an ideal bus"
         )
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Powers that a device feeds in, over changes of the voltage at its terminals."""
+
+    frequencies: Numbers  # of the change [Hz], shape (f,)
+    # p_theta, q_v: P over the angle [pu/rad], and Q over the relative change of the magnitude [pu], shape (f,)
+    p_theta: Complex
+    q_v: Complex
+    # p_v, q_theta: the same crosswise [pu, pu/rad], shape (f,)
+    p_v: Complex
+    q_theta: Complex
+    p_omega: Complex  # P over the frequency of the voltage [pu/pu], shape (f,)
+
+    def least(self, values: Complex, low: float, high: float) -> tuple[float, float]:
+        """Least size of one of them in a band, and its frequency [Hz]."""
+        inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
+        if not len(inside):
+            raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
+        at = inside[int(np.argmin(np.abs(values[inside])))]
+        return float(abs(values[at])), float(self.frequencies[at])
+
+
+def stiffness(response: FrequencyResponse, voltage: complex, omega_b: float) -> Stiffness:
+    """Change the basis of a measured response.
+
+    With S = v·i* and i = Y·v in real and imaginary parts, a change dv gives dS = dv·i* + v·(Y·dv)*. A change of the
+    angle is dv = j·v·dθ, one of the magnitude dv = v·dV/V."""
+    Y = response.continuous()
+    current = complex(*response.operating_point)
+    by_voltage = np.array([[current.real, current.imag], [-current.imag, current.real]])
+    by_current = np.array([[voltage.real, voltage.imag], [voltage.imag, -voltage.real]])
+    powers = by_voltage + by_current @ Y
+    turned, longer = (np.array([change.real, change.imag]) for change in (1j * voltage, voltage))
+    (p_theta, q_theta), (p_v, q_v) = (powers @ turned).T, (powers @ longer).T
+    p_omega = p_theta * omega_b / (2j * np.pi * response.frequencies)
+    return Stiffness(response.frequencies, p_theta, q_v, p_v, q_theta, p_omega)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.black_box.excitation import line_response, multisine, odd_lines, pulse_response
+from orchestrator.black_box.frequency_response import line_response, multisine, odd_lines, pulse_response
 
 H = 1e-3
 A = np.array([[0.97, 0.1], [-0.1, 0.95]])

@@ -5,8 +5,7 @@ import cmath
 import numpy as np
 import pytest
 
-from orchestrator.black_box.frequency_response import FrequencyResponse
-from orchestrator.black_box.stiffness import stiffness
+from orchestrator.black_box.frequency_response import FrequencyResponse, stiffness
 
 OMEGA_B = 2 * np.pi * 50
 STEP = 1e-6

@@ -18,8 +18,8 @@ from pathlib import Path
 from orchestrator.binding.draft import draft_binding
 from orchestrator.errors import FmuFileError
 from orchestrator.fmi.archive import extract
+from orchestrator.fmi.confinement import landlock_version, restrict
 from orchestrator.fmi.description import read_description
-from orchestrator.fmi.landlock import landlock_version, restrict
 from orchestrator.fmi.limits import Limits, apply_limits
 
 XML = "modelDescription.xml"

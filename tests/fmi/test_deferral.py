@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.cli import info
 from orchestrator.errors import ResultsError
-from orchestrator.fmi import deferral
+from orchestrator.fmi import interrupts
 from orchestrator.fmi.interrupts import calls
 
 LIBRARY = """
@@ -129,7 +129,7 @@ def test_it_is_raised_at_once_in_a_program_of_the_users(library):
 
 
 def test_it_does_not_wait_for_a_library_for_ever(library, ours, monkeypatch):
-    monkeypatch.setattr(deferral, "_LONGEST", 0.2)
+    monkeypatch.setattr(interrupts, "_LONGEST", 0.2)
     begun = time.monotonic()
     with calls.terminable(), pytest.raises(TypeError):
         ours["study"](library.hangs, [], signal.SIGTERM)
@@ -209,7 +209,7 @@ def test_a_second_sigterm_ends_a_process_in_which_the_first_one_waits():
 @pytest.mark.parametrize(("waits", "event", "count"), [(True, "line", 1), (True, "call", 0), (False, "line", 0)])
 def test_it_is_delivered_at_a_line_while_it_waits(waits, event, count, monkeypatch):
     delivered = []
-    waiting = deferral.Deferral(lambda: delivered.append(1))
+    waiting = interrupts.Deferral(lambda: delivered.append(1))
     if waits:
         frame = sys._getframe()
         monkeypatch.setattr(waiting, "_frame", frame)

@@ -10,8 +10,7 @@ import numpy as np
 
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
-from orchestrator.black_box.frequency_response import Excitation, measure
-from orchestrator.black_box.stiffness import Stiffness, stiffness
+from orchestrator.black_box.frequency_response import Excitation, Stiffness, measure, stiffness
 from orchestrator.cases.values import convert
 from orchestrator.certification.codes.bench_case import STEP
 from orchestrator.certification.codes.programme import RATING_MVA, jumps
