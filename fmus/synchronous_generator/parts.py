@@ -14,8 +14,15 @@ from fmus.synchronous_generator.machine import FluxDeclaration, Machine
 from fmus.synchronous_generator.machines.classical import classical
 from fmus.synchronous_generator.machines.standard import genrou, genrou_rated_speed, gensal, two_axis
 from fmus.synchronous_generator.stabilization.standard import pss1a, pss2a, pss2b
-from fmus.synchronous_generator.turbines.common import constant_power, constant_torque, read_either_way
-from fmus.synchronous_generator.turbines.governors import gast, hygov, ieeeg1, tgov1
+from fmus.synchronous_generator.turbines.governors import (
+    constant_power,
+    constant_torque,
+    gast,
+    hygov,
+    ieeeg1,
+    read_either_way,
+    tgov1,
+)
 from fmus.synchronous_generator.variants import Governor, Stabilizer
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort

@@ -1,6 +1,6 @@
 """The part of modelDescription.xml that FMI 2.0 and FMI 3.0 share, from a model's declarations.
 
-`description` and `description3` write the rest: the names that a version gives its elements, and their order."""
+`description` and `native_fmu` write the rest: the names that a version gives its elements, and their order."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

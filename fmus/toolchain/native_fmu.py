@@ -1,18 +1,170 @@
 """The recipe for a native FMU, for co-simulation by FMI 2.0 or 3.0: compiled code, no Python anywhere.
 
 It is made of the same kernel as the Python-backed FMU and gives the same answers. Beyond that it has exact
-directional derivatives and may be stepped from many threads, one per instance at a time."""
+directional derivatives and may be stepped from many threads, one per instance at a time.
+
+Its source is one translation unit per version of FMI, with nothing in it but the C library."""
 
 from importlib.metadata import version as version_of
+from itertools import chain, islice
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from fmus.toolchain import description_common as common
 from fmus.toolchain.archive import digest_of, guid_of
-from fmus.toolchain.c_text import identity_source
+from fmus.toolchain.c_text import c_number, c_string, identity_source
 from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for, compile_library, recipe
 from fmus.toolchain.description import model_description, with_guid
-from fmus.toolchain.description3 import build_description, has_port, model_description_3, terminals_and_icons
 from fmus.toolchain.exporter import this_machine
+from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import FmiVersion, Model
-from fmus.toolchain.native_source import native_source
+from fmus.toolchain.symbols import Expr, Function, jtimes, jtimes_transposed, symbols
+
+_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}  # FMI 2.0's name of a type → FMI 3.0's
+
+
+def model_description_3(model: Model, token: str, identifier: str, tool: str) -> bytes:
+    """Return the file's text.
+
+    ``token``, ``identifier``: As in the standard; the identifier also names the binaries.
+    ``tool``: Name and version for ``generationTool``."""
+    root = common.root_element(model, "3.0", {"instantiationToken": token}, tool)
+    SubElement(
+        root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true",
+        canGetAndSetFMUState="true", canSerializeFMUState="true", providesDirectionalDerivatives="true",
+        providesAdjointDerivatives="true",
+    )  # fmt: skip
+    common.write_definitions(root, model, "fmi3")
+    _variables(root, model)
+    _structure(root, model)
+    annotations = SubElement(root, "Annotations")
+    SubElement(annotations, "Annotation", type=f"{common.TOOL}.ContinuousStates").text = "settable"
+    SubElement(annotations, "Annotation", type=common.COMPONENT).append(common.component_element(model))
+    return common.text_of(root)
+
+
+def build_description(identifier: str, source_file: str) -> bytes:
+    """The text of sources/buildDescription.xml: how a tool compiles the FMU."""
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    SubElement(SubElement(configuration, "SourceFileSet", language="C11"), "SourceFile", name=source_file)
+    return common.text_of(root)
+
+
+def _variables(root: Element, model: Model) -> None:
+    variables = SubElement(root, "ModelVariables")
+    for variable in common.described_variables(model):
+        state = variable.derivative_of
+        more = {} if state is None else {"derivative": str(state)}
+        SubElement(variables, _TYPES[variable.kind], {**variable.attributes, **variable.own, **more})
+    SubElement(
+        variables, "Float64", name="time", valueReference=str(len(model.value_references)), description="Time",
+        causality="independent", variability="continuous", unit="s",
+    )  # fmt: skip
+
+
+def _structure(root: Element, model: Model) -> None:
+    element = SubElement(root, "ModelStructure")
+    for kind, group in common.unknowns(model).items():
+        for unknown in group:
+            given = {} if unknown.known is None else {"dependencies": " ".join(map(str, unknown.known))}
+            SubElement(element, kind, {"valueReference": str(unknown.reference), **given})
+
+
+KIND = "org.gfor-cosim.electrical.network-frame"
+"""Voltage and injected current as complex phasors in the frame turning at rated frequency, in pu."""
+
+_MEMBERS = {"v_re": "signal", "v_im": "signal", "i_re": "outflow", "i_im": "outflow"}
+
+
+def has_port(model: Model) -> bool:
+    """Whether a model meets the grid through a bus voltage and an injected current."""
+    return set(_MEMBERS) <= {v.name for v in (*model.inputs, *model.outputs)}
+
+
+def terminals_and_icons(model: Model) -> bytes:
+    """Return the file's text, for a model that has a port."""
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    terminal = SubElement(
+        SubElement(root, "Terminals"), "Terminal", name="bus", matchingRule="bus", terminalKind=KIND,
+        description=f"Electrical port of {model.name} in the network frame: bus voltage and injected current",
+    )  # fmt: skip
+    for name, kind in _MEMBERS.items():
+        SubElement(terminal, "TerminalMemberVariable", variableName=name, memberName=name, variableKind=kind)
+    indent(root)
+    text: str = tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+_C = Path(__file__).with_name("c")
+_SHORTEST_TEXT = 640  # room for a message [bytes] beside the longest rule or name it may quote
+
+
+def native_source(model: Model, version: FmiVersion) -> str:
+    """Source of the FMU's binary without its identity, which is a hash of this text."""
+    parts = [
+        "#define KERNEL static",
+        c_source(model, derivative_functions(model)),
+        _data(model),
+        (_C / "instance.c").read_text(encoding="utf-8"),
+        (_C / f"fmi{version[0]}.c").read_text(encoding="utf-8"),
+    ]
+    return "\n".join(parts)
+
+
+def derivative_functions(model: Model) -> dict[str, Function]:
+    """Products of the exact Jacobians with a direction, and of their transposes with a seed.
+
+    ``direction`` and ``adjoint`` are of (ẋ, y) by (x, u, p, c); ``start_direction`` and ``start_adjoint`` of the
+    initialisation (c, x) by p."""
+    x, u, p, c = (
+        symbols(name, len(group))
+        for name, group in (("x", model.states), ("u", model.inputs), ("p", model.parameters), ("c", model.calculated))
+    )
+    known = [x, u, p, c]
+    follows = [*model.derivatives.of(*known), *model.outputs_function.of(*known)]
+    start = model.initialise.of(p)
+    return {
+        "direction": _direction("direction", known, follows),
+        "adjoint": _adjoint("adjoint", known, follows),
+        "start_direction": _direction("start_direction", [p], start),
+        "start_adjoint": _adjoint("start_adjoint", [p], start),
+    }
+
+
+def _direction(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
+    directions = [symbols("d", len(vector)) for vector in known]
+    point, along = list(chain(*known)), list(chain(*directions))
+    return Function(name, [*known, *directions], [jtimes(values, point, along) for values in follows])
+
+
+def _adjoint(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
+    seeds = [symbols("a", len(vector)) for vector in follows]
+    total = iter(jtimes_transposed(list(chain(*follows)), list(chain(*known)), list(chain(*seeds))))
+    return Function(name, [*known, *seeds], [list(islice(total, len(vector))) for vector in known])
+
+
+def _data(model: Model) -> str:
+    parameters, rules = model.parameters, model.requirement_texts
+    texts = [*rules, *model.value_references]
+    start = [p.start for p in parameters] + [u.start for u in model.inputs]
+    rows = [
+        f"{{{p.type.upper()}, {c_number(p.minimum, '-INFINITY')}, {c_number(p.maximum, 'INFINITY')}, {int(p.tunable)}}}"
+        for p in parameters
+    ]
+    lines = [
+        f"enum {{ NR = {len(rules)}, TEXT = {_SHORTEST_TEXT + max(len(t.encode()) for t in texts)}, "
+        f"INTERNAL_STEP = {model.value_references['internal_step']} }};",
+        "enum kind { REAL, INTEGER, BOOLEAN };",
+        'static const char *const KIND[] = {"Real", "Integer", "Boolean"};',
+        "struct parameter { int kind; double minimum, maximum; int tunable; };",
+        f"static const char *const NAME[] = {{{', '.join(map(c_string, model.value_references))}}};",
+        f"static const double START[] = {{{', '.join(map(c_number, start))}}};",
+        f"static const struct parameter PARAMETER[] = {{{', '.join(rows)}}};",
+        f"static const char *const RULE[] = {{{', '.join(map(c_string, rules)) or '0'}}};",
+    ]
+    return "\n".join(lines)
+
 
 _FOLDERS_3 = {
     # zig target -> platform tuple of FMI 3.0

@@ -18,12 +18,11 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi import answers
 from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.confined import ConfinedProcess
+from orchestrator.fmi.confined import ConfinedProcess, ProcessFault
 from orchestrator.fmi.description import FmuDescription, runs_under_wine
 from orchestrator.fmi.limits import TO_BEGIN, Limits, crowded
 from orchestrator.fmi.mailbox import GET, MOST, ROOM, RUN, SET, STEP, TALK, unlocked_library
 from orchestrator.fmi.port import BoundDescription
-from orchestrator.fmi.process_end import ProcessFault
 from orchestrator.fmi.protection import Protection
 from orchestrator.fmi.refusal import FATAL, refusal
 from orchestrator.fmi.remote_calls import Form, RemoteCalls

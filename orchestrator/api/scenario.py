@@ -32,8 +32,7 @@ from orchestrator.late import pd, xr
 from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
-from orchestrator.results.recording import RecordingFolder, temporary_recording
-from orchestrator.results.room import recorded_size
+from orchestrator.results.recording import RecordingFolder, recorded_size, temporary_recording
 from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.sensitivities.view import Sensitivities
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept

@@ -31,8 +31,7 @@ from orchestrator.late import xr
 from orchestrator.report.progress import progress_bar
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import open_whole
-from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder
-from orchestrator.results.room import require_room
+from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder, require_room
 from orchestrator.results.staging import ScenarioFolder, mend, new_run_id, staged, unfinished
 from orchestrator.results.storage import save_dataset
 from orchestrator.safe_files import PARTIAL, made_folder

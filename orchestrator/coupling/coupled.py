@@ -12,9 +12,9 @@ from fmus.toolchain.removal import remove_tree
 from orchestrator.arrays import Numbers
 from orchestrator.closing import Closing
 from orchestrator.coupling.clock import Clock
+from orchestrator.coupling.compiled_loop import apart
 from orchestrator.coupling.schedule import Schedule
 from orchestrator.coupling.system import ComponentPlan, Endpoint, System
-from orchestrator.coupling.team import apart
 from orchestrator.coupling.turns import Exchange
 from orchestrator.coupling.wires import Wires
 from orchestrator.errors import ComponentError, InputError

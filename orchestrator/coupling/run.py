@@ -1,5 +1,8 @@
 """One run of a master: from event to event, with its observers, kept on the way and taken up again."""
 
+import os
+import signal
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import isfinite
 from time import perf_counter
@@ -12,9 +15,26 @@ from orchestrator.coupling.observers import Observer
 from orchestrator.coupling.run_state import Keeper, Resumable, RunState, resume_observers, set_state, state_as_bytes
 from orchestrator.coupling.statistics import StepStatistics
 from orchestrator.coupling.stepping import Stepper
-from orchestrator.errors import ComponentError, NotFiniteError, NotTakenUpError
+from orchestrator.errors import ComponentError, InputError, NotFiniteError, NotTakenUpError
+from orchestrator.fmi.bound import BoundComponent
+from orchestrator.fmi.component import Component
 from orchestrator.fmi.interrupts import calls
-from orchestrator.fmi.silence import silence
+from orchestrator.fmi.isolation import IsolatedComponent
+
+
+def silence(component: Component) -> None:
+    """Stop the processes of an isolated component, so that the limit on its answers ends it as it ends a hang."""
+    while isinstance(component, BoundComponent):
+        component = component.inner
+    if not isinstance(component, IsolatedComponent):
+        raise InputError(
+            f"component {component.name!r} runs in this process, where nothing limits how long it takes to answer; "
+            "give it 'isolated = true' to try a time-out"
+        )
+    if sys.platform == "win32":
+        raise InputError("a time-out cannot be tried on Windows, which stops no process; try it on Linux or macOS")
+    os.killpg(component.process_group, signal.SIGSTOP)
+
 
 _LONGEST_STRETCH = 1000  # communication steps done at a stretch, so that an interrupt from the keyboard is heard
 

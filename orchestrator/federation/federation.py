@@ -29,11 +29,11 @@ from orchestrator.federation.component import FederatedComponent
 from orchestrator.federation.frames import Door, Frames
 from orchestrator.federation.layout import Layout, Part, broker_port, make_layout, require_broker
 from orchestrator.fmi.component import Component
+from orchestrator.fmi.confined import fault_of_exit, last_line
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import compile_adapters, open_component
 from orchestrator.fmi.interrupts import calls
 from orchestrator.fmi.limits import Limits
-from orchestrator.fmi.process_end import fault_of_exit, last_line
 
 _LOOK = 0.2  # between two looks at the processes while something is waited for [s]
 _GRACE = 10.0  # what the hub gets beyond its own patience [s]

@@ -2,7 +2,8 @@
 
 Three processes stand in a row. The *supervisor* is what gfor starts; it waits for gfor's word or end. The *keeper* is
 the first process of the FMU's own process namespace, where there is one: with it all others there end, whatever they
-did to hide. The *worker* alone has the FMU's code in it.
+did to hide. The *worker* alone has the FMU's code in it. An ordinary user makes namespaces together with a user
+namespace, which some systems and containers forbid: then there are none, and the other protections stand alone.
 
 No library but Python's own is imported here: the worker closes itself off before numpy brings threads."""
 

@@ -8,8 +8,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from orchestrator.errors import InputError
-from orchestrator.results.netcdf import DAMAGED, stored_name
-from orchestrator.results.pieces import Piece, opened
+from orchestrator.results.netcdf import DAMAGED, Piece, opened, stored_name
 
 
 class _Column(xr.backends.BackendArray):

@@ -4,7 +4,9 @@ When the disk is full, HDF5 ends the whole process. So its files are made in mem
 disk was reserved before."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from io import RawIOBase
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -13,6 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.safe_files import replacing
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A file with some of the rows: the number of its first one, and how many they are."""
+
+    path: Path
+    first: int
+    rows: int
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Any]:
+    """A file of HDF5, to be read."""
+    import h5py  # noqa: PLC0415 - a tenth of a second that only recordings need
+
+    with h5py.File(path, "r") as file:
+        yield file
+
 
 LEVEL = 1  # of the compression: higher ones take twice the time for three parts in a hundred
 _SLACK = 1_000_000  # what a file needs beside its columns, at most [bytes]

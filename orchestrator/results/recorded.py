@@ -10,8 +10,7 @@ from typing import Any
 from orchestrator.errors import InputError
 from orchestrator.late import xr
 from orchestrator.results.manifest import ResultsWarning
-from orchestrator.results.netcdf import DAMAGED, name_of, stored_name
-from orchestrator.results.pieces import Piece, opened
+from orchestrator.results.netcdf import DAMAGED, Piece, name_of, opened, stored_name
 from orchestrator.results.recording import ENDED_EARLY, parts_of
 
 IN_MEMORY = 256_000_000  # size of a recording up to which it is read as a whole [bytes]

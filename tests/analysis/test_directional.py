@@ -5,7 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from fmus.toolchain import native_source
+from fmus.toolchain import native_fmu
 from fmus.toolchain.compiler import host_platform
 from fmus.toolchain.exporter import export
 from fmus.toolchain.native_fmu import NativeFmu
@@ -73,7 +73,7 @@ def test_a_kind_without_derivatives_is_refused_with_the_remedy():
 def lag_with_wrong_derivatives(folder, monkeypatch, state=1.0, entry=1.0, *, settable=True):
     """A native lag whose directional derivatives along its state and its input are scaled; all else is right."""
     model = small_fmus.lag()
-    right = native_source.derivative_functions
+    right = native_fmu.derivative_functions
 
     def wrong(of):
         functions = right(of)
@@ -82,7 +82,7 @@ def lag_with_wrong_derivatives(folder, monkeypatch, state=1.0, entry=1.0, *, set
         scaled[4], scaled[5] = [state * d for d in known[4]], [entry * d for d in known[5]]  # directions of x and u
         return functions | {"direction": Function("direction", known, functions["direction"].of(*scaled))}
 
-    monkeypatch.setattr(native_source, "derivative_functions", wrong)
+    monkeypatch.setattr(native_fmu, "derivative_functions", wrong)
     path = export(NativeFmu(model), folder / "made", (host_platform(),))
     if not settable:
         closed = folder / "closed.fmu"

@@ -20,7 +20,7 @@ import xarray as xr
 from orchestrator.cases.case import load_case
 from orchestrator.cli import run as command
 from orchestrator.coupling.observers import Progress
-from orchestrator.results import room
+from orchestrator.results import recording
 from orchestrator.results.manifest import read_manifest
 
 RUN = ("run", "infinite_bus", "--scenario", "dip", "--scenario", "load_step", "--stop", "1.5")
@@ -77,7 +77,7 @@ def test_the_folder_is_removed_in_the_middle_of_a_run(gfor, interfere, tmp_path)
 
 
 def test_a_recording_that_the_disk_cannot_hold_is_refused_before_the_start(gfor, monkeypatch, tmp_path):
-    monkeypatch.setattr(room.shutil, "disk_usage", lambda folder: SimpleNamespace(free=100_000))
+    monkeypatch.setattr(recording.shutil, "disk_usage", lambda folder: SimpleNamespace(free=100_000))
     code, _, error = gfor(*RUN, "--out", tmp_path)
     assert code == 2
     assert "the recordings would take about" in error

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no process can 
 _RUNS = """
 import os, signal, threading
 from orchestrator.cases.case import load_case
-from orchestrator.coupling import loop
+from orchestrator.coupling import compiled_loop
 from orchestrator.coupling.master import Master
 
 {patch}
@@ -38,7 +38,9 @@ for delay in (0.02, 0.05, 0.09, 0.2):
 """
 
 
-@pytest.mark.parametrize("patch", ["", "loop._library = lambda: None"], ids=["compiled loop", "python loop"])
+@pytest.mark.parametrize(
+    "patch", ["", "compiled_loop.loop_library = lambda: None"], ids=["compiled loop", "python loop"]
+)
 def test_a_run_can_be_interrupted_at_any_time(patch):
     result = subprocess.run(
         [sys.executable, "-c", _RUNS.format(patch=patch)], capture_output=True, text=True, check=False, timeout=120

@@ -11,10 +11,10 @@ from fmus.toolchain.compiler import compile_library, joined_source
 from orchestrator import fmi
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.coupling.compiled_loop import CompiledLoop
-from orchestrator.coupling.loop import PythonLoop
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import jacobi
+from orchestrator.coupling.stepping import PythonLoop
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, InputError
 from orchestrator.fmi import instance

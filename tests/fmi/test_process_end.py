@@ -5,9 +5,9 @@ import signal
 import pytest
 
 from orchestrator.acceptance.checks.base import REMEDIES
+from orchestrator.fmi.confined import ProcessFault, fault_of_exit, last_line
 from orchestrator.fmi.limits import Limits
 from orchestrator.fmi.messages import FLOODED
-from orchestrator.fmi.process_end import ProcessFault, fault_of_exit, last_line
 
 LIMITS = Limits(messages=100, output=2000)
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from orchestrator.coupling.system import System
 from orchestrator.interop.candidates import SIGNALS, probe_system
-from orchestrator.interop.emulation import emulate
 from orchestrator.interop.rules import MASTERS, MasterRules
 from orchestrator.interop.which_master import STEP_SIZE as PROBE_STEP_SIZE
 from orchestrator.interop.which_master import STOP_TIME as PROBE_STOP_TIME
+from orchestrator.study.like import emulate
 from tests.interop.jobs import job_of, write_ssp
 from tests.interop.systems import MAGNIFIED, STEP_SIZE, STOP_TIME, SYSTEMS, with_magnifier
 

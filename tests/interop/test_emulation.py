@@ -15,8 +15,8 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import FirstInputs, jacobi
 from orchestrator.errors import InputError
 from orchestrator.interop.candidates import probe_system
-from orchestrator.interop.emulation import emulate
 from orchestrator.interop.rules import MASTERS, LastLabel, Steps
+from orchestrator.study.like import emulate
 from tests.interop import drivers, table
 from tests.interop.jobs import job_of, write_ssp
 

@@ -85,7 +85,7 @@ def functions(model):
     """All functions of a model from which code is written, by name."""
     from fmus.toolchain.elimination_plan import plan_elimination
     from fmus.toolchain.kernel import kernel_functions
-    from fmus.toolchain.native_source import derivative_functions
+    from fmus.toolchain.native_fmu import derivative_functions
 
     found = kernel_functions(model) | derivative_functions(model)
     return found | ({"iteration": plan_elimination(model).values} if model.integrator == "sdirk" else {})

@@ -8,7 +8,7 @@ import pytest
 from fmus.toolchain import kernel
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import compile_library, host_platform
-from fmus.toolchain.symbols import Function, c_code, symbol
+from fmus.toolchain.symbols import Function, symbol
 
 
 def _after(source, model):
@@ -33,7 +33,7 @@ def test_parts_compute_the_same_to_the_last_bit(name, monkeypatch):
     source = kernel.c_source(model)
     assert "noinline" not in source
     monkeypatch.setattr(kernel, "LONGEST", 20)
-    monkeypatch.setattr(c_code, "PART", 7)
+    monkeypatch.setattr(kernel, "PART", 7)
     parts = kernel.c_source(model)
     assert parts.count("noinline") > 20
     whole = _after(source, model)
@@ -45,6 +45,6 @@ def test_parts_compute_the_same_to_the_last_bit(name, monkeypatch):
 def test_constants_keep_their_last_bit_and_may_be_infinite():
     x = symbol("x")
     values = [1 / 3, -1e-300, 5e22, float("inf"), float("-inf")]
-    text = c_code.c_function(Function("f", [[x]], [[x + value for value in values]]), "f", 100)
+    text = kernel.c_function(Function("f", [[x]], [[x + value for value in values]]), "f", 100)
     literals = "0.3333333333333333", "-1e-300", "5e+22", "INFINITY", "-INFINITY"
     assert all(f"={literal};" in text for literal in literals)
