@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from orchestrator.arrays import Matrix, Vector
 
-_NAMES = ("dgebal", "dgehrd", "dorghr", "dhseqr", "dtrevc", "dgebak")
+_ROUTINES = {"dgebal": 5, "dgehrd": 6, "dorghr": 6, "dhseqr": 7, "dtrevc": 8, "dgebak": 6}
+"""How many arguments of each routine are integers of 32 bits, or logical values."""
 _SIZES = (1e-120, 1e120)  # matrices whose largest element lies outside are scaled by LAPACK's driver, and left to it
 
 
@@ -94,7 +95,7 @@ def lapack() -> dict[str, Any] | None:
     try:
         from scipy.linalg import cython_lapack  # noqa: PLC0415 - only large systems need it
 
-        capsules = {name: cython_lapack.__pyx_capi__[name] for name in _NAMES}
+        capsules = {name: cython_lapack.__pyx_capi__[name] for name in _ROUTINES}
     except (ImportError, AttributeError, KeyError):
         return None
     python = ctypes.pythonapi
@@ -104,15 +105,10 @@ def lapack() -> dict[str, Any] | None:
     routines = {}
     for name, capsule in capsules.items():
         signature = python.PyCapsule_GetName(capsule)
-        if signature.count(b"int *") != _integers(name) or b"long" in signature:
+        if signature.count(b"int *") != _ROUTINES[name] or b"long" in signature:
             return None  # integers of 64 bits
         routines[name] = ctypes.CFUNCTYPE(None)(python.PyCapsule_GetPointer(capsule, signature))
     return routines
-
-
-def _integers(name: str) -> int:
-    """How many arguments of a routine are integers of 32 bits, or logical values."""
-    return {"dgebal": 5, "dgehrd": 6, "dorghr": 6, "dhseqr": 7, "dtrevc": 8, "dgebak": 6}[name]
 
 
 class _Call:

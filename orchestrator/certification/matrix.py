@@ -1,13 +1,27 @@
-"""Several devices under several codes: a verdict and the narrowest margin for each pair."""
+"""Several devices under several codes: a verdict and the narrowest margin for each pair, and the files with them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
 
+from orchestrator.cases.devices import Device
 from orchestrator.certification.certificate import Certificate, Judged
-from orchestrator.certification.margins import CriterionMargin, narrowest
+from orchestrator.certification.codes.frequency_domain import FIGURES_JSON, FIGURES_PNG
+from orchestrator.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
+from orchestrator.certification.environment import environment
+from orchestrator.certification.files import HTML, JSON
+from orchestrator.certification.margins import CriterionMargin, margin_text, narrowest
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, NOT_TRUSTED, PASSES, exit_code
 from orchestrator.errors import InputError
+from orchestrator.fmi.values import as_text
 from orchestrator.points.failure import Failure
+from orchestrator.report.html.elements import document, table
+from orchestrator.results.storage import save_json
+from orchestrator.safe_files import write_text
 
 NOT_TESTED, FIGURES = "not tested", "no verdict"
 """In place of a verdict: where a device could not be tested at all, and where a code gives figures alone."""
@@ -87,3 +101,104 @@ class CertificateMatrix:
 
 WORST_FIRST = (exit_code(FAILS, refused=False), InputError.exit_code, exit_code(INCOMPLETE, refused=False), NOT_TRUSTED)
 """Exit codes of cells, the one that counts most first."""
+
+
+FORMAT = "matrix-1"  # form of the JSON
+MATRIX_HTML, MATRIX_JSON = "matrix.html", "matrix.json"
+
+READING = (
+    "A margin is the distance from a criterion's limit in parts of that limit, negative on the bad side. Criteria ask "
+    "for different things: margins order the criteria of one device, and compare devices at one criterion."
+)
+
+
+def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Path) -> list[Path]:
+    made = datetime.now(UTC).replace(microsecond=0)
+    content = {"made": made.isoformat(), **matrix_json(matrix, devices)}
+    write_text(folder / MATRIX_HTML, matrix_page(matrix, devices, made))
+    save_json(content, folder / MATRIX_JSON)
+    return [folder / MATRIX_HTML, folder / MATRIX_JSON]
+
+
+def matrix_json(matrix: CertificateMatrix, devices: Sequence[Device]) -> dict[str, Any]:
+    return {
+        "format": FORMAT, "sentence": matrix.sentence(), "exit_code": matrix.exit_code,
+        "devices": [{"name": d.name, "file": d.file.name, "binding": d.binding.name if d.binding else None,
+                     "values": dict(d.values)} for d in devices],
+        "codes": list(matrix.codes), "left_out": list(matrix.left_out),
+        "cells": [_cell_json(cell) for cell in matrix.cells.values()],
+        "environment": environment(),
+    }  # fmt: skip
+
+
+def _cell_json(cell: MatrixCell) -> dict[str, Any]:
+    least = cell.narrowest
+    return {
+        "device": cell.device, "code": cell.code, "verdict": cell.verdict, "exit_code": cell.exit_code,
+        "sentence": cell.sentence, "failure": None if cell.failure is None else str(cell.failure),
+        "judged": cell.judged, "missing": cell.missing,
+        "acceptance_failed": cell.refused, "narrowest": None if least is None else asdict(least),
+        "failed": [asdict(m) for m in cell.failed],
+        "certificate": None if cell.failure is not None or cell.figures is not None else f"{cell.folder}/{JSON}",
+        "figures": None if cell.figures is None or cell.failure is not None else f"{cell.folder}/{FIGURES_JSON}",
+        "sensitivities": f"{cell.folder}/{NEEDS_JSON}" if cell.has_needs else None,
+    }  # fmt: skip
+
+
+def in_words(cell: MatrixCell) -> list[str]:
+    """What a cell of the matrix shows, line by line: verdict, narrowest margin, and what has no figure."""
+    if cell.failure is not None:
+        return [cell.verdict]
+    if cell.figures is not None:
+        return [cell.verdict, *cell.figures]
+    lines = [cell.verdict, *(f"{m.place}: {m.criterion}" for m in cell.without_figure)]
+    if (least := cell.narrowest) is not None:
+        lines.append(f"{margin_text(least.margin)} {least.place}: {least.criterion}")
+    return lines
+
+
+def matrix_page(matrix: CertificateMatrix, devices: Sequence[Device], made: datetime) -> str:
+    whole = [[escape(code.upper()), *(_cell_html(matrix.cells[name, code]) for name in matrix.devices)]
+             for code in matrix.codes]  # fmt: skip
+    tried = [[escape(text) for text in _given(device)] for device in devices]
+    bad = [
+        [escape(cell.device), escape(cell.code.upper()), escape(m.place), escape(m.criterion), escape(m.text),
+         margin_text(m.margin)]
+        for cell in matrix.cells.values() for m in cell.failed
+    ]  # fmt: skip
+    lost = [[escape(c.device), escape(c.code.upper()), escape(str(c.failure)).replace("\n", "<br>")]
+            for c in matrix.cells.values() if c.failure is not None]  # fmt: skip
+    columns = ["Device", "Code", "Where", "Criterion", "Found", "Margin"]
+    width = 1 + len(matrix.devices)
+    sections = [
+        ("Verdict and narrowest margin",
+         table("Codes and devices", ["", *matrix.devices], whole, left=width) + f"<p>{escape(READING)}</p>"),
+        ("What is not met", table("Criteria, least margin first", columns, bad, left=5) if bad else "<p>Nothing.</p>"),
+        *([("Not tested", table("Why", ["Device", "Code", "Reason"], lost, left=3))] if lost else []),
+        ("The devices", table("As they were given", ["Device", "File", "Binding", "Values set"], tried, left=4)),
+    ]  # fmt: skip
+    kind = "Grid codes for grid-forming converters"
+    return document("Codes and devices", kind, f"<p><b>{escape(matrix.sentence())}</b></p>", sections, made)
+
+
+def _given(device: Device) -> list[str]:
+    values = ", ".join(f"{name} = {as_text(value)}" for name, value in device.values.items())
+    return [device.name, device.file.name, device.binding.name if device.binding else "none", values or "none"]
+
+
+def _cell_html(cell: MatrixCell) -> str:
+    verdict, *rest = in_words(cell)
+    if cell.figures is not None and cell.failure is None:
+        word = f'<a class="soft" href="{quote(f"{cell.folder}/{FIGURES_PNG}")}">{escape(verdict)}</a>'
+        return "<br>".join([word, *(escape(line) for line in rest)])
+    passing = cell.exit_code == 0 and cell.failure is None
+    style = "good" if passing else "bad" if verdict == FAILS or cell.failure is not None else "soft"
+    word = f'<span class="{style}">{escape(verdict)}</span>'
+    if cell.failure is None:
+        word = f'<a href="{quote(f"{cell.folder}/{HTML}")}">{word}</a>'
+    if verdict == PASSES and cell.refused:
+        rest = ["acceptance tests failed", *rest]
+    lines = [word, *(escape(line) for line in rest)]
+    if cell.has_needs:
+        lines.append(f'<a href="{quote(f"{cell.folder}/{NEEDS_HTML}")}">what it would take</a>')
+    return "<br>".join(lines)

@@ -9,7 +9,7 @@ from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.analysis.device_start import misfits_of
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
-from orchestrator.analysis.modes import Mode, find_spectrum
+from orchestrator.analysis.modes import find_spectrum
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.arrays import Numbers
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
@@ -108,15 +108,14 @@ def _keep_modes(result: PointResult, model: LinearModel, stability: Stability | 
     modes = [mode for mode in spectrum.modes if mode.is_oscillation]
     result.modes = ModeSet.of(modes, model.names)
     result.linearised = dict(model.sources)
-    result.components = [_in_words(mode) for mode in modes]
+    result.components = [
+        ", ".join(f"{name} {100 * share:.0f} %" for name, share in mode.by_component.items() if share >= 0.01)
+        for mode in modes
+    ]
     verdict = stability or judge(model, spectrum)
     result.stability = verdict.as_json()
     growth = verdict.largest_growth_rate
     result.growth = float("nan") if growth is None else growth
-
-
-def _in_words(mode: Mode) -> str:
-    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in mode.by_component.items() if share >= 0.01)
 
 
 def _keep_signals(result: PointResult, recorder: Recorder, master: Master, f_n: float) -> None:

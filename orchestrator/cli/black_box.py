@@ -60,10 +60,6 @@ def run(options: argparse.Namespace) -> int:
     return exit_code(options, list(verdicts.values()))
 
 
-def _nearest(mode: Mode, others: list[Mode]) -> Mode | None:
-    return min(others, key=lambda m: abs(m.eigenvalue - mode.eigenvalue), default=None)
-
-
 def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
     fitted = f"order {len(system.identified.A)}, fit {system.identified.error:.1e}"
     columns = ["f [Hz]", "Damping [%]", "the box takes part [%]"]
@@ -71,7 +67,7 @@ def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
     table = make_table(f"{title}: {system.component} as a black box, {fitted}", *columns, left=0)
     for mode in system.modes():
         row = [f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.3f}", f"{100 * system.participation(mode):.2f}"]
-        other = _nearest(mode, white)
+        other = min(white, key=lambda m: abs(m.eigenvalue - mode.eigenvalue), default=None)
         if other is not None:
             share = component_participation(other, system.component)
             row += [f"{other.frequency_hz:.4f}", f"{other.damping_percent:.3f}", f"{100 * share:.2f}"]

@@ -15,8 +15,16 @@ from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.frequency_domain import stiffness_in_words
 from orchestrator.certification.codes.row import checked
 from orchestrator.certification.issue import NTS631
-from orchestrator.certification.matrix import FIGURES, NOT_TESTED, CertificateMatrix, MatrixCell
-from orchestrator.certification.matrix_record import READING, in_words, matrix_json, save_matrix
+from orchestrator.certification.matrix import (
+    FIGURES,
+    NOT_TESTED,
+    READING,
+    CertificateMatrix,
+    MatrixCell,
+    in_words,
+    matrix_json,
+    save_matrix,
+)
 from orchestrator.cli.certificate import ALL, GB, certified, check_code_options, codes_of, measured_figures, show
 from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.terminal import make_console, make_errors, print_json

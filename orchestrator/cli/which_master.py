@@ -57,7 +57,12 @@ def run(options: argparse.Namespace) -> int:
     named = dict(_named(text) for text in options.column)
     verdict = identify(read_probe_result(options.result, named), options.step, options.stop)
     if options.json:
-        print_json(_json(verdict))
+        print_json({
+            "fits": [asdict(fit) for fit in verdict.fits],
+            "told": {name: a[0] if len(a) == 1 else None for name in PROPERTIES for a in [verdict.answers(name)]},
+            "nearest": asdict(verdict.nearest), "difference": verdict.difference, "rows": verdict.rows,
+            "steps": verdict.steps, "intervals": verdict.intervals, "masters": list(verdict.masters),
+        })  # fmt: skip
     else:
         _print(verdict, make_console())
     return 0 if verdict.fits else 1
@@ -107,12 +112,3 @@ def _print(verdict: Identified, console: Console) -> None:
 
 def _in_words(candidate: Candidate) -> str:
     return "; ".join(f"{title.lower()} {words[getattr(candidate, name)]}" for name, (title, words) in _WORDS.items())
-
-
-def _json(verdict: Identified) -> dict[str, Any]:
-    return {
-        "fits": [asdict(fit) for fit in verdict.fits],
-        "told": {name: a[0] if len(a) == 1 else None for name in PROPERTIES for a in [verdict.answers(name)]},
-        "nearest": asdict(verdict.nearest), "difference": verdict.difference, "rows": verdict.rows,
-        "steps": verdict.steps, "intervals": verdict.intervals, "masters": list(verdict.masters),
-    }  # fmt: skip

@@ -4,8 +4,8 @@ from functools import partial
 
 from orchestrator.cases.case import Case
 from orchestrator.cases.definition import CaseDefinition
-from orchestrator.coordinated_design.measured_loops import measure
 from orchestrator.coordinated_design.objective import Aim, RatedPoint
+from orchestrator.coordinated_design.point import measure
 from orchestrator.coordinated_design.search import SettingSearch
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
 from orchestrator.coordinated_design.study import naming_of

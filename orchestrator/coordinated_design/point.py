@@ -7,15 +7,17 @@ from typing import Any
 import numpy as np
 
 from orchestrator.analysis.apart import standing_apart
+from orchestrator.analysis.component_linearization import ComponentLinearization
 from orchestrator.analysis.linear_model import LinearModel
+from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, ZERO, Mode, find_spectrum, index_of_rightmost
-from orchestrator.analysis.slope_linearization import gives_slopes
+from orchestrator.analysis.slope_linearization import gives_slopes, linearize_slopes
 from orchestrator.analysis.steady_state import find_operating_point
-from orchestrator.arrays import Complex
+from orchestrator.arrays import Complex, Vector
 from orchestrator.cases.case import Case
-from orchestrator.coordinated_design.measured_loops import measure
 from orchestrator.coordinated_design.open_loops import OpenLoops, PodPlace
 from orchestrator.coupling.master import Master
+from orchestrator.coupling.step_awareness import other_step
 from orchestrator.errors import AnalysisError
 from orchestrator.operating_points.bench import PointBench
 from orchestrator.operating_points.item import Item, Status
@@ -24,6 +26,56 @@ from orchestrator.points.codec import plain
 from orchestrator.points.failure import Failure
 from orchestrator.points.task import Kept, Task, computed
 from orchestrator.study.naming import named_modes
+
+UNIT_GAIN = 50.0  # gain with which a loop is measured [pu]; the signal stays far below its limit
+_RANK = 1e-6  # A loop has one signal: the second singular value of its effect is below this part of the first
+
+
+def measure(master: Master, model: LinearModel, blocks: Blocks, places: Sequence[PodPlace]) -> OpenLoops:
+    windows, known = blocks.state_windows(), blocks.components
+    there = [place for place in places if place.component in known]
+    p = len(blocks.output_names)
+    newest, arriving = np.arange(p), p + np.arange(len(blocks.links))  # as `continuous` numbers w
+    U, V = np.zeros((len(model.names), len(there))), np.zeros((len(there), len(model.names)))
+    sent, seen = np.zeros((model.K.shape[0], len(there))), np.zeros((len(there), model.K.shape[0]))
+    for k, place in enumerate(there):
+        name, before = place.component, known[place.component]
+        n = len(before.states)
+        acts, sees = _loop(master, place, before)
+        U[windows[name], k], sent[:p][blocks.window[name], k] = acts[:n], acts[n:]
+        V[k, windows[name]], seen[k, blocks.entries(name, newest, arriving)] = sees[:n], sees[n:]
+    if not (sent.any() or seen.any()):
+        return OpenLoops.of(model.A, U, V, there, model.names)
+    # What a loop gives to the outputs comes back by way of the network: ż = F·z + G·w + U·s, w = H·z + K·w + sent·s.
+    travelled = model.settle(sent)
+    through = model.settle(model.H.toarray())
+    return OpenLoops.of(model.A, U + model.G @ travelled, V + seen @ through, there, model.names, seen @ travelled)
+
+
+def _loop(master: Master, place: PodPlace, before: ComponentLinearization) -> tuple[Vector, Vector]:
+    """Where the signal with unit gain acts, on states and outputs, and what it is made of, states and inputs."""
+    component, exchange = master.components[place.component], master.exchanges[place.component]
+    saved = component.save_state()
+    try:
+        component.set({f"{place.controller}.enabled": True, f"{place.controller}.K": UNIT_GAIN})
+        with other_step(master, place.component, 0.0):  # as the whole system is: without a communication step
+            with_it = linearize_slopes(exchange, master.time, master.clock.step_size)
+    finally:
+        component.restore_state(saved)
+        component.free_state(saved)
+        component.set({f"{place.controller}.enabled": False})
+    if with_it.A_c is None or with_it.B_c is None or before.A_c is None or before.B_c is None:
+        raise AnalysisError(f"component {place.component!r} does not give its derivatives, so no loop can be measured")
+    m = len(with_it.inputs)
+    changes = [[with_it.A_c - before.A_c, with_it.B_c - before.B_c[:, :m]],
+               [with_it.C - before.C, with_it.D - before.D[:, :m]]]  # fmt: skip
+    left, sizes, right = np.linalg.svd(np.block(changes) / UNIT_GAIN)
+    if sizes[0] == 0:
+        raise AnalysisError(f"{place.name} does not act on its converter at all; nothing can be designed there")
+    if sizes[1] > _RANK * sizes[0]:
+        raise AnalysisError(f"{place.name} acts on its converter in more ways than by one signal")
+    return left[:, 0] * sizes[0], right[0]
+
 
 _MOST_STATES = 2500  # all eigenvalues of larger systems take too long for a design
 

@@ -251,7 +251,8 @@ def ranked(
     frequency: float, most: int, known: tuple[PodPlace, PodSetting] | None = None,
 ) -> tuple[RankedConverter, ...]:  # fmt: skip
     """The controllers by the size of their residues; for the first a controller alone is designed."""
-    by_shift = sorted(((_shift(place, points), place) for place in places), key=lambda one: (-one[0], one[1]))
+    shifts = ((float(np.mean([abs(p.residues().get(place, 0j)) for p in points])), place) for place in places)
+    by_shift = sorted(shifts, key=lambda one: (-one[0], one[1]))
     found = []
     for k, (shift, place) in enumerate(by_shift):
         if k >= most:
@@ -270,7 +271,3 @@ def ranked(
 def best_first(found: Sequence[RankedConverter]) -> tuple[RankedConverter, ...]:
     """The converters in the order of their least damping, those without one by how far they move the modes."""
     return tuple(sorted(found, key=lambda one: (one.worst is None, -(one.worst or 0.0), -one.shift)))
-
-
-def _shift(place: PodPlace, points: Sequence[RatedPoint]) -> float:
-    return float(np.mean([abs(point.residues().get(place, 0j)) for point in points]))

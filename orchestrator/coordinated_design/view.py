@@ -122,7 +122,13 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
             }
             for group, setting in zip(plan.groups, design.settings, strict=True)
         ],
-        "all": [_point(point) for point in verdict.points],
+        "all": [
+            _where(point) | {
+                "stable": point.stable, "before": _mode(point.target_before), "after": _mode(point.target),
+                "allowed": None if point.worth is None else point.worth.allowed, "why": point.why_not,
+            }
+            for point in verdict.points
+        ],
         "ranking": [_ranked(one) for one in design.ranking],
         "search": {
             "worst_damping_ratio": design.found.worth.worst, "evaluations": design.evaluations,
@@ -139,13 +145,6 @@ def _mode(mode: PlacedMode | None) -> dict[str, Any] | None:
     if mode is None:
         return None
     return {"real": mode.value.real, "imag": mode.value.imag, "damping_ratio": mode.damping_ratio, "who": mode.who}
-
-
-def _point(point: JudgedPoint) -> dict[str, Any]:
-    return _where(point) | {
-        "stable": point.stable, "before": _mode(point.target_before), "after": _mode(point.target),
-        "allowed": None if point.worth is None else point.worth.allowed, "why": point.why_not,
-    }  # fmt: skip
 
 
 def _ranked(one: RankedConverter) -> dict[str, Any]:

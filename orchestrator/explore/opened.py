@@ -13,10 +13,10 @@ from orchestrator.certification.case_file import CASE
 from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.codes.certificate import CodeCertificate
-from orchestrator.certification.codes.row_pictures import pictures_of
+from orchestrator.certification.codes.record import pictures_of
 from orchestrator.certification.files import JSON, RESPONSES, read_record
 from orchestrator.certification.margins import margin_text
-from orchestrator.certification.matrix_record import MATRIX_JSON
+from orchestrator.certification.matrix import MATRIX_JSON
 from orchestrator.certification.rebuilt import rebuilt
 from orchestrator.certification.report_criteria import response_curves
 from orchestrator.certification.study import Certification

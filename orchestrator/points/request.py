@@ -12,16 +12,10 @@ from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.schema import Value
 
-
-def _as_it_is(given: Any, argument: str) -> Any:
-    """What is checked where it is used."""
-    return given
-
-
 POINTS_FILE = FieldKind(
     "FILE", Path, lambda given, argument: None if given is None else kept(given, "points.csv", argument)
 )
-ANYTHING = FieldKind("", str, _as_it_is)
+ANYTHING = FieldKind("", str, lambda given, _: given)  # checked where it is used
 _VALUES = FieldKind("", str, case_values)
 _STEP = FieldKind("", str, in_seconds)
 _FILES = FieldKind("", Path, lambda given, argument: parameter_files(given))

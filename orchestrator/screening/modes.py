@@ -101,7 +101,8 @@ def find_modes_here(
 
 def _from_search(model: LinearModel, equations: ShiftedEquations, wanted: CriticalRegion) -> ModeSet:
     """The modes from a search over the region, or from all eigenvalues where it has missed some."""
-    found = ModeSet.of(find_critical_modes(model, *_region(wanted.wider)), model.names)
+    wide = wanted.wider
+    found = ModeSet.of(find_critical_modes(model, wide.lowest_hz, wide.highest_hz, wide.damping), model.names)
     if missed(equations, _columns(found), *_radians(wanted), wanted.damping):
         return _whole(model, wanted).modes
     return found
@@ -171,10 +172,6 @@ def _near_zero(model: LinearModel, found: ModeSet) -> tuple[int, int]:
 
 def _columns(modes: ModeSet) -> RefinedModes:
     return RefinedModes(modes.eigenvalues, modes.left.T, modes.right.T, settled=True)
-
-
-def _region(wanted: CriticalRegion) -> tuple[float, float, float]:
-    return wanted.lowest_hz, wanted.highest_hz, wanted.damping
 
 
 def _radians(wanted: CriticalRegion) -> tuple[float, float]:

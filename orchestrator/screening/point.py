@@ -86,8 +86,9 @@ class _Worker:
         results: list[_Result] = []
         for k, item in enumerate(items):
             if k == 1 and item == items[0]:
-                results.append(_Result(replace(results[0].record, reference=0, links=_same(results[0])),
-                                       results[0].found))  # fmt: skip
+                record, found = results[0].record, results[0].found
+                itself = tuple(range(len(record.eigenvalues)))
+                results.append(_Result(replace(record, reference=0, links=itself), found))
                 continue
             reference = _reference(items, results, k)
             neighbour = None if reference is None else results[reference].found
@@ -190,10 +191,6 @@ class _Worker:
                 self._alone[id(c)] = c, np.linalg.eigvals(c.A_c).astype(complex)
             parts.append(self._alone[id(c)][1])
         return np.concatenate(parts)
-
-
-def _same(result: _Result) -> tuple[int, ...]:
-    return tuple(range(len(result.record.eigenvalues)))
 
 
 def _reference(items: list[Item], results: list[_Result], k: int) -> int | None:

@@ -45,7 +45,7 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
     }
     for name, plan in prepared.system.components.items():
         file, port = component_content(plan.description)
-        found[f"the FMU of {name!r} ({_shown(plan.description.path)})"] = file
+        found[f"the FMU of {name!r} ({plan.description.path.name})"] = file  # the name only: our own lie in a cache
         found[f"the binding of {name!r}"] = port
         found[f"whether {name!r} runs in a process of its own"] = str(plan.isolated)
         found |= {f"the start value of {name}.{v}": repr(x) for v, x in plan.inputs.items()}
@@ -59,11 +59,6 @@ def computed(prepared: PreparedScenario) -> dict[str, str]:
     files = files_named(case.text, case.directory) | {p.name: sha256_of(p) for p in sorted(fmus) if p.is_file()}
     inputs = {case.path.name: hashlib.sha256(case.text.encode()).hexdigest(), **files}
     return {"date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", "code": code_hash(), "inputs": json.dumps(inputs)}
-
-
-def _shown(path: Path) -> str:
-    """A file by its name: the folder in which our own are cached says nothing to anybody."""
-    return path.name
 
 
 @lru_cache(maxsize=4)

@@ -245,7 +245,9 @@ class Linearised:
             ),
             swing=tuple(name for name in model.names if any(fnmatch.fnmatchcase(name, p) for p in analysis.swing)),
             areas=areas_of(analysis.areas, prepared.system),
-            stability=examined.stability.doubted(_faults(self._misfits)),
+            stability=examined.stability.doubted(
+                [f"{name} does not fit its binding: {m.fault}" for name, found in self._misfits.items() for m in found]
+            ),
             hidden=None
             if spectrum is None
             else replace(
@@ -260,10 +262,6 @@ class Linearised:
             fit_errors={name: c.disagreement for name, c in self._blocks.components.items() if c.source == IDENTIFIED},
             unnamed=naming.reasons,
         )  # fmt: skip
-
-
-def _faults(misfits: Mapping[str, list[Misfit]]) -> list[str]:
-    return [f"{name} does not fit its binding: {m.fault}" for name, found in misfits.items() for m in found]
 
 
 def identified(

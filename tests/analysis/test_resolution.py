@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from orchestrator.analysis.resolution import Pair
+from orchestrator.analysis.examination import Pair
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
 from orchestrator.study.modes import compute_modes

@@ -16,8 +16,7 @@ from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.criteria import ModalTest, ModeVerdict
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.margins import CriterionMargin, narrowest
-from orchestrator.certification.matrix import CertificateMatrix, MatrixCell
-from orchestrator.certification.matrix_record import in_words, matrix_json, matrix_page
+from orchestrator.certification.matrix import CertificateMatrix, MatrixCell, in_words, matrix_json, matrix_page
 from orchestrator.certification.study import Certification
 from orchestrator.certification.swings import SwingTest
 

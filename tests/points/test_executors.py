@@ -84,7 +84,7 @@ def test_a_cluster_whose_workers_are_all_gone_ends_the_run_with_what_is_there(mo
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr("orchestrator.points.dask_cluster._PATIENCE", 5)
     monkeypatch.setattr("orchestrator.points.dask_cluster.INTERVAL", 0.5)
-    monkeypatch.setattr("orchestrator.points.dask_watch.INTERVAL", 0.5)
+    monkeypatch.setattr("orchestrator.points.dask_cluster.INTERVAL", 0.5)
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
         results = DaskCluster(cluster.scheduler_address).run(sleepy_double, NUMBERS)
         first = next(results)

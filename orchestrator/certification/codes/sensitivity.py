@@ -76,7 +76,7 @@ def sensitivity_of(
             doubts.append(f"{word}, its declared bound leaves no room")
         elif result.failure is not None:
             doubts.append(f"{word}, it is refused: {result.failure}")
-        elif (again := _same(criterion, result)) is None:
+        elif (again := next((c for c in result.criteria if c.criterion == criterion.criterion), None)) is None:
             why = next((c.text for c in result.criteria if not c.accepted), "nothing was judged")
             doubts.append(f"{word}, {why}")
         else:
@@ -105,10 +105,6 @@ def sensitivity_of(
     return MarginSensitivity(
         parameter, criterion.margin, below, above, slope, sides_met, tuple(doubts), "", idle, values
     )  # fmt: skip
-
-
-def _same(criterion: ChangedCriterion, result: ChangeResult) -> ChangedCriterion | None:
-    return next((c for c in result.criteria if c.criterion == criterion.criterion), None)
 
 
 def _of_slopes(slopes: Mapping[int, float], rounding: float) -> list[str]:

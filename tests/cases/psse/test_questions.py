@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.cases.file_solution import misfit_of
+from orchestrator.cases.network_data import misfit_of
 from orchestrator.cases.network_import import import_network
 from orchestrator.cases.network_sources import read_pandapower
 from orchestrator.errors import CaseError

@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.certification.codes.all_codes import CODES, code_for
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.row_pictures import row_pictures
+from orchestrator.certification.codes.record import row_pictures
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.report.html.elements import Figures
 
