@@ -21,10 +21,9 @@ from orchestrator.report.tables import eigenvalue_text
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import made_folder, write_text
-from orchestrator.screening.stress import OutageRow, by_outage
 from orchestrator.screening.study import ScreenedItem, ScreeningResult
 from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration
-from orchestrator.screening.words import verdict_of, verdict_sentence, what_was_counted, where
+from orchestrator.screening.words import OutageRow, by_outage, verdict_of, verdict_sentence, what_was_counted, where
 
 ITEMS, MODES, SUMMARY, PAGE = "items.csv", "modes.csv", "screening.json", "screening.html"
 

@@ -9,11 +9,10 @@ from rich.console import Console
 from orchestrator.operating_points.item import Status
 from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.request import ScreeningRequest
-from orchestrator.screening.stress import by_outage, not_judged
 from orchestrator.screening.study import ScreenedItem, ScreeningResult, plan_screening
 from orchestrator.screening.summary import Summary
 from orchestrator.screening.view import overview
-from orchestrator.screening.words import verdict_sentence
+from orchestrator.screening.words import by_outage, not_judged, verdict_sentence
 from tests.screening.five_machines import five_machines
 
 POINTS = "name,load\nnight,0.7\nmorning,0.9\nnoon,1.1\nevening,1.2\n"
