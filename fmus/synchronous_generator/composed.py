@@ -4,11 +4,11 @@ A part that is not named is not there: the field voltage and the mechanical torq
 
 from dataclasses import replace
 
+from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.generator import with_controls
 from fmus.synchronous_generator.machine import flux_state
 from fmus.synchronous_generator.parts import NONE, chosen_parts
 from fmus.synchronous_generator.phasor_generator import with_controls as phasor_with_controls
-from fmus.synchronous_generator.usual import MACHINE
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import phasor_builder

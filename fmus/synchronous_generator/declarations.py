@@ -4,7 +4,12 @@ Saturation goes through two points of a curve, S(x)·x = B·(x − A)² above A 
 A machine's data sheet gives S(1.0) and S(1.2), an exciter's S_E(E_1) and S_E(E_2)."""
 
 from fmus.toolchain.model_builder import ModelBuilder
+from fmus.toolchain.port_variables import TRANSFORMER
 from fmus.toolchain.symbols import Expr, Scalar, fmax, if_else, logic_and, logic_or, sqrt
+from fmus.toolchain.variables import usual_beside
+
+MACHINE = TRANSFORMER | usual_beside(__file__)
+"""Usual ranges of machines, exciters, stabilisers, governors and turbines, by the parameter's full name."""
 
 
 def time_constant(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0, *, source: str) -> Expr:

@@ -2,6 +2,7 @@
 
 from functools import partial
 
+from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.machine import (
     Machine,
@@ -12,7 +13,6 @@ from fmus.synchronous_generator.machine import (
 )
 from fmus.synchronous_generator.stabilization.norm631 import pss2a
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
-from fmus.synchronous_generator.usual import MACHINE
 from fmus.synchronous_generator.variants import (
     AC4A,
     ST1,

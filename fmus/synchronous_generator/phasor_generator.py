@@ -13,10 +13,10 @@ taken from i_q through a short lag, so that the emf follows from states alone; i
 
 from functools import partial
 
+from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.excitation.common import Exciter
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations, terminal_power
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
-from fmus.synchronous_generator.usual import MACHINE
 from fmus.synchronous_generator.variants import (
     AC4A,
     ST1,

@@ -13,9 +13,8 @@ from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.files import identification_json, save_identification
-from orchestrator.black_box.fitting import fit, require_fitting
+from orchestrator.black_box.fitting import fit, passivity, require_fitting
 from orchestrator.black_box.frequency_response import METHODS, Excitation, measure
-from orchestrator.black_box.passivity import passivity
 from orchestrator.black_box.port import check_port, start_of, values_for
 from orchestrator.cases.given import Time, binding_path, in_seconds, plain
 from orchestrator.errors import InputError

@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from orchestrator.analysis.linear_model import IDENTIFIED
-from orchestrator.black_box.fitting import IdentifiedModel
+from orchestrator.black_box.fitting import IdentifiedModel, Passivity
 from orchestrator.black_box.frequency_response import FrequencyResponse
-from orchestrator.black_box.passivity import Passivity
 from orchestrator.report.plot_style import STYLE, colour, save_figure
 from orchestrator.results.storage import save_json, save_matrices, save_table
 

@@ -11,7 +11,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode
 from orchestrator.analysis.stability import Stability, judge
 from orchestrator.black_box.coupled_modes import BoxedSystem, component_participation, is_black_box, linearize_with_box
 from orchestrator.black_box.files import identification_json, save_identification
-from orchestrator.black_box.passivity import passivity
+from orchestrator.black_box.fitting import passivity
 from orchestrator.cli.case_arguments import excitation_of, prepare
 from orchestrator.cli.terminal import make_console, print_json, said_stages, warn
 from orchestrator.cli.verdict import exit_code, print_stability

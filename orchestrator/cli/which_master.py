@@ -13,8 +13,7 @@ from fmus.toolchain.extras import require
 from orchestrator.cli.arguments import option, repeatable, switch
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import InputError
-from orchestrator.interop.candidates import Candidate
-from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.interop.probe_result import Candidate, read_probe_result
 from orchestrator.interop.which_master import PROPERTIES, STEP_SIZE, STOP_TIME, Identified, identify, instructions
 from orchestrator.report.tables import PlainTable
 from orchestrator.safe_files import made_folder, write_text

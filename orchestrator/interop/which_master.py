@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import InputError
-from orchestrator.interop.candidates import EXTRAPOLATIONS, SIGNALS, Candidate, candidates
-from orchestrator.interop.probe_result import ProbeResult
+from orchestrator.interop.probe_result import EXTRAPOLATIONS, SIGNALS, Candidate, ProbeResult, candidates
 from orchestrator.interop.rules import MASTERS, MasterRules
 
 STEP_SIZE, STOP_TIME = 0.1, 2.0  # step size and stop time that the instructions ask for [s]

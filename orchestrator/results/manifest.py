@@ -60,7 +60,6 @@ class Manifest:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -6,9 +6,8 @@ import scipy.linalg
 import scipy.signal
 
 from orchestrator.black_box import fitting
-from orchestrator.black_box.fitting import fit
+from orchestrator.black_box.fitting import fit, passivity
 from orchestrator.black_box.frequency_response import FrequencyResponse
-from orchestrator.black_box.passivity import passivity
 from orchestrator.errors import AnalysisError
 
 H = 1e-4

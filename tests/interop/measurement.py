@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.coupling.system import System
-from orchestrator.interop.candidates import SIGNALS, probe_system
+from orchestrator.interop.probe_result import SIGNALS, probe_system
 from orchestrator.interop.rules import MASTERS, MasterRules
 from orchestrator.interop.which_master import STEP_SIZE as PROBE_STEP_SIZE
 from orchestrator.interop.which_master import STOP_TIME as PROBE_STOP_TIME

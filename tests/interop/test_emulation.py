@@ -14,7 +14,7 @@ from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.schedule import FirstInputs, jacobi
 from orchestrator.errors import InputError
-from orchestrator.interop.candidates import probe_system
+from orchestrator.interop.probe_result import probe_system
 from orchestrator.interop.rules import MASTERS, LastLabel, Steps
 from orchestrator.study.like import emulate
 from tests.interop import drivers, table

@@ -2,8 +2,7 @@
 
 import pytest
 
-from orchestrator.interop.candidates import SIGNALS
-from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.interop.probe_result import SIGNALS, read_probe_result
 from orchestrator.interop.rules import MASTERS
 from orchestrator.interop.which_master import identify
 from tests.interop import table

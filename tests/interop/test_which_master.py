@@ -7,8 +7,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import InputError
-from orchestrator.interop.candidates import EXTRAPOLATIONS, SIGNALS, candidates, probe_system
-from orchestrator.interop.probe_result import read_probe_result
+from orchestrator.interop.probe_result import EXTRAPOLATIONS, SIGNALS, candidates, probe_system, read_probe_result
 from orchestrator.interop.rules import MASTERS
 from orchestrator.interop.which_master import PROPERTIES, identify
 from tests.interop import drivers
