@@ -9,11 +9,9 @@ from typing import Any
 from orchestrator.spelling import spelled
 
 NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
+INTERRUPTED = 130  # exit code after Ctrl-C
 
-TERMINATED = 143
-"""Exit code after SIGTERM."""
+TERMINATED = 143  # exit code after SIGTERM
 
 
 class ErrorKind(StrEnum):
@@ -116,8 +114,7 @@ class Problem:
         return spelled(f"{self.place}: {self.text}" if self.place else self.text)
 
 
-MOST_PROBLEMS = 200
-"""So many mistakes of one case are listed; looking for more would take long and help nobody."""
+MOST_PROBLEMS = 200  # so many mistakes of one case are listed; looking for more would take long and help nobody
 
 TOO_MANY = Problem("", "there are more problems than are listed; mend these first")
 

@@ -44,8 +44,7 @@ def _built_registry() -> Any:
     return registry
 
 
-LARGEST = 1e100
-"""Of a number in a file, below which products of some are numbers still."""
+LARGEST = 1e100  # of a number in a file, below which products of some are numbers still
 
 
 def read_value(text: str) -> bool | float | str:

@@ -10,8 +10,7 @@ from fmus.toolchain.phasor_port import SourceEmf, declare_phasor_outputs, phasor
 from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, device_port_of
 from fmus.toolchain.symbols import sqrt
 
-S_SC = 20000.0
-"""Default short-circuit power [MVA]."""
+S_SC = 20000.0  # default short-circuit power [MVA]
 
 
 def external_grid() -> Model:

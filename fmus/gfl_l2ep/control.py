@@ -63,8 +63,7 @@ def transformer_equation(m: ModelBuilder, t: Transformer, port: DevicePort, v_c:
     t.i.set_derivative(m, port.through_breaker(closed, i * (-1 / BREAKER_TIME)))
 
 
-MEMORY = 1e-3
-"""Time constant [s] of the state that remembers; it passes the middle 0.7 ms after a threshold."""
+MEMORY = 1e-3  # time constant [s] of the state that remembers; it passes the middle 0.7 ms after a threshold
 
 
 def running(m: ModelBuilder, v: Expr) -> Expr:
@@ -83,8 +82,7 @@ def running(m: ModelBuilder, v: Expr) -> Expr:
     return runs
 
 
-SMALLEST = 1e-3
-"""Least part of the limit's square under a root, for a finite derivative."""
+SMALLEST = 1e-3  # least part of the limit's square under a root, for a finite derivative
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from fmus.toolchain.phasor_port import SourceEmf, declare_master_step, declare_p
 from fmus.toolchain.port import declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr
 
-S_N, P_0 = 2400.0, 0.83
-"""Default rating [MVA] and dispatch [pu]: those of a wind park of the benchmark."""
+S_N, P_0 = 2400.0, 0.83  # default rating [MVA] and dispatch [pu]: those of a wind park of the benchmark
 
 BEHIND = Phasor(0.1, 10.0)
 """Impedance [pu, S_n] behind which the phasor variant gives its current: the larger, the less does the error of the

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from fmus.grid.names import line_variable
 
-SMALLEST_REACTANCE = 1e-5
-"""Smallest reactance of a line [pu, 100 MVA]."""
+SMALLEST_REACTANCE = 1e-5  # smallest reactance of a line [pu, 100 MVA]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +49,13 @@ class Zip:
     p: float = 0.0
 
 
-LAWS = {"impedance": Zip(z=1.0), "current": Zip(i=1.0), "power": Zip(p=1.0)}
-"""Laws of one share only, by name."""
+LAWS = {"impedance": Zip(z=1.0), "current": Zip(i=1.0), "power": Zip(p=1.0)}  # laws of one share only, by name
 
 IMPEDANCE = LAWS["impedance"]
 
-LOW_VOLTAGE = 0.7
-"""Default of the voltage [pu] below which a load with a share of constant power is an impedance."""
+LOW_VOLTAGE = 0.7  # default of the voltage [pu] below which a load with a share of constant power is an impedance
 
-LEAST_LOW_VOLTAGE = 0.3
-"""Least of that voltage [pu]: a constant power draws more than three times its current there."""
+LEAST_LOW_VOLTAGE = 0.3  # least of that voltage [pu]: a constant power draws more than three times its current there
 
 
 @dataclass(frozen=True, slots=True)

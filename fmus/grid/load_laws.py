@@ -34,17 +34,14 @@ POWER_RECOVERY_TIME = 2e-3
 """The same with a share of constant power, whose negative resistance feeds resonances of the network below 1/τ: in
 ieee39 with such loads alone, 0.5 ms leaves one at 151 Hz growing, 1 ms none."""
 
-SHORTEST_RECOVERY = 5e-4
-"""Least τ [s]: the law is taken at the stages of an implicit step of up to 0.2 ms."""
+SHORTEST_RECOVERY = 5e-4  # least τ [s]: the law is taken at the stages of an implicit step of up to 0.2 ms
 
 PHASOR_RECOVERY_TIME, SHORTEST_PHASOR_RECOVERY = 1e-2, 4e-3
 """The same for phasor networks, whose explicit steps are up to 2 ms long."""
 
-LONGEST_RECOVERY = 1.0
-"""Largest τ [s]."""
+LONGEST_RECOVERY = 1.0  # largest τ [s]
 
-FREQUENCY_TIME = 0.02
-"""Default time constant [s] of the frequency that a load feels: one period at 50 Hz."""
+FREQUENCY_TIME = 0.02  # default time constant [s] of the frequency that a load feels: one period at 50 Hz
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.nodes import LARGEST_REST
 from fmus.toolchain.symbols import Expr, fabs, fmax
 
-Admittances = dict[str, dict[str, Phasor]]
-"""Rows and columns by bus; the pattern is symmetric."""
+Admittances = dict[str, dict[str, Phasor]]  # rows and columns by bus; the pattern is symmetric
 
 
 def add_admittance(Y: Admittances, row: str, column: str, value: Phasor) -> None:

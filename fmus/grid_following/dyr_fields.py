@@ -20,11 +20,9 @@ FIELDS: dict[str, tuple[str, ...]] = {
 }
 """Fields behind the identifier of the machine, in the file's order, by PSS/E's name of the record."""
 
-PLANT = "REPCA1"
-"""The plant's controller, of which nothing can be taken over."""
+PLANT = "REPCA1"  # the plant's controller, of which nothing can be taken over
 
-X_S = 0.5
-"""Reactance [pu, S_n] by which `gfl_phasor` states its voltage control; any gives the same integrator."""
+X_S = 0.5  # reactance [pu, S_n] by which `gfl_phasor` states its voltage control; any gives the same integrator
 
 _FLAGS = {"PFFLAG", "VFLAG", "QFLAG", "PFLAG", "PQFLAG"}
 _SHORTEST, _SHORTEST_CURRENT, _LEAST_LIMIT, _LEAST_REACTANCE = 5e-3, 1e-3, 0.1, 0.01

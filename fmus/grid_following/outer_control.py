@@ -15,8 +15,7 @@ from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr, Scalar, if_else
 
 CHOSEN = "chosen here: about six times slower than the PLL"
-TRACKING_TIME = 0.01
-"""Time constant [s] with which control and capacitor follow the bus behind an open breaker."""
+TRACKING_TIME = 0.01  # time constant [s] with which control and capacitor follow the bus behind an open breaker
 
 
 @dataclass(frozen=True)

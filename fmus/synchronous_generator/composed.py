@@ -15,8 +15,7 @@ from fmus.toolchain.phasor_port import phasor_builder
 from fmus.toolchain.port import declare_rating, device_port_of
 from fmus.toolchain.symbols import if_else
 
-S_N, P_0 = 100.0, 0.8
-"""Defaults of rating [MVA] and power [pu]."""
+S_N, P_0 = 100.0, 0.8  # defaults of rating [MVA] and power [pu]
 
 
 def synchronous_generator(

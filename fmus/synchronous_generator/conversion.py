@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 from fmus.toolchain.symbols import Expr, fabs, fmax, fmin, if_else, sqrt
 
-_NOTHING = 1e-9
-"""Admittance of a missing branch, as a part of 1/X_m."""
+_NOTHING = 1e-9  # admittance of a missing branch, as a part of 1/X_m
 
 
 @dataclass(frozen=True)

@@ -142,8 +142,7 @@ def terminal_power(g: Machine, port: DevicePort) -> tuple[Expr, Expr]:
     return Expr(P_e), Expr(P_e_0)
 
 
-RotorRates = tuple[Expr, ...]
-"""Rates of the fluxes of one axis' rotor windings."""
+RotorRates = tuple[Expr, ...]  # rates of the fluxes of one axis' rotor windings
 
 
 def _flux_rates(g: Machine, port: DevicePort, E_fd: Expr) -> tuple[Expr, Expr, RotorRates, RotorRates]:

@@ -31,8 +31,7 @@ from fmus.toolchain.symbols import Expr
 MachinePart = Callable[[ModelBuilder, DevicePort, Expr, FluxDeclaration], Machine]
 """Declares a machine at its port: builder, port, rating [MVA], declaration of the stator's fluxes."""
 
-NONE = "none"
-"""The stabiliser of a generator that has none."""
+NONE = "none"  # the stabiliser of a generator that has none
 
 MACHINES: dict[str, MachinePart] = {
     "classical": classical, "two_axis": two_axis, "gensal": gensal, "genrou": genrou,

@@ -9,8 +9,7 @@ and is seen by nobody."""
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
 
-BYPASS_TIME = 0.01
-"""Time constant [s] with which the unused state of a left-out block follows its input."""
+BYPASS_TIME = 0.01  # time constant [s] with which the unused state of a left-out block follows its input
 
 RETURN_TIME = 2e-3
 """Time constant [s] with which a state returns to the limit that a step of integration carried it over: as long as the

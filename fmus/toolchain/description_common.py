@@ -11,8 +11,7 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.variables import UNITS, CalculatedParameter, Input, Output, Parameter, State, Variable
 
 TOOL = "gfor-cosim"
-COMPONENT = f"{TOOL}.Component"
-"""Names of our annotations."""
+COMPONENT = f"{TOOL}.Component"  # names of our annotations
 
 _CALCULATED = {"causality": "local", "variability": "continuous", "initial": "calculated"}
 

@@ -71,8 +71,7 @@ def _left_to_later(function: Function, part: int) -> set[int]:
     return found
 
 
-LONGEST = 2_000
-"""Instructions of a function that is not written in parts."""
+LONGEST = 2_000  # instructions of a function that is not written in parts
 
 _C = Path(__file__).with_name("c")
 

@@ -13,8 +13,7 @@ from fmus.toolchain.variables import CalculatedParameter, Input, Kind, Output, P
 
 Integrator = Literal["runge_kutta", "sdirk"]
 
-FmiVersion = Literal["2.0", "3.0"]
-"""FMI versions of a native FMU."""
+FmiVersion = Literal["2.0", "3.0"]  # FMI versions of a native FMU
 
 
 @dataclass(frozen=True)

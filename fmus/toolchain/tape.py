@@ -52,8 +52,7 @@ def instructions(function: Function, name: str) -> Iterator[tuple[int, tuple[int
                 raise ValueError(f"{name}: operation {operation} has no code of a tape yet; add it to `CODES`")
 
 
-Operation = tuple[int, ...]
-"""Code, and the values that it takes."""
+Operation = tuple[int, ...]  # code, and the values that it takes
 
 MUL_ADD, MUL_SUB, SUB_MUL, MUL_ADD_MUL, MUL_SUB_MUL = range(29, 34)
 """Codes of a·b + c, a·b − c, c − a·b, a·b + c·d, a·b − c·d."""
@@ -119,8 +118,7 @@ def runs_of(operations: dict[int, Operation]) -> list[tuple[int, list[int]]]:
 
 MAGIC, VERSION = b"gfortape", 1
 
-LIBRARY = Path(__file__).with_name("c") / "tape.c"
-"""What executes tapes, with the files that it includes."""
+LIBRARY = Path(__file__).with_name("c") / "tape.c"  # what executes tapes, with the files that it includes
 
 
 def tape_of(model: Model) -> bytes:

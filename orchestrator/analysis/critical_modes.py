@@ -44,8 +44,7 @@ _KEPT = 100
 """Least number of vectors that Arnoldi's method keeps. With 50 it begins anew more often, and solves a fifth more
 equations (299 buses, 0.1 to 2 Hz)."""
 
-_KEPT_FOR_ONE = 30
-"""The same where only the eigenvalue nearest to the point is looked for, mostly next to it."""
+_KEPT_FOR_ONE = 30  # the same where only the eigenvalue nearest to the point is looked for, mostly next to it
 
 _TOLERANCE = 1e-9
 """Of Arnoldi's method, relative. The last digits of eigenvalues at the rim, which crowd, cost most of its equations;

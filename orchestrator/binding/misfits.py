@@ -27,8 +27,7 @@ axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff
 
 FREQUENCY_APART = 0.02  # deviation of omega at rest from 1 above which a device is made for another frequency
 SLIGHT = 1e-3  # the same below which nothing is said
-_HELD = 5
-"""How often a device is held again whose omega still moves, as a meter's does that begins elsewhere, or at 1."""
+_HELD = 5  # how often a device is held again whose omega still moves, as a meter's does that begins elsewhere, or at 1
 
 REMEDIES: dict[str, str] = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
 _OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit")

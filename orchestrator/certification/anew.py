@@ -42,8 +42,7 @@ rounding."""
 DRAWN = 1  # so many rows are drawn by chance beside the one with the narrowest margin
 
 Content = Mapping[str, Any]
-Compared = Iterator[tuple[str, str]]
-"""Faults, or otherwise sentences on what agrees, one of both empty."""
+Compared = Iterator[tuple[str, str]]  # faults, or otherwise sentences on what agrees, one of both empty
 
 
 @dataclass

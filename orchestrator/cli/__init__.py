@@ -49,8 +49,7 @@ _LONGEST_PATH = 200
 _READERS = ("signal compare", "signal identify", "signal source", "verify")
 """Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
 
-QUESTIONS = Path(__file__).with_name("questions.txt").read_text(encoding="utf-8")
-"""The page that ``gfor`` alone prints."""
+QUESTIONS = Path(__file__).with_name("questions.txt").read_text(encoding="utf-8")  # the page that ``gfor`` alone prints
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

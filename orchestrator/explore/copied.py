@@ -15,8 +15,7 @@ from orchestrator.errors import InputError
 from orchestrator.results.staging import new_run_id
 from orchestrator.safe_files import made_folder, write_text
 
-EXPLORED = "explored"
-"""Name of the scenario that a state of the page becomes."""
+EXPLORED = "explored"  # name of the scenario that a state of the page becomes
 
 
 def copied(

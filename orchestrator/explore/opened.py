@@ -29,8 +29,7 @@ from orchestrator.results.comtrade.reading import is_comtrade
 from orchestrator.results.csv_recording import SUFFIXES
 from orchestrator.results.recording import TRAJECTORY
 
-CERTIFICATES = (MATRIX_JSON, JSON)
-"""Names of files that `certified` opens."""
+CERTIFICATES = (MATRIX_JSON, JSON)  # names of files that `certified` opens
 
 
 def certified(file: Path) -> tuple[str, dict[str, Any]]:

@@ -30,11 +30,9 @@ from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.preparation import ItemPreparation
 from orchestrator.spelling import as_options
 
-_CHANGE = 2e-3
-"""Of the parameter, in parts of its value, or of 1 where that is 0."""
+_CHANGE = 2e-3  # of the parameter, in parts of its value, or of 1 where that is 0
 
-_FAR = 0.05
-"""An eigenvalue that moves by more than this part of itself is no longer known to be the same."""
+_FAR = 0.05  # an eigenvalue that moves by more than this part of itself is no longer known to be the same
 
 _WIDER = 1.5  # the range in which changed modes are looked for, beyond that which is shown
 

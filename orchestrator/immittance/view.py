@@ -16,8 +16,7 @@ from orchestrator.immittance.study import CutResult
 from orchestrator.report.tables import VerdictSentence, make_table
 from orchestrator.results.storage import save_json
 
-GOAL = 0.3
-"""Distance from −1 that a retuning is to reach: all of L may be off by so much of 1."""
+GOAL = 0.3  # distance from −1 that a retuning is to reach: all of L may be off by so much of 1
 
 _MARGINS = (
     ("gain up", "gain_up", "× {:.3f}"), ("gain down", "gain_down", "× {:.3f}"), ("phase", "phase_deg", "{:.1f}°"),

@@ -13,8 +13,7 @@ from orchestrator.cases.schema import CaseTable, NamedModeTable, Value
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import InputError
 
-CRITICAL = "least damped swing"
-"""The mode that is designed for where the case names none."""
+CRITICAL = "least damped swing"  # the mode that is designed for where the case names none
 
 
 def require_controllers(controllers: Sequence[str]) -> None:

@@ -9,8 +9,7 @@ from typing import Any
 from orchestrator.errors import InputError
 from orchestrator.late import pd
 
-Axes = Any
-"""``matplotlib.axes.Axes``; to import the class takes a second, which only plots are worth."""
+Axes = Any  # ``matplotlib.axes.Axes``; to import the class takes a second, which only plots are worth
 
 _ROWS = 40
 

@@ -25,8 +25,7 @@ _TIMES = ("time", "t", "timestamp", "datetime", "utc", "soc", "epoch", "zeit", "
 _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
 _TIME = re.compile(rf"\s*([-+]?\d*[.,]?\d+([eE][-+]?\d+)?|{_DATE.pattern})\s*")
-_EPOCH = 1e8
-"""Numbers of seconds above it count from 1970, and are taken from the first sample on."""
+_EPOCH = 1e8  # numbers of seconds above it count from 1970, and are taken from the first sample on
 
 
 def read_table(path: Path) -> xr.Dataset:

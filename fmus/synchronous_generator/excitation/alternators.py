@@ -28,11 +28,9 @@ from fmus.toolchain.blocks import clamp, held_at_limits, limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax
 
-_MOST = 1e9
-"""No upper limit of V_E [pu]."""
+_MOST = 1e9  # no upper limit of V_E [pu]
 
-_LEAST = 1e-3
-"""Smallest V_E [pu] that the rectifier's loading is divided by."""
+_LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
 
 
 def ac1a(

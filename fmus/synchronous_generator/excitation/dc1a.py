@@ -50,5 +50,4 @@ def dc1a(
         return measured.close(E_fd)
 
 
-ieeet1 = partial(dc1a, compensated=False)
-"""DC1A without its lead and lag."""
+ieeet1 = partial(dc1a, compensated=False)  # DC1A without its lead and lag

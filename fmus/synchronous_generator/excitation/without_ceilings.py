@@ -10,8 +10,7 @@ from fmus.toolchain.blocks import lead_lag, low_pass, proportional_integral
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, if_else, logic_and
 
-LOOP_PASSES = 4
-"""Fixed-point passes for the algebraic loop of ST4B; each shrinks its error more than fiftyfold."""
+LOOP_PASSES = 4  # fixed-point passes for the algebraic loop of ST4B; each shrinks its error more than fiftyfold
 
 
 def ac4a(

@@ -144,8 +144,7 @@ _DAMPER = ("psi_1d", "Damper flux, d axis")
 _FIRST_Q = ("psi_1q", "First damper flux, q axis")
 _SECOND_Q = ("psi_2q", "Second damper flux, q axis")
 
-_NO_TIME = 1e-3
-"""Stands for the time constant [s] of a fast winding that a machine does not have."""
+_NO_TIME = 1e-3  # stands for the time constant [s] of a fast winding that a machine does not have
 
 
 def two_axis(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:

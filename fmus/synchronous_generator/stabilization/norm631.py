@@ -14,8 +14,7 @@ from fmus.toolchain.blocks import lead_lag, limit, low_pass, low_pass_or_nothing
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, if_else
 
-RAMP_LAGS = 5
-"""M of the ramp-tracking filter; N is 1."""
+RAMP_LAGS = 5  # M of the ramp-tracking filter; N is 1
 
 
 def pss2a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr) -> Expr:

@@ -115,8 +115,7 @@ def pss2a(m: ModelBuilder, delta_omega: Expr, P_e: Expr, P_e_0: Expr, *, newer: 
         return limited_output(m, signal)
 
 
-pss2b = partial(pss2a, newer=True)
-"""PSS2A with limited inputs and a third stage."""
+pss2b = partial(pss2a, newer=True)  # PSS2A with limited inputs and a third stage
 
 
 def _input_limits(m: ModelBuilder, number: str, text: str) -> tuple[Expr, Expr]:

@@ -92,8 +92,7 @@ def constant_torque(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         return power_reference(m, P_m_0) * w
 
 
-_LEAST_GATE = 1e-3
-"""Smallest gate [pu] that the flow is divided by."""
+_LEAST_GATE = 1e-3  # smallest gate [pu] that the flow is divided by
 
 
 def hygov(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:

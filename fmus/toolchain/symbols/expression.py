@@ -69,8 +69,7 @@ class Expr:
         return self.value
 
 
-Scalar = Expr | float
-"""An operand of equations."""
+Scalar = Expr | float  # an operand of equations
 
 
 def node(op: int, a: Expr, b: Expr) -> Expr:

@@ -42,8 +42,7 @@ C = _SAME | {
 }  # fmt: skip
 """The same in C."""
 
-UNARY = {op for op, form in PYTHON.items() if "{1}" not in form}
-"""Operations of one operand."""
+UNARY = {op for op, form in PYTHON.items() if "{1}" not in form}  # operations of one operand
 
 _scope: dict[str, Any] = {**NAMES, "atan": math.atan}
 VALUE: dict[int, Callable[[float, float], float]] = {

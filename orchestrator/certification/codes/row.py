@@ -70,8 +70,7 @@ class RowFinding:
     text: str
 
 
-Judge = Callable[[MeasuredRow], RowFinding]
-"""A criterion: the response of a row → whether it is met."""
+Judge = Callable[[MeasuredRow], RowFinding]  # A criterion: the response of a row → whether it is met
 
 
 @dataclass(frozen=True)

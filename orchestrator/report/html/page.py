@@ -120,8 +120,7 @@ def _of_run(run: Results, figures: Figures) -> Sections:
     return content
 
 
-_OPEN, _LONGEST = 4, 110
-"""What was not judged on the first page, and the characters of each."""
+_OPEN, _LONGEST = 4, 110  # what was not judged on the first page, and the characters of each
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
