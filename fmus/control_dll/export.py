@@ -24,7 +24,7 @@ _RULES = {
 def data_sheet(part: ControlPart, sample_time: float) -> str:
     model = part.model
     values = {p.name: p.start for p in model.parameters}
-    page = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
+    page = Path(__file__).with_name("sheet.txt").read_text(encoding="utf-8")
     return page.format(
         name=model.name, title=model.title, circuit=_circuit(part, values), bases=_bases(values),
         sample_time=sample_time, lead=part.lead, lead_time=values[part.lead], inputs=_signals(model.inputs),
