@@ -21,8 +21,20 @@ OTHERS = ("certification", "interop", "cli", "report/pdf.py", "cases/new_case.py
 """Where texts are for the command line alone: Python has no such functions."""
 
 COMMANDS_ALONE = {
-    *("broker", "broker_port", "external", "like", "engine", "against", "contest", "details", "generator", "junit"),
-    *("method", "no_csv", "json", "with_linear_model", "per_unit", "units_checked", "scr", "retune"),
+    *(
+        "broker",
+        "broker_port",
+        "external",
+        "like",
+        "engine",
+        "against",
+        "beside",
+        "contest",
+        "details",
+        "generator",
+        "junit",
+    ),
+    *("method", "no_csv", "json", "with_linear_model", "per_unit", "units_checked", "scr", "retune", "beside"),
 }
 """Options of errors that no function of the face has."""
 
