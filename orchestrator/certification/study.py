@@ -93,9 +93,12 @@ def certify(
         return {name: case.prepare([name], first)[0] for name in (WITHOUT, WITH)}
 
     if (own := rated_frequency(request, NORM_HZ)) != NORM_HZ:
+        from orchestrator.certification.codes.all_codes import CODES  # noqa: PLC0415 - only for this error
+
+        others = ", ".join(f"--code {key}" for key, code in CODES.items() if code.f_n == own) or "none"
         raise InputError(
-            f"{request.fmu}: it is rated at {own:g} Hz, and NTS 631 is a code of {NORM_HZ:g} Hz; of 60 Hz are "
-            "--code miso, ercot, nogrr245 and prc029; f_n of the FMU and rating.f_n of a binding say what it is"
+            f"{request.fmu}: it is rated at {own:g} Hz, and NTS 631 is a code of {NORM_HZ:g} Hz; of {own:g} Hz are "
+            f"{others}; f_n of the FMU and rating.f_n of a binding say what it is"
         )
     with refusing(request, folder, "in the study's case that `gfor certify` makes from the request") as trial:
         laid(trial)
