@@ -28,7 +28,7 @@ from orchestrator.api.saved import Saved as Saved
 from orchestrator.api.saved import open as open
 from orchestrator.api.scenario import Scenario as Scenario
 from orchestrator.api.source import source as source
-from orchestrator.certification.verification import Verification as Verification
+from orchestrator.certification.compared import Verification as Verification
 from orchestrator.coordinated_design.view import CoordinatedDesign as CoordinatedDesign
 from orchestrator.errors import CosimError as CosimError
 from orchestrator.immittance.view import Nyquist as Nyquist

@@ -15,7 +15,7 @@ from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
 
 if TYPE_CHECKING:
-    from orchestrator.certification.verification import Verification
+    from orchestrator.certification.compared import Verification
 
 
 class IssuedCertificate:
@@ -103,9 +103,10 @@ def certify(
     orchestrator.errors.InputError: code = 'misa'; choose from nts631, miso, ...
     """
     from orchestrator.certification.acceptance import run_checks  # noqa: PLC0415 - `verify` computes less
+    from orchestrator.certification.codes.all_codes import NTS631  # noqa: PLC0415 - as above
     from orchestrator.certification.files import JSON, read_record, save  # noqa: PLC0415 - as above
     from orchestrator.certification.inside import check_target, put_inside  # noqa: PLC0415 - as above
-    from orchestrator.certification.issue import NTS631, WITH_VERDICT, issue_of  # noqa: PLC0415 - as above
+    from orchestrator.certification.kinds import WITH_VERDICT, issue_of  # noqa: PLC0415 - as above
     from orchestrator.certification.request import PODS, REACTANCES  # noqa: PLC0415 - as above
 
     if code not in WITH_VERDICT:
@@ -125,7 +126,7 @@ def certify(
     usual = Path("results") / f"certify_{file.stem}{'' if code == NTS631 else f'_{code}'}"
     place = made_folder(usual if folder is None else path_of(folder, "folder", "folder"), "folder")
     with held(place), shown_progress(f"Certificate, {code}", shown=progress) as report:
-        with closing(choose_executor(workers, None, [issue.worker])) as executor:
+        with closing(choose_executor(workers, None, [issue.parts.task.__module__])) as executor:
             found = issue.compute(executor, place, report)
         found.acceptance = run_checks(issue.request.fmu, issue.request.binding, place) if check else None
         save(found, place)
@@ -172,9 +173,9 @@ def verify(
     ...     print(type(error).__name__)
     InputError
     """
-    from orchestrator.certification.anew import verified  # noqa: PLC0415 - as above
+    from orchestrator.certification.compared import Verification  # noqa: PLC0415 - as above
     from orchestrator.certification.inside import laid_out  # noqa: PLC0415 - as above
-    from orchestrator.certification.verification import Verification  # noqa: PLC0415 - as above
+    from orchestrator.certification.verification import verified  # noqa: PLC0415 - as above
 
     found, wanted = Verification(), None if anew is None else tuple(anew)
     with laid_out(path_of(certificate, "certificate")) as places:

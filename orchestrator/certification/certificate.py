@@ -1,71 +1,65 @@
 """The certificate of one converter under one code: what was judged, the verdict, and the sentence on it."""
 
+from __future__ import annotations
+
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Generic, Protocol, TypeVar
+from typing import Any
 
 from orchestrator.cases.schema import Value
 from orchestrator.certification.acceptance import Acceptance
 from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.codes.row import GridCode
+from orchestrator.certification.damping_controllers import DampingControllers
 from orchestrator.certification.details import Details
+from orchestrator.certification.judgement import watched
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.point import CONVERTER
-from orchestrator.certification.request import CertificationRequest
-from orchestrator.certification.verdict import PASSES, verdict_of
+from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
+from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because, verdict_of
 from orchestrator.errors import CaseError, Problem
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.values import as_text
 
 
-class Judged(Protocol):
-    """The verdict on one row of a code: a line reactance of NTS 631, or a row of the test bench."""
-
-    @property
-    def judged(self) -> bool: ...
-
-    @property
-    def accepted(self) -> bool | None: ...
-
-    def margins(self) -> list[CriterionMargin]:
-        """Every criterion that counts towards the verdict."""
-        ...
-
-
-Row_co = TypeVar("Row_co", bound=Judged, covariant=True)
-
-
 @dataclass
-class Certificate(ABC, Generic[Row_co]):
+class Certificate:
     request: CertificationRequest
     description: FmuDescription
-    verdicts: Sequence[Row_co]
+    code: GridCode[Any]
+    f_n: float
+    verdicts: Sequence[Any]  # each with ``name``, ``judged``, ``accepted``, ``unknown``, and its ``margins()``
+    results: Mapping[Any, Any]  # what was computed: by row, or by scenario and line reactance
+    case: Path  # the case file of the damping test, or of the first row
+    # every value of the system with the converter at the first row, by ``component.variable``
+    values: Mapping[str, float | bool] = field(default_factory=dict, kw_only=True)
+    damping: DampingTest | None = field(default=None, kw_only=True)  # what the damping test has beside
     stored: int = field(default=0, kw_only=True)  # number of rows that an earlier start had kept
     details: Details = field(default_factory=Details, kw_only=True)
     acceptance: Acceptance | None = field(default=None, kw_only=True)  # of the FMU; None where they were not run
 
     @property
-    @abstractmethod
-    def missing(self) -> tuple[object, ...]:
-        """Parts of the code that were not judged."""
-
-    @property
     def departures(self) -> tuple[str, ...]:
         """By what the test differs from the code's own."""
-        return self.request.departures
+        own = self.request.departures
+        if self.f_n == self.code.f_n:
+            return own
+        return (*own, f"the rated frequency, {self.f_n:g} Hz in place of {self.code.f_n:g} Hz")
 
-    @abstractmethod
-    def result(self) -> str:
-        """The verdict as a sentence, before anything is said of acceptance tests."""
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Why a test that nothing fails is not passed, its departures included."""
+        done = {v.name for v in self.verdicts if v.judged}
+        rows = tuple(f"row {r.name}" for r in self.code.rows if r.name not in done and not r.shown_only)
+        return (*rows, *self.code.left_out, *self.departures)
 
     @property
     def verdict(self) -> str:
-        accepted = [bool(row.accepted) for row in self.verdicts if row.judged]
-        return verdict_of(accepted, len(self.missing) + len(self.departures))
+        return verdict_of([bool(row.accepted) for row in self.verdicts if row.judged], len(self.missing))
 
     @property
     def passed(self) -> bool:
@@ -80,10 +74,62 @@ class Certificate(ABC, Generic[Row_co]):
         return [margin for row in self.verdicts if row.judged for margin in row.margins()]
 
     def sentence(self) -> str:
-        said = self.result()
+        """The verdict, with what failed or was not tested."""
+        said = rows_in_words(self) if self.damping is None else self.damping.in_words(self)
         if self.acceptance is not None and self.refused:
             said += f" Acceptance tests failed: {', '.join(self.acceptance.faults)}; do not rely on the FMU as it is."
         return said
+
+
+def rows_in_words(c: Certificate) -> str:
+    judged = [v for v in c.verdicts if v.judged]
+    bad = [v for v in judged if not v.accepted]
+    subject, title = f"The converter {c.description.model_name!r}", c.code.title
+    rows = f"{len(judged) - len(bad)} of {len(judged)} judged rows are accepted."
+    if bad:
+        names = "; ".join(f"{v.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
+        return f"{subject} {FAILS} {title}: {rows} Not accepted: {names}."
+    if c.verdict == INCOMPLETE:
+        untested = f"{len(c.missing)} parts of {title} were not tested."
+        return f"The test is {INCOMPLETE}: {untested} {subject}: {rows}"
+    return f"{subject} {PASSES} {title}: {rows}"
+
+
+@dataclass(frozen=True)
+class DampingTest:
+    """What NTS 631 has beside the rows of other codes: rows are line reactances, of a case of its own."""
+
+    controllers: DampingControllers
+    event_time: float
+
+    @property
+    def pod(self) -> str:
+        return self.controllers.pod
+
+    @property
+    def signal(self) -> str:
+        return watched(self.pod)
+
+    def in_words(self, c: Certificate) -> str:
+        subject = f"The converter {c.description.model_name!r} {self.controllers.in_words()}"
+        reasons = incomplete_because(missing_of(c), c.departures)
+        if c.verdict == PASSES:
+            return f"{subject} passes the damping test at all {len(REACTANCES)} line reactances, by both criteria."
+        if c.verdict == FAILS:
+            failed = [v for v in c.verdicts if v.judged and not v.accepted]
+            places, first = ", ".join(f"{v.X_L:g}" for v in failed), failed[0]
+            text = f"{subject} fails the damping test at X_L = {places} pu. At {first.X_L:g} pu: "
+            text += f"{'; '.join(first.faults)}."
+            return f"{text} The test is incomplete as well: {reasons}." if reasons else text
+        where = "is accepted where it was judged" if any(v.judged for v in c.verdicts) else "was judged nowhere"
+        unknown = [v for v in c.verdicts if not v.judged]
+        text = f"The damping test is incomplete: {reasons}. {subject} {where}"
+        return f"{text}; at {unknown[0].X_L:g} pu, {unknown[0].unknown}." if unknown else f"{text}."
+
+
+def missing_of(c: Certificate) -> tuple[float, ...]:
+    """Reactances of the norm that were not judged [pu]."""
+    return missing_reactances(v.X_L for v in c.verdicts if v.judged)
 
 
 _OWN = re.compile(rf'^(?:components\.{CONVERTER}\.parameters\.|--set {CONVERTER}\.)"?(?P<name>[^"]*)"?$')

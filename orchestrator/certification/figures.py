@@ -11,13 +11,13 @@ import xarray as xr
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.case_file import CASE, WITH, WITHOUT
+from orchestrator.certification.certificate import Certificate, DampingTest, missing_of
 from orchestrator.certification.criteria import ModeVerdict
 from orchestrator.certification.environment import environment
 from orchestrator.certification.form import NORM
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.point import COMPUTED, CONVERTER
 from orchestrator.certification.request import REACTANCES
-from orchestrator.certification.study import Certification
 from orchestrator.certification.swings import RecordedSwing, SwingTest
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.origin import read_origin
@@ -39,7 +39,7 @@ class ParameterRow:
     description: str
 
 
-def parameter_rows(c: Certification) -> list[ParameterRow]:
+def parameter_rows(c: Certificate) -> list[ParameterRow]:
     """Parameters, and inputs that are held, in the order of the file."""
     values = {own: (value, by) for own, value, by in _values(c, c.description)}
     rows = []
@@ -58,7 +58,7 @@ def _start(info: VariableInfo) -> Scalar | None:
     return str(info.start) if info.type == "Enumeration" else float(info.start)
 
 
-def _values(c: Certification, description: FmuDescription) -> Iterator[tuple[str, Scalar, str]]:
+def _values(c: Certificate, description: FmuDescription) -> Iterator[tuple[str, Scalar, str]]:
     """The FMU's own name, the value and its origin, for every variable that is not left at its start value."""
     bound = description if isinstance(description, BoundDescription) else None
     given = {name.partition(".")[2]: v for name, v in c.values.items() if name.startswith(f"{CONVERTER}.")}
@@ -77,26 +77,43 @@ def _values(c: Certification, description: FmuDescription) -> Iterator[tuple[str
             yield target, passed, _by(c, name)
 
 
-def _by(c: Certification, name: str) -> str:
+def _by(c: Certificate, name: str) -> str:
     if name in c.request.values:
         return "--set"
-    if name in c.controllers.settings:
+    if c.damping is None:
+        return f"the bench, in row {c.verdicts[0].name}"
+    if name in c.damping.controllers.settings:
         return "--pod"
     if name in _FLOW:
         return f"the power flow at X_L = {c.request.reactances[0]:g} pu"
     return "the study" if name in _STUDY else "the step size of the study"
 
 
-def certification_json(c: Certification) -> dict[str, Any]:
+def linearised_of(c: Certificate) -> dict[str, str]:
+    having = [point for (name, _), point in c.results.items() if name == WITH]
+    return {component: how for point in having for component, how in point.linearised.items()}
+
+
+def fit_errors_of(c: Certificate) -> dict[str, float]:
+    """The largest of each component."""
+    found: dict[str, float] = {}
+    for point in c.results.values():
+        for component, error in point.fit_errors.items():
+            found[component] = max(error, found.get(component, 0.0))
+    return found
+
+
+def damping_json(c: Certificate, test: DampingTest) -> dict[str, Any]:
+    missing = missing_of(c)
     return {
         "format": NORM,
-        "norm": "Norma técnica de supervisión 631 v2.0 (2020), section 5.10",
+        "norm": c.code.source,
         "tool": f"gfor-cosim {version('gfor-cosim')}",
         "verdict": c.verdict,
         "passed": c.passed,
         "sentence": c.sentence(),
-        "judged": f"{len(REACTANCES) - len(c.missing)} of {len(REACTANCES)}",
-        "missing": list(c.missing),
+        "judged": f"{len(REACTANCES) - len(missing)} of {len(REACTANCES)}",
+        "missing": list(missing),
         "departures": list(c.request.departures),
         "details": c.details.texts(),
         "fmu": {"file": c.request.fmu.name, "model": c.description.model_name, "guid": c.description.guid}
@@ -105,22 +122,22 @@ def certification_json(c: Certification) -> dict[str, Any]:
         "values": dict(c.request.values),
         "study_values": dict(c.request.study_values),
         "black_box": c.request.black_box,
-        "pod": c.pod,
-        "pod_source": c.controllers.source,
-        "pod_values": dict(c.controllers.settings),
+        "pod": test.pod,
+        "pod_source": test.controllers.source,
+        "pod_values": dict(test.controllers.settings),
         "parameters": [asdict(row) for row in parameter_rows(c)],
         "acceptance": None if c.acceptance is None else dict(c.acceptance.report),
-        "signal": c.signal,
-        "event_time": c.event_time,
-        "linearised": c.linearised,
-        "fit_errors": c.fit_errors,
+        "signal": test.signal,
+        "event_time": test.event_time,
+        "linearised": linearised_of(c),
+        "fit_errors": fit_errors_of(c),
         "environment": environment(),
         "points": [_point_json(c, v) for v in c.verdicts],
     }
 
 
-def _point_json(c: Certification, v: PointVerdict) -> dict[str, Any]:
-    points = {name: c.points[name, v.X_L] for name in (WITHOUT, WITH)}
+def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
+    points = {name: c.results[name, v.X_L] for name in (WITHOUT, WITH)}
     having, without = points[WITH], points[WITHOUT].modes
     return {
         "X_L": v.X_L, "accepted": v.accepted, "judged": v.judged, "faults": list(v.faults), "unknown": v.unknown,
@@ -192,22 +209,22 @@ def _swing_json(s: RecordedSwing) -> dict[str, Any]:
     return {"k": s.number, "line": s.line, "depth": s.depth} | {n: [p.time, p.value] for n, p in points.items()}
 
 
-def responses_dataset(c: Certification) -> xr.Dataset:
+def damping_responses(c: Certificate, test: DampingTest) -> xr.Dataset:
     """Recorded signals over scenario, X_L and time; NaN where a run ended early."""
-    whole = max(c.points.values(), key=lambda p: len(p.times))
-    names = dict.fromkeys(name for point in c.points.values() for name in point.signals)
+    whole = max(c.results.values(), key=lambda p: len(p.times))
+    names = dict.fromkeys(name for point in c.results.values() for name in point.signals)
     reactances, scenarios = list(c.request.reactances), [WITHOUT, WITH]
     data = {}
     for name in names:
         values = np.full((2, len(reactances), len(whole.times)), np.nan)
         for i, scenario in enumerate(scenarios):
             for k, X_L in enumerate(reactances):
-                signal = c.points[scenario, X_L].signals.get(name, np.empty(0))
+                signal = c.results[scenario, X_L].signals.get(name, np.empty(0))
                 values[i, k, : len(signal)] = signal
-        unit = next(p.units[name] for p in c.points.values() if name in p.units)
+        unit = next(p.units[name] for p in c.results.values() if name in p.units)
         data[name] = (
             ("scenario", "X_L", "time"),
-            values.astype(np.float32 if name != c.signal else float),
+            values.astype(np.float32 if name != test.signal else float),
             {"units": unit},
         )
     coordinates = {"scenario": scenarios, "X_L": ("X_L", reactances, {"units": "pu"}),

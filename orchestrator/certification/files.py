@@ -2,22 +2,18 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import xarray as xr
-
 from orchestrator.certification.acceptance import KEPT
-from orchestrator.certification.case_file import BINDING, CASE, FMU
-from orchestrator.certification.certificate import Certificate, Judged
-from orchestrator.certification.codes.bench_point import case_name
-from orchestrator.certification.codes.record import code_json, code_page, code_responses
-from orchestrator.certification.figures import certification_json, responses_dataset
+from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.certificate import Certificate
+from orchestrator.certification.codes.record import code_json, code_responses
+from orchestrator.certification.figures import damping_json, damping_responses
+from orchestrator.certification.form import case_files
 from orchestrator.certification.report import page
-from orchestrator.certification.study import Certification
 from orchestrator.report.pdf import print_pdf
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import file_hash, write_text
@@ -27,37 +23,18 @@ HTML, JSON, RESPONSES, PDF = "certificate.html", "certificate.json", "responses.
 _FIGURES = f"{JSON}, its figures"
 
 
-@dataclass(frozen=True)
-class _Form:
-    figures: Callable[[Any], dict[str, Any]]
-    responses: Callable[[Any], xr.Dataset]
-    page: Callable[[Any, Mapping[str, str | None], datetime], str]
-    cases: Callable[[Any], list[str]]
+def figures_of(c: Certificate) -> dict[str, Any]:
+    return code_json(c) if c.damping is None else damping_json(c, c.damping)
 
 
-def _form_of(certificate: Certificate[Judged]) -> _Form:
-    if isinstance(certificate, Certification):
-        return _Form(certification_json, responses_dataset, page, lambda _: [CASE])
-    return _Form(code_json, code_responses, lambda c, hashes, made: code_page(c, made, str(hashes[_FIGURES])),
-                 lambda c: [case_name(row.name) for row in c.code.rows if row.name in c.results])  # fmt: skip
-
-
-def figures_of(certificate: Certificate[Judged]) -> dict[str, Any]:
-    return _form_of(certificate).figures(certificate)
-
-
-def names_of(certificate: Certificate[Judged]) -> list[str]:
-    names = [FMU, *([BINDING] if certificate.request.binding else []), *_form_of(certificate).cases(certificate)]
-    return [*names, RESPONSES, *([KEPT] if certificate.acceptance else [])]
-
-
-def save(certificate: Certificate[Judged], folder: Path, *, pdf: bool = False) -> list[Path]:
-    html, target, form = folder / HTML, folder / JSON, _form_of(certificate)
-    made = datetime.now(UTC).replace(microsecond=0)
-    save_netcdf(form.responses(certificate), folder / RESPONSES)
-    hashes = {name: file_hash(folder / name) for name in names_of(certificate)}
-    content = {"made": made.isoformat(), **form.figures(certificate)}
-    write_text(html, form.page(certificate, hashes | {_FIGURES: figures_hash(content)}, made))
+def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
+    html, target, made = folder / HTML, folder / JSON, datetime.now(UTC).replace(microsecond=0)
+    responses = code_responses(c) if c.damping is None else damping_responses(c, c.damping)
+    save_netcdf(responses, folder / RESPONSES)
+    content = {"made": made.isoformat(), **figures_of(c)}
+    names = [FMU, *([BINDING] if c.request.binding else []), *case_files(content), RESPONSES]
+    hashes = {name: file_hash(folder / name) for name in [*names, *([KEPT] if c.acceptance else [])]}
+    write_text(html, page(c, hashes | {f"{JSON}, its figures": figures_hash(content)}, made))
     printed = [print_pdf(html, folder / PDF)] if pdf else []
     content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
     write_sealed(content, target)

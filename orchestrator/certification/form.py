@@ -1,12 +1,15 @@
 """The form of a certificate's JSON: the entries that a verification reads; all others it compares."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from orchestrator.certification.case_file import CASE
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES
+from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.errors import InputError
 
 _SHOWN = 60  # characters of a wrong value that are shown
@@ -135,3 +138,7 @@ def _wrong(kind: str, seen: object) -> str:
     text = json.dumps(seen, ensure_ascii=False, default=str)
     shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
     return f"is {shown}, which is not what a certificate has there"
+
+
+def case_files(content: Mapping[str, Any]) -> list[str]:
+    return [CASE] if content["format"] == NORM else [case_name(row["row"]) for row in content["rows"]]

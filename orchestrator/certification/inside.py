@@ -20,13 +20,13 @@ import numpy as np
 from orchestrator.arrays import Numbers
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.certification.anew import chosen_points
 from orchestrator.certification.case_file import CASE, FMU, WITH
+from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.files import JSON, read_record
 from orchestrator.certification.form import NORM
-from orchestrator.certification.issue import NTS631
 from orchestrator.certification.point import CONVERTER
+from orchestrator.certification.points_again import chosen_points
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.errors import CosimError, FmuFileError, InputError

@@ -21,6 +21,7 @@ from orchestrator.certification.criteria import (
 )
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
+from orchestrator.certification.request import row_of
 from orchestrator.certification.swings import LARGEST_RATIO, SLOWEST_PERIOD, SwingTest, slow_part, swing_test
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
 from orchestrator.watch.limits import told_of
@@ -69,6 +70,10 @@ class PointVerdict:
     unknown: str = ""  # why the point could not be judged at all; empty where it was
     # the least damped judged mode without the converter [rad/s]; None where there is none.
     base_critical: complex | None = None
+
+    @property
+    def name(self) -> str:
+        return row_of(self.X_L)
 
     @property
     def judged(self) -> bool:

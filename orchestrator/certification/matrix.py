@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from orchestrator.cases.devices import Device
-from orchestrator.certification.certificate import Certificate, Judged
+from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.frequency_domain import FIGURES_JSON, FIGURES_PNG
 from orchestrator.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
 from orchestrator.certification.environment import environment
@@ -43,7 +43,7 @@ class MatrixCell:
     # what a code without a verdict gives, in words; None of a code with one. Whatever it is, it decides nothing.
     figures: Sequence[str] | None = None
 
-    def take(self, found: Certificate[Judged]) -> None:
+    def take(self, found: Certificate) -> None:
         self.verdict, self.sentence, self.refused = found.verdict, found.sentence(), found.refused
         self.margins, self.missing = found.margins, len(found.missing)
         self.judged = sum(1 for v in found.verdicts if v.judged)

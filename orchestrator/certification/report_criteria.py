@@ -1,20 +1,78 @@
 """The two criteria on a certificate's page: every mode, and every response with the norm's construction."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from html import escape
 
 import numpy as np
 
+from orchestrator.analysis.linear_model import PACKED
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.certification.case_file import WITH, WITHOUT
+from orchestrator.certification.certificate import Certificate, DampingTest
 from orchestrator.certification.criteria import PAIRED, is_judged, is_near
-from orchestrator.certification.judgement import PointVerdict, TimeVerdict
-from orchestrator.certification.point import COMPUTED, FREQUENCY
-from orchestrator.certification.study import Certification
+from orchestrator.certification.figures import fit_errors_of, linearised_of
+from orchestrator.certification.judgement import LOWERED, PointVerdict, TimeVerdict
+from orchestrator.certification.point import COMPUTED, CONVERTER, FREQUENCY, PointResult
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
-from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, table
+from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
+from orchestrator.report.linearised import exceptions_in_words
 
 _SHOWN = 30.0  # length of the drawn part of the response, from the event on [s]. The whole response is judged.
+
+
+PODS = {"none": "none", "p": "POD-P", "q": "POD-Q", "pq": "POD-P and POD-Q"}
+
+
+def damping_chapters(c: Certificate, test: DampingTest, figures: Figures) -> list[tuple[str, str]]:
+    return [
+        ("Result at every line reactance", _overview(c)),
+        ("Dampings that the converter lowers", _lowered(c)),
+        ("Stability at all frequencies", _stability(c)),
+        ("Eigenvalue criterion", eigenvalues(c, figures)),
+        ("Time-domain criterion", "".join(part for v in c.verdicts for part in _response(c, v, test, figures))),
+    ]
+
+
+def damping_findings(c: Certificate, test: DampingTest) -> Iterator[str]:
+    yield f"Eigenvalue criterion: {_where([v for v in c.verdicts if v.judged and not v.eigenvalues_accepted])}"
+    bad = [v for v in c.verdicts if v.judged and (v.time is None or not v.time.accepted)]
+    yield f"Time-domain criterion on {signal_name(test.signal)}: {_where(bad)}"
+    yield escape(converter_model(c.results[WITH, v.X_L] for v in c.verdicts))
+    yield f"Damping controllers: {PODS[test.pod]} ({escape(test.controllers.source)})"
+    yield from _least_and_growth(c)
+    yield from _remark(c)
+
+
+def told_of_damping(c: Certificate, test: DampingTest) -> dict[str, str]:
+    """Lines of the table of the converter."""
+    linearised = linearised_of(c)
+    return {
+        "Damping controllers": f"{PODS[test.pod]}: {test.controllers.source}",
+        "Watched in time": signal_name(test.signal),
+        "In the modes": converter_model(c.results[WITH, v.X_L] for v in c.verdicts),
+        "Linear models": exceptions_in_words(linearised, fit_errors_of(c))
+        or ("all by perturbing the running FMUs" if linearised else "not recorded"),
+    }
+
+
+def signal_name(signal: str) -> str:
+    return "the frequency at bus 2" if signal == FREQUENCY else "SG1's active power"
+
+
+def converter_model(points: Iterable[PointResult]) -> str:
+    known = [p for p in points if p.modes is not None]
+    boxes = [p for p in known if p.identified is not None]
+    if boxes:
+        orders = ", ".join(dict.fromkeys(str(p.identified) for p in boxes))
+        error = max(p.fit_errors.get(CONVERTER, 0.0) for p in boxes)
+        return (
+            f"Black box: a model identified at its port, of order {orders}; largest relative fitting error {error:.1e}"
+        )
+    if any(p.linearised.get(CONVERTER) == PACKED for p in known):
+        return (
+            "The model packed in the FMU stands for the converter in the modes; it was compared with its own response"
+        )
+    return "White box: the FMU's own states were perturbed" if known else "Modes of the converter are not known"
 
 
 def before(value: complex | None) -> str:
@@ -27,10 +85,10 @@ def verdict(accepted: bool) -> str:
     return '<span class="good">accepted</span>' if accepted else '<span class="bad">not accepted</span>'
 
 
-def eigenvalues(c: Certification, figures: Figures) -> str:
+def eigenvalues(c: Certificate, figures: Figures) -> str:
     marks = []
     for k, scenario in enumerate((WITHOUT, WITH)):
-        for (name, X_L), point in c.points.items():
+        for (name, X_L), point in c.results.items():
             if name != scenario or point.modes is None:
                 continue
             for value, words in zip(point.modes.eigenvalues.tolist(), point.components, strict=True):
@@ -70,8 +128,8 @@ def _modes_beside(v: PointVerdict) -> str:
     return table(caption, columns, rows) if rows else f'<p class="soft">{caption}: none.</p>'
 
 
-def _base_modes(c: Certification, v: PointVerdict) -> str:
-    point = c.points[WITHOUT, v.X_L]
+def _base_modes(c: Certificate, v: PointVerdict) -> str:
+    point = c.results[WITHOUT, v.X_L]
     if point.modes is None:
         return ""
     entries = zip(point.modes.eigenvalues.tolist(), point.components, strict=True)
@@ -86,16 +144,12 @@ def _base_modes(c: Certification, v: PointVerdict) -> str:
     return table(caption, ["λ [rad/s]", "f [Hz]", "Damping [%]", "Who takes part"], rows) + note
 
 
-def responses(c: Certification, figures: Figures) -> str:
-    return "".join(part for v in c.verdicts for part in _response(c, v, figures))
-
-
-def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[str]:
+def _response(c: Certificate, v: PointVerdict, test: DampingTest, figures: Figures) -> Iterator[str]:
     yield f"<h3>X_L = {v.X_L:g} pu</h3>"
     if v.time is None:
         yield f'<p class="bad">{escape("; ".join(v.faults) or v.unknown)}</p>'
         return
-    label, curves = response_curves(c, v, v.time)
+    label, curves = response_curves(c, v, test.event_time)
     picture, link = figures.add(
         line_chart(f"Response at X_L = {v.X_L:g} pu", "Time [s]", label, curves),
         f"Response to +2 % of SG2's voltage reference at X_L = {v.X_L:g} pu. Dashed: without the converter. "
@@ -104,21 +158,23 @@ def _response(c: Certification, v: PointVerdict, figures: Figures) -> Iterator[s
     reasons = f"{escape(v.time.swings.reason)}. By its modes: {escape(v.time.modal.reason)}."
     yield f"<p>{link}: {reasons} {verdict(v.time.accepted)}</p>"
     yield picture
-    yield _swing_table(v.time, c.points[WITH, v.X_L].units[v.time.signal])
+    yield _swing_table(v.time, c.results[WITH, v.X_L].units[v.time.signal])
     yield _modal_table(v.time)
 
 
-def response_curves(c: Certification, v: PointVerdict, time: TimeVerdict) -> tuple[str, list[ChartCurve]]:
+def response_curves(c: Certificate, v: PointVerdict, event_time: float) -> tuple[str, list[ChartCurve]]:
     """The response with the norm's construction, and what it is of."""
-    unit = c.points[WITH, v.X_L].units[time.signal]
+    time = v.time
+    assert time is not None
+    unit = c.results[WITH, v.X_L].units[time.signal]
     curves = []
     for k, scenario in enumerate((WITHOUT, WITH)):
-        point = c.points[scenario, v.X_L]
+        point = c.results[scenario, v.X_L]
         if time.signal in point.signals:
-            shown = point.times <= c.event_time + _SHOWN
+            shown = point.times <= event_time + _SHOWN
             curves.append(ChartCurve(f"{scenario} the converter", colour(k), point.times[shown],
                                 point.signals[time.signal][shown], dashed=scenario == WITHOUT))  # fmt: skip
-    curves += _construction(time, c.event_time + _SHOWN)
+    curves += _construction(time, event_time + _SHOWN)
     return f"{'Frequency at bus 2' if time.signal == FREQUENCY else 'Active power of SG1'} [{unit}]", curves
 
 
@@ -157,3 +213,85 @@ def _modal_table(time: TimeVerdict) -> str:
     ]  # fmt: skip
     columns = ["λ [rad/s]", "f [Hz]", "Damping [%]", "Amplitude"]
     return table("Modes in the signal from 0.1 to 1.5 Hz (matrix pencil)", columns, rows) if rows else ""
+
+
+def _overview(c: Certificate) -> str:
+    rows = []
+    for v in c.verdicts:
+        worst = v.modes[0] if v.modes else None
+        row = [f"{v.X_L:g}"]
+        row += [f"{worst.frequency_hz:.3f}", damping(worst.damping_percent)] if worst else ["–", "–"]
+        row += [before(worst.before) if worst else "–", *_time_cells(v.time), _said(c, v)]
+        rows.append(row)
+    columns = ["X_L [pu]", "Least damped mode [Hz]", "Damping [%]", "Without the converter",
+               "ΔP1M1", "ΔP5M5", "Ratio", "Least damping in the signal [%]", "Verdict"]  # fmt: skip
+    reasons = [(v.X_L, "; ".join(v.faults) or v.unknown) for v in c.verdicts]
+    listed = "".join(f"<li>X_L = {X_L:g} pu: {escape(reason)}</li>" for X_L, reason in reasons if reason)
+    return table("All line reactances, with the converter", columns, rows) + (f"<ul>{listed}</ul>" if listed else "")
+
+
+def _said(c: Certificate, v: PointVerdict) -> str:
+    beyond = "" if any(v.name == row.name for row in c.code.rows) else ", beyond the norm's"
+    return (verdict(v.accepted) if v.judged else '<span class="bad">not judged</span>') + beyond
+
+
+def _time_cells(time: TimeVerdict | None) -> list[str]:
+    if time is None:
+        return ["–"] * 4
+    swings, test = time.swings.swings, time.swings
+    depths = [f"{s.depth:.4g}" for s in (swings[0], swings[4])] if len(swings) >= 5 else [
+        f"{swings[0].depth:.4g}" if swings else "–", "died out" if test.accepted else "–"]  # fmt: skip
+    ratio = "–" if test.ratio is None else f"{test.ratio:.3f}"
+    least = min((m.damping_percent for m in time.modal.modes), default=None)
+    return [*depths, ratio if test.accepted else f'<span class="bad">{ratio}</span>',
+            "–" if least is None else damping(least)]  # fmt: skip
+
+
+def _remark(c: Certificate) -> Iterator[str]:
+    lowered = [(m, v.X_L) for v in c.verdicts for m in v.lowered]
+    if lowered:
+        worst, X_L = min(lowered, key=lambda entry: entry[0].damping_percent)
+        places = ", ".join(f"{X:g}" for X in dict.fromkeys(X for _, X in lowered))
+        change = f"from {number(worst.before_percent or 0.0, 2)} to {damping(worst.damping_percent)} %"
+        yield (
+            f"<b>Remark: the converter lowers a damping by more than {LOWERED:g} points at X_L = {places} pu</b>; the "
+            f"lowest of them at {X_L:g} pu and {worst.frequency_hz:.3f} Hz, {change}"
+        )
+
+
+def _where(bad: list[PointVerdict]) -> str:
+    places = ", ".join(f"{v.X_L:g}" for v in bad)
+    return f"not accepted at X_L = {places} pu" if bad else "accepted wherever it was judged"
+
+
+def _least_and_growth(c: Certificate) -> Iterator[str]:
+    least = min((m for v in c.verdicts for m in v.modes), key=lambda m: m.damping_percent, default=None)
+    if least is not None:
+        yield f"Least damping of all judged modes: {damping(least.damping_percent)} % at {least.frequency_hz:.3f} Hz"
+    growing = [c.results[WITH, v.X_L] for v in c.verdicts]
+    if growing and all(p.modes is not None for p in growing):
+        worst = max(growing, key=lambda p: p.growth)
+        words = worst.stability["sentence"] if worst.stability else f"{worst.growth:+.3g} 1/s"
+        yield f"All frequencies, largest growth rate with the converter, at {worst.X_L:g} pu: {escape(words)}"
+
+
+def _lowered(c: Certificate) -> str:
+    rows = [
+        [f"{v.X_L:g}", f"{m.frequency_hz:.3f}", number(m.before_percent or 0.0, 2), damping(m.damping_percent),
+         number(m.damping_percent - (m.before_percent or 0.0), 2), escape(m.components)]
+        for v in c.verdicts for m in v.lowered
+    ]  # fmt: skip
+    columns = ["X_L [pu]", "f [Hz]", "from [%]", "to [%]", "by [points]", "Who takes part"]
+    caption = f"Modes whose damping is lower by more than {LOWERED:g} points than without the converter"
+    said = "The norm asks for 5 % only; what is here is for the reader to weigh."
+    return f"{table(caption, columns, rows)}<p>{said}</p>" if rows else f"<p>{caption}: none.</p>"
+
+
+def _stability(c: Certificate) -> str:
+    rows = [
+        [f"{v.X_L:g}", name, escape(p.stability["sentence"]) if p.stability else f"{p.growth:+.3g} 1/s"]
+        for v in c.verdicts for name in (WITHOUT, WITH) if (p := c.results[name, v.X_L]).modes is not None
+    ]  # fmt: skip
+    caption = "The verdict over the whole spectrum, whatever the frequency"
+    note = "<p>The free angle of the system has an eigenvalue of 0, which is left out.</p>"
+    return table(caption, ["X_L [pu]", "The converter", "Verdict"], rows, left=3) + note

@@ -60,6 +60,11 @@ def rated_frequency(request: CertificationRequest, wanted: float) -> float:
     return wanted if "f_n" in description.variables else 50.0
 
 
+def row_of(X_L: float) -> str:
+    """The row of NTS 631 that a line reactance [pu] is; as many digits as `same_reactance` tells apart."""
+    return f"X_L = {X_L:.9g} pu"
+
+
 def same_reactance(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=1e-9)
 

@@ -14,19 +14,18 @@ from rich.text import Text
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.cases.devices import Device
 from orchestrator.certification.acceptance import read_checks, run_checks
-from orchestrator.certification.certificate import Certificate, Judged
+from orchestrator.certification.certificate import Certificate, DampingTest
 from orchestrator.certification.codes import frequency_domain
-from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.codes.row import checked
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.inside import check_target, put_inside
-from orchestrator.certification.issue import NTS631, WITH_VERDICT, bench_request, issue_of
 from orchestrator.certification.judgement import PointVerdict
+from orchestrator.certification.kinds import WITH_VERDICT, bench_request, issue_of
 from orchestrator.certification.margins import margin_of, narrowest
 from orchestrator.certification.request import REACTANCES, STUDY, rated_frequency
-from orchestrator.certification.study import Certification
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
 from orchestrator.cli.arguments import choose_executor
 from orchestrator.cli.certify_sensitivities import find_needs
@@ -43,15 +42,15 @@ from orchestrator.watch.finding import MISFIT
 _LONGEST = 100  # of a remark in the first table [characters]
 
 
-def show(found: Certificate[Judged], files: Sequence[Path], folder: Path, console: Console) -> None:
+def show(found: Certificate, files: Sequence[Path], folder: Path, console: Console) -> None:
     colour = {INCOMPLETE: "yellow"}.get(found.verdict, "green" if found.passed and not found.refused else "red")
     said = found.sentence()
-    if isinstance(found, CodeCertificate) and found.departures:
+    if found.damping is None and found.departures:
         said += f" Not as the code has it: {', '.join(found.departures)}."
     console.print(f"[bold {colour}]{escape(said)}[/]", soft_wrap=True)
-    if isinstance(found, Certification):
-        _show_damping_test(found, console)
-    elif isinstance(found, CodeCertificate):
+    if found.damping is not None:
+        _show_damping_test(found, found.damping, console)
+    else:
         console.print(_verdicts(found), "")
         for text in _remarks(found):
             console.print(escape(text), soft_wrap=True, highlight=False)
@@ -59,7 +58,7 @@ def show(found: Certificate[Judged], files: Sequence[Path], folder: Path, consol
     console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
 
 
-def _verdicts(found: CodeCertificate) -> PlainTable:
+def _verdicts(found: Certificate) -> PlainTable:
     table = make_table(f"{found.code.title}: {found.description.model_name}", "Row", "Verdict", "Criteria met",
                        "Least margin", "Remark", left=99)  # fmt: skip
     judged = [v for v in found.verdicts if v.judged]
@@ -79,7 +78,7 @@ def _verdicts(found: CodeCertificate) -> PlainTable:
     return table
 
 
-def _remarks(found: CodeCertificate) -> list[str]:
+def _remarks(found: Certificate) -> list[str]:
     """Remarks on the device, its acceptance tests and parts not tested, each once."""
     said = _misfits(r.findings for r in found.results.values())
     if isinstance(found.description, BoundDescription):
@@ -93,7 +92,7 @@ def _misfits(findings: Iterable[Sequence[Mapping[str, Any]]]) -> list[str]:
     return list(dict.fromkeys(str(f["message"]) for found in findings for f in found if f["kind"] == MISFIT))
 
 
-def _criteria(found: CodeCertificate) -> PlainTable:
+def _criteria(found: Certificate) -> PlainTable:
     table = make_table("Criteria", "Row", "Criterion", "Found", "Margin", "", left=99)
     for v in found.verdicts:
         for f in v.findings:
@@ -101,10 +100,10 @@ def _criteria(found: CodeCertificate) -> PlainTable:
     return table
 
 
-def _show_damping_test(found: Certification, console: Console) -> None:
-    for text in _misfits(p.findings for p in found.points.values()):
+def _show_damping_test(found: Certificate, test: DampingTest, console: Console) -> None:
+    for text in _misfits(p.findings for p in found.results.values()):
         console.print(escape(text), soft_wrap=True, highlight=False)
-    table = make_table(f"Damping test, {found.signal} watched", "X_L [pu]", "least damped [Hz]", "ξ [%]",
+    table = make_table(f"Damping test, {test.signal} watched", "X_L [pu]", "least damped [Hz]", "ξ [%]",
                        "the same without", "ΔP5M5/ΔP1M1", "in the signal: ξ [%]", "", left=0)  # fmt: skip
     for v in found.verdicts:
         table.add_row(f"{v.X_L:g}", *_figures(v), "accepted" if v.accepted else
@@ -114,7 +113,7 @@ def _show_damping_test(found: Certification, console: Console) -> None:
         if said := v.of_base_critical():
             console.print(f"X_L = {v.X_L:g} pu: {escape(said)}", soft_wrap=True, highlight=False)
     if found.stored:
-        console.print(f"{found.stored} of {len(found.points)} points were there already")
+        console.print(f"{found.stored} of {len(found.results)} points were there already")
 
 
 def _figures(v: PointVerdict) -> Iterator[str]:
@@ -150,7 +149,7 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
     if not options.json:
         show(found, files, folder, console)
     beside: dict[str, Any] = {}
-    if options.sensitivities and isinstance(found, CodeCertificate):
+    if options.sensitivities and found.damping is None:
         beside = {"sensitivities": find_needs(options, found, folder, console)}
     if options.json:
         content = json.loads((folder / JSON).read_text(encoding="utf-8"))
@@ -171,7 +170,7 @@ def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -
 
 def certified(
     options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
-) -> tuple[Certificate[Judged], list[Path]]:
+) -> tuple[Certificate, list[Path]]:
     """Compute a certificate with its acceptance tests, and write its files; points are kept as they come."""
     issue = issue_of(
         key, device.file, device.binding, device.values, declared=dict(options.declare), pod=options.pod,
@@ -183,8 +182,8 @@ def certified(
     made_folder(folder, "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):
-        executor = choose_executor(options, [issue.worker])
-        told = (f"{device.name}, {key}: computing", issue.rows)
+        executor = choose_executor(options, [issue.parts.task.__module__])
+        told = (f"{device.name}, {key}: computing", f"{issue.parts.one}s")
         found = progress.compute(lambda report: issue.compute(executor, folder, report), executor, console, told)
         if acceptance is not None:
             acceptance.keep(folder)

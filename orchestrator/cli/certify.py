@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from orchestrator.cases.devices import devices_of
+from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.details import TEMPLATE
-from orchestrator.certification.issue import NTS631
 from orchestrator.certification.request import PODS, REACTANCES
 from orchestrator.cli.arguments import add_executor_arguments, option, reactances, repeatable, setting, switch
 from orchestrator.cli.certificate import ALL, CODE_NAMES, GB, codes_of, run_one, run_stiffness

@@ -10,11 +10,10 @@ from rich.markup import escape
 
 from orchestrator.cases.devices import Device
 from orchestrator.certification.acceptance import KEPT
-from orchestrator.certification.codes.all_codes import BY_DECLARATION
-from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.certificate import Certificate
+from orchestrator.certification.codes.all_codes import BY_DECLARATION, NTS631
 from orchestrator.certification.codes.frequency_domain import stiffness_in_words
 from orchestrator.certification.codes.row import checked
-from orchestrator.certification.issue import NTS631
 from orchestrator.certification.matrix import (
     FIGURES,
     NOT_TESTED,
@@ -96,7 +95,7 @@ def _tested(
             cell.take(found)
             if not (options.json or several):
                 show(found, files, own, console)
-            if options.sensitivities and isinstance(found, CodeCertificate):
+            if options.sensitivities and found.damping is None:
                 _take_needs(options, found, cell, own, console)
         if not options.no_check and key != GB:
             options.check = own / KEPT
@@ -108,7 +107,7 @@ def _tested(
 
 
 def _take_needs(
-    options: argparse.Namespace, found: CodeCertificate, cell: MatrixCell, folder: Path, console: Console
+    options: argparse.Namespace, found: Certificate, cell: MatrixCell, folder: Path, console: Console
 ) -> None:
     """Find the needs of failed criteria; where that fails, the certificate stands."""
     if not options.json:

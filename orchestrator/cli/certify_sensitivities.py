@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.asked import read_part
+from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes import needs_record
-from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.change_point import ChangeTask
 from orchestrator.certification.codes.what_it_takes import CHANGE, confirm_changes, plan_changes, run_changes
 from orchestrator.cli.arguments import choose_executor, repeatable, switch
@@ -49,7 +49,7 @@ def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str],
 
 
 def find_needs(
-    options: argparse.Namespace, certificate: CodeCertificate, folder: Path, console: Console
+    options: argparse.Namespace, certificate: Certificate, folder: Path, console: Console
 ) -> dict[str, Any] | None:
     """Run what failed rows would take, and write and print it.
 

@@ -8,10 +8,12 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from orchestrator.certification.anew import POINTS, TOLERANCE, TOLERANCE_IDENTIFIED, Verified, verified
+from orchestrator.certification.codes.all_codes import NTS631
+from orchestrator.certification.compared import TOLERANCE, TOLERANCE_IDENTIFIED
 from orchestrator.certification.inside import laid_out
-from orchestrator.certification.issue import NTS631
+from orchestrator.certification.kinds import POINTS
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
+from orchestrator.certification.verification import Verified, verified
 from orchestrator.cli.arguments import add_executor_arguments, choose_executor, option, reactances
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import INTERRUPTED

@@ -12,14 +12,12 @@ from orchestrator.api.case import Case, load
 from orchestrator.certification.case_file import CASE
 from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.bench_point import case_name
-from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.record import pictures_of
 from orchestrator.certification.files import JSON, RESPONSES, read_record
+from orchestrator.certification.kinds import rebuilt
 from orchestrator.certification.margins import margin_text
 from orchestrator.certification.matrix import MATRIX_JSON
-from orchestrator.certification.rebuilt import rebuilt
 from orchestrator.certification.report_criteria import response_curves
-from orchestrator.certification.study import Certification
 from orchestrator.certification.verification import read_certificate, verify_files
 from orchestrator.errors import InputError
 from orchestrator.report.cells import CELLS, check_case, found_from, read_cells
@@ -66,11 +64,11 @@ def certified(file: Path) -> tuple[str, dict[str, Any]]:
     }  # fmt: skip
 
 
-def _rows(certificate: Certificate[Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+def _rows(certificate: Certificate) -> Iterator[tuple[str, str, dict[str, Any]]]:
     """Of each row its name, its case file, and its cell."""
     for verdict in certificate.verdicts:
         pictures: list[tuple[str, list[ChartCurve], str]] = []
-        if isinstance(certificate, CodeCertificate):
+        if certificate.damping is None:
             name, bench, said = verdict.row.name, case_name(verdict.row.name), [verdict.row.title]
             said += [f"{f.criterion}: {verdict.word(f)}, {f.text} (margin {margin_text(f.margin)})"
                      for f in verdict.findings]  # fmt: skip
@@ -79,8 +77,9 @@ def _rows(certificate: Certificate[Any]) -> Iterator[tuple[str, str, dict[str, A
         else:
             name, bench, said = f"X_L = {verdict.X_L:g} pu", CASE, list(verdict.faults)
             said += [f"{m.criterion}: {m.text} (margin {margin_text(m.margin)})" for m in verdict.margins()]
-            if isinstance(certificate, Certification) and verdict.time is not None:
-                pictures = [(*response_curves(certificate, verdict, verdict.time), verdict.time.swings.reason)]
+            if verdict.time is not None:
+                event_time = certificate.damping.event_time
+                pictures = [(*response_curves(certificate, verdict, event_time), verdict.time.swings.reason)]
         said += [f"not judged: {verdict.unknown}"] if verdict.unknown else []
         yield name, bench, {
             "text": "\n".join(said), "stable": verdict.accepted if verdict.judged else None,

@@ -49,7 +49,7 @@ def test_a_vendors_black_box_is_certified_and_does_something_to_the_modes(galler
     fmu, binding = gallery("converter_power_si")
     result = certify(CertificationRequest(fmu, binding, reactances=(0.3,)), Serial(), tmp_path)
     assert result.verdicts[0].accepted
-    assert result.points["with", 0.3].identified is not None
+    assert result.results["with", 0.3].identified is not None
     least = result.verdicts[0].modes[0]
     assert least.damping_percent == pytest.approx(36.4, abs=0.5)  # without the converter: 13.8 %
     assert "converter" in least.components

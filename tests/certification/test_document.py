@@ -19,7 +19,7 @@ from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.environment import environment
 from orchestrator.certification.judgement import judge
 from orchestrator.certification.point import POWER, PointResult
-from orchestrator.certification.report import converter_model
+from orchestrator.certification.report_criteria import converter_model
 from orchestrator.errors import CaseError, InputError
 from orchestrator.report.pdf import find_browser
 from tests.certification.fabricated import rings
@@ -82,7 +82,7 @@ def test_machine_versions_and_hashes_stand_there(document):
 
 def test_what_was_read_into_the_norm_and_what_this_does_not_prove_stand_there(document):
     page = " ".join(document.page.split())
-    assert "norm's own text was not at hand" in page
+    assert "norm&#x27;s own text was not at hand" in page
     assert "no protection against forgery" in page
     assert "White box: the FMU&#x27;s own states" in page
 

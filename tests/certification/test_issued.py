@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.certification.files import figures_hash, write_sealed
-from orchestrator.certification.rebuilt import rebuilt
+from orchestrator.certification.kinds import rebuilt
 from orchestrator.safe_files import file_hash
 
 ISSUED = Path(__file__).parent / "issued"

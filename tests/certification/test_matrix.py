@@ -9,15 +9,14 @@ import pytest
 
 import orchestrator as gfor_api
 from orchestrator.analysis.identification import IdentifiedMode
+from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.all_codes import CODES
-from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.criteria import ModalTest, ModeVerdict
 from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.margins import CriterionMargin, narrowest
 from orchestrator.certification.matrix import CertificateMatrix, MatrixCell, in_words, matrix_json, matrix_page
-from orchestrator.certification.study import Certification
 from orchestrator.certification.swings import SwingTest
 
 
@@ -83,7 +82,7 @@ def response(ratio, least=None, *, swings=True, modal=True):
 
 def norm(modes, time, faults=()):
     point = PointVerdict(0.1, modes, time, None, tuple(faults))
-    made = object.__new__(Certification)
+    made = object.__new__(Certificate)
     made.verdicts = [point]
     return made.margins
 
@@ -106,7 +105,7 @@ def test_a_row_without_a_verdict_or_an_answer_gives_no_margin():
     """AEMO's ±60° are shown only: a failure there must not stand as the narrowest margin."""
     bad, good = (RowFinding("settles", "", "code", 1.0, 1.0, m, m >= 0, "found") for m in (-5.0, 0.2))
     rows = {row.name: row for row in CODES["aemo"].rows}
-    made = object.__new__(CodeCertificate)
+    made = object.__new__(Certificate)
     made.verdicts = [RowVerdict(rows["jump_60"], (bad,)), RowVerdict(rows["jump_10"], (good,)),
                      RowVerdict(rows["rocof"], unknown="no licence")]  # fmt: skip
     assert [(m.place, m.margin) for m in made.margins] == [("jump_10", 0.2)]

@@ -22,8 +22,8 @@ from orchestrator.cases.case import load_case
 from orchestrator.certification import point as point_module
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
-from orchestrator.certification.figures import certification_json
-from orchestrator.certification.files import save
+from orchestrator.certification.figures import fit_errors_of, linearised_of
+from orchestrator.certification.files import figures_of, save
 from orchestrator.certification.judgement import judge, watched
 from orchestrator.certification.point import FREQUENCY, POWER, PointResult
 from orchestrator.certification.request import REACTANCES, CertificationRequest
@@ -216,7 +216,7 @@ def test_threads_of_one_worker_compute_one_point_at_a_time(tmp_path, fmu_path, m
 
     monkeypatch.setattr(point_module, "_compute", compute)
     result = certify(CertificationRequest(fmu_path("gfor"), reactances=(0.1,)), Threads(), tmp_path)
-    assert [point.failure for point in result.points.values()] == ["not computed"] * 2
+    assert [point.failure for point in result.results.values()] == ["not computed"] * 2
     assert most == [1, 1]
 
 
@@ -277,7 +277,7 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
     for verdict in result.verdicts:
         assert verdict.accepted != wanted[verdict.X_L], verdict.faults
     assert any(wanted.values()) == (gain > 1000)
-    sentence = certification_json(result)["sentence"]
+    sentence = figures_of(result)["sentence"]
     for X_L, bad in wanted.items():
         assert not bad or f"{X_L:g}" in sentence
     save(result, tmp_path)
@@ -296,9 +296,9 @@ def test_a_converter_that_hides_its_states_gets_the_same_verdict(tmp_path, execu
         )
         for black_box in (False, True)
     ]
-    assert [result.linearised["converter"] for result in results] == ["perturbed", "identified"]
-    assert certification_json(results[1])["linearised"] == results[1].linearised
-    assert 0 < results[1].fit_errors["converter"] < 1e-3
+    assert [linearised_of(result)["converter"] for result in results] == ["perturbed", "identified"]
+    assert figures_of(results[1])["linearised"] == linearised_of(results[1])
+    assert 0 < fit_errors_of(results[1])["converter"] < 1e-3
     save(results[1], tmp_path)
     assert "converter (fitting error" in (tmp_path / "certificate.html").read_text(encoding="utf-8")
     shown, hidden = (result.verdicts[0] for result in results)

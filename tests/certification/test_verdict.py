@@ -78,7 +78,7 @@ def test_less_than_thirteen_are_incomplete(certified, reactances, judged):
     assert "passes" not in content["sentence"]
     assert (content["verdict"], content["passed"], content["judged"]) == ("incomplete", False, judged)
     assert f"incomplete ({judged})</h1>" in page
-    assert ("beyond the norm" in page.partition("<h2>How the norm was read")[0]) == (reactances[-1] not in REACTANCES)
+    assert ("beyond the norm" in page.partition("<h2>How the code was read")[0]) == (reactances[-1] not in REACTANCES)
 
 
 UNSTABLE = {"growth": 104.6}

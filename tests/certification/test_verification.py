@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from orchestrator.acceptance.checks.all import CHECKS
-from orchestrator.certification import acceptance, anew
+from orchestrator.certification import acceptance, kinds, points_again
 from orchestrator.certification import study as study_module
 from orchestrator.certification.case_file import write_case
 from orchestrator.certification.files import figures_hash, write_sealed
@@ -39,7 +39,7 @@ def original(tmp_path_factory, fmu_path):
 
 @pytest.fixture
 def certificate(original, tmp_path, monkeypatch):
-    monkeypatch.setattr(anew.POINTS, "compute", rings)
+    monkeypatch.setattr(kinds.POINTS, "compute", rings)
     return shutil.copytree(original, tmp_path / "certificate")
 
 
@@ -197,7 +197,7 @@ def test_points_that_come_out_otherwise(certificate, gfor, monkeypatch, damping,
         signals = {name: values + signal * np.ptp(values) for name, values in found.signals.items()}
         return replace(found, modes=modes, signals=signals)
 
-    monkeypatch.setattr(anew.POINTS, "compute", compute)
+    monkeypatch.setattr(kinds.POINTS, "compute", compute)
     got, found = verified(gfor, certificate)
     assert got == code
     assert any(said in text for text in (found["faults"] if code == 5 else found["agreed"]))
@@ -217,9 +217,9 @@ def test_what_cannot_be_verified_is_said(certificate, gfor, tmp_path):
 def test_equal_modes_agree_and_one_that_is_no_number_does_not():
     """Equal differences leave complex numbers to be compared, which have no order."""
     modes = [-1 + 2j, -1 + 3j]
-    assert anew._differ_modes(modes, list(modes), 1e-5)[0] == ""
-    assert anew._differ_modes(modes, [-1 + 2j, complex("nan")], 1e-5)[0]
-    assert anew._differ_modes(modes, [complex("nan"), -1 + 3j], 1e-5)[0]
+    assert points_again._differ_modes(modes, list(modes), 1e-5)[0] == ""
+    assert points_again._differ_modes(modes, [-1 + 2j, complex("nan")], 1e-5)[0]
+    assert points_again._differ_modes(modes, [complex("nan"), -1 + 3j], 1e-5)[0]
 
 
 def at(*place, value):
@@ -336,7 +336,7 @@ def test_a_refused_request_leaves_a_finished_certificate_as_it_was(certificate, 
     ],
 )
 def test_figures_of_a_point_that_come_out_otherwise(certificate, gfor, monkeypatch, other, said):
-    monkeypatch.setattr(anew.POINTS, "compute", lambda task: replace(rings(task), **other))
+    monkeypatch.setattr(kinds.POINTS, "compute", lambda task: replace(rings(task), **other))
     code, found = verified(gfor, certificate)
     assert (code, any(said in text for text in found["faults"])) == (5, True)
 

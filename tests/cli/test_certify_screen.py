@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from orchestrator.certification.codes.certificate import CodeCertificate
+from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_verdict import RowVerdict
-from orchestrator.certification.issue import WITH_VERDICT
+from orchestrator.certification.kinds import WITH_VERDICT
 from orchestrator.certification.margins import margin_text
 from orchestrator.cli.certificate import show
 
@@ -34,9 +34,9 @@ VERDICTS = [
 def shown(f_n):
     slip = {"kind": "misfit", "message": "converter: wrong rated frequency: omega is 0.8333"}
     code = SimpleNamespace(title="ERCOT", f_n=50.0, rows=[v.row for v in VERDICTS], left_out=())
-    found = CodeCertificate(
-        SimpleNamespace(values={}, departures=()), SimpleNamespace(model_name="vendor"), VERDICTS, code, f_n,
-        {name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")},
+    found = Certificate(
+        SimpleNamespace(values={}, departures=()), SimpleNamespace(model_name="vendor"), code, f_n, VERDICTS,
+        {name: SimpleNamespace(findings=[slip]) for name in ("jump", "dip")}, Path("row.toml"),
     )  # fmt: skip
     console = Console(width=150, record=True, file=StringIO())
     show(found, [Path("certificate.html")], Path("out"), console)

@@ -6,7 +6,7 @@ import json
 import pytest
 
 from orchestrator.cases.case import load_case
-from orchestrator.certification import issue
+from orchestrator.certification import kinds
 from orchestrator.cli import main
 from orchestrator.study.modes import compute_modes
 from tests.support.vendor_dlls import droop_device
@@ -146,7 +146,7 @@ def test_other_codes_take_the_device_as_an_fmu(folder, monkeypatch):
         seen.append(request.fmu)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(issue, "certify_code", watch)
+    monkeypatch.setattr(kinds, "certify_code", watch)
     main(["certify", str(folder / "droop.toml"), "--code", "aemo", "--no-check", "--out", str(folder / "aemo")])
     assert [path.suffix for path in seen] == [".fmu"]
 

@@ -1,4 +1,4 @@
-"""The codes that `gfor certify --code` knows beside NTS 631, each a table of rows; their words stand in ``codes.toml``.
+"""The codes that `gfor certify --code` knows, each a table of rows; their words stand in ``codes.toml``.
 
 MISO's appendix H, AEMO's test framework, ERCOT's AGS-ESR and NOGRR245, Fingrid's SJV2024, NERC's PRC-029-1 and
 Energinet's TR 3.3.1; RTE's rows have a module of their own."""
@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from orchestrator.certification.codes import criteria as c
 from orchestrator.certification.codes import rte
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps, voltage, weakening
-from orchestrator.certification.codes.row import CodeRow, Declaration, GridCode, Judge, checked
+from orchestrator.certification.codes.row import CodeRow, Declaration, GridCode, Judge, Row, checked
+from orchestrator.certification.request import REACTANCES, row_of
 
 RATIOS = (10.0, 3.0, 2.0, 1.5, 1.25)
 """Short-circuit ratios, down from 20: MISO BPM-015 r32 appendix H, AEMO's test framework of January 2024."""
@@ -40,6 +41,10 @@ NOGRR_LEVELS = (0.2, 0.45, 0.65, 0.85)  # voltages of the dips between 0 and 0.9
 NOGRR_SWELLS = ((1.15, 1.0), (1.175, 0.5), (1.2, 0.2))  # highest voltage of each band [pu], and its time [s]
 RECOVERY = 1.0  # NOGRR245, PRC-029: time after which the power is back once the voltage is within 0.90 and 1.05 pu [s]
 
+NTS631 = "nts631"
+NTS = GridCode.of(NTS631, tuple(Row(row_of(X), "the line's reactance", "5.10") for X in REACTANCES))
+"""Spain's damping test: a case of its own, at each of the norm's line reactances."""
+
 NONE, BACK, PARTS = 0.15, 1.5, 9  # TR 3.3.1: time at no voltage and of the profile's end [s], and steps between them
 AREAS = {"dk1": 0.85, "dk2": 0.9}  # voltage at that end, in the west and in the east [pu]
 
@@ -49,7 +54,7 @@ def _jumps(
 ) -> CodeRow:
     """Jumps of the source's angle, after which all codes ask for the same; ``more``: what one asks besides."""
     criteria = (c.holds_together(), *more, c.settles(), c.returns())
-    return CodeRow(name, title, clause, lambda f: jumps(scr, 0.5, degrees), criteria, shown_only)
+    return CodeRow(name, title, clause, lambda f: jumps(scr, 0.5, degrees), criteria, shown_only=shown_only)
 
 
 def _ramps(
@@ -205,13 +210,13 @@ TR331 = GridCode.of(
 
 CODES = {code.key: code for code in (MISO, AEMO, ERCOT, NOGRR245, FINGRID, PRC029, TR331)}  # by what ``--code`` takes
 
-BY_DECLARATION: dict[str, tuple[Sequence[Declaration], Callable[[Mapping[str, float]], GridCode]]] = {
+BY_DECLARATION: dict[str, tuple[Sequence[Declaration], Callable[[Mapping[str, float]], GridCode[CodeRow]]]] = {
     "rte": (rte.DECLARED, rte.rte_code)
 }
 """Codes whose rows depend on what the applicant declares: what that is, and the code for it."""
 
 
-def code_for(key: str, given: Mapping[str, object]) -> GridCode:
+def code_for(key: str, given: Mapping[str, object]) -> GridCode[CodeRow]:
     if key in CODES:
         checked((), given, key)
         return CODES[key]

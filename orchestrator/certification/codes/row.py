@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from orchestrator.arrays import Numbers
 from orchestrator.certification.codes.measured import MeasuredRow
@@ -102,25 +102,33 @@ class Bounded:
 
 
 @dataclass(frozen=True)
-class CodeRow:
-    """One row of a code's table: a stimulus, and what is asked of the response.
-
-    ``name``: short, for files: letters, digits and underscores; ``programme``: what the bench does, for a rated
-    frequency [Hz]; ``shown_only``: whether the code gives no verdict on it."""
+class Row:
+    """One row of a code's table. ``shown_only``: whether the code gives no verdict on it."""
 
     name: str
     title: str
     clause: str
+    shown_only: bool = field(default=False, kw_only=True)
+
+
+@dataclass(frozen=True)
+class CodeRow(Row):
+    """A row on the test bench: a stimulus, and what is asked of the response.
+
+    ``name``: short, for files: letters, digits and underscores; ``programme``: what the bench does, for a rated
+    frequency [Hz]."""
+
     programme: Callable[[float], BenchProgramme]
     criteria: tuple[Judge, ...]
-    shown_only: bool = False
 
+
+AnyRow = TypeVar("AnyRow", bound=Row)
 
 _WORDS = tomllib.loads(Path(__file__).with_name("codes.toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
-class GridCode:
+class GridCode(Generic[AnyRow]):
     """A code as a table; its words stand in ``codes.toml``.
 
     ``title``, ``source``, ``date``: what it is, where its numbers were read, and of when it is; ``f_n``: rated
@@ -133,15 +141,15 @@ class GridCode:
     source: str
     date: str
     f_n: float
-    rows: tuple[CodeRow, ...]
+    rows: tuple[AnyRow, ...]
     left_out: tuple[str, ...] = ()
     readings: tuple[str, ...] = ()
     declared: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
-        cls, key: str, rows: tuple[CodeRow, ...], declared: Mapping[str, float] = MappingProxyType({})
-    ) -> "GridCode":
+        cls, key: str, rows: tuple[AnyRow, ...], declared: Mapping[str, float] = MappingProxyType({})
+    ) -> "GridCode[AnyRow]":
         texts: dict[str, Any] = {
             name: tuple(text) if isinstance(text, list) else text for name, text in _WORDS[key].items()
         }

@@ -21,6 +21,10 @@ class RowVerdict:
     unknown: str = ""
 
     @property
+    def name(self) -> str:
+        return self.row.name
+
+    @property
     def judged(self) -> bool:
         return not self.unknown and not self.row.shown_only
 

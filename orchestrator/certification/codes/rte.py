@@ -121,7 +121,7 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
     return Bounded(judge, bands)
 
 
-def rte_code(declared: Mapping[str, float]) -> GridCode:
+def rte_code(declared: Mapping[str, float]) -> GridCode[CodeRow]:
     rows = [
         made
         for scr in (STRONG, WEAK)

@@ -11,8 +11,8 @@ from typing import TypeVar
 
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.bench_point import DUPLICATE, PLANT, case_name
-from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.change_point import (
     ChangedCriterion,
     ChangeResult,
@@ -60,7 +60,7 @@ class CriterionNeeds:
 
 @dataclass(frozen=True)
 class ChangePlan:
-    certificate: CodeCertificate
+    certificate: Certificate
     folder: Path
     rows: Sequence[RowVerdict]
     parameters: Sequence[Parameter]
@@ -71,11 +71,11 @@ class ChangePlan:
     @property
     def seconds(self) -> float:
         """Processor time of all tasks [s], as long as each takes what its row took."""
-        return sum(self.certificate.results[row].seconds for row, *_ in self.tasks)
+        return float(sum(self.certificate.results[row].seconds for row, *_ in self.tasks))
 
 
 def plan_changes(
-    certificate: CodeCertificate, folder: Path, patterns: Sequence[str] = (), *, fixed: bool = False,
+    certificate: Certificate, folder: Path, patterns: Sequence[str] = (), *, fixed: bool = False,
     change: float = CHANGE,
 ) -> ChangePlan:  # fmt: skip
     """Find what is to be run; nothing is run yet.
@@ -184,7 +184,7 @@ def _computed(
     return dict(zip(tasks, work.all(compute_change, list(tasks.values())), strict=True))
 
 
-def _task(certificate: CodeCertificate, folder: Path, row: str, parameter: Parameter, change: float) -> ChangeTask:
+def _task(certificate: Certificate, folder: Path, row: str, parameter: Parameter, change: float) -> ChangeTask:
     prepared = _prepared(folder, row)
     value = parameter.value + change * parameter.scale
     places = [name for name in (PLANT, DUPLICATE) if name in prepared.system.components]

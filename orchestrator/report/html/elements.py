@@ -28,6 +28,11 @@ def table(caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], l
     )
 
 
+def listed(texts: Iterable[str]) -> str:
+    items = "".join(f"<li>{escape(text)}</li>" for text in texts)
+    return f"<ul>{items}</ul>" if items else ""
+
+
 class Figures:
     def __init__(self) -> None:
         self.count = 0

@@ -7,12 +7,13 @@ from dataclasses import replace
 import pytest
 
 import orchestrator as gfor
-from orchestrator.certification.anew import ROWS, chosen_rows
 from orchestrator.certification.codes import bench_point
 from orchestrator.certification.codes.all_codes import CODES, ERCOT
 from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.codes.certificate import certify_code
+from orchestrator.certification.codes.rows_again import chosen_rows
 from orchestrator.certification.files import save
+from orchestrator.certification.kinds import ROWS
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.verification import read_certificate, verify_files
 from orchestrator.points.executor import Serial

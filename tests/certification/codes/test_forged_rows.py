@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 
 from orchestrator.binding.binding import bound_fmu
+from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_point import BenchResult, case_name
-from orchestrator.certification.codes.certificate import CodeCertificate
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, save, seal_of
 from orchestrator.certification.request import CertificationRequest
@@ -38,7 +38,8 @@ def fails(tmp_path, fmu_path):
     shutil.copyfile(fmu_path("gfor"), fmu)
     verdicts = [judge_row(row, results[row.name], 50.0) for row in CODE.rows]
     request = CertificationRequest(fmu)
-    save(CodeCertificate(request, bound_fmu(fmu), verdicts, CODE, 50.0, results), tmp_path)
+    case = tmp_path / case_name(CODE.rows[0].name)
+    save(Certificate(request, bound_fmu(fmu), CODE, 50.0, verdicts, results, case), tmp_path)
     assert verify_files(*read_certificate(tmp_path)).holds
     return tmp_path
 

@@ -1,78 +1,44 @@
-"""The certificate anew from what its folder keeps, by the judgement that made it: from the FMU, the case file, the
-responses and, of a damping test, the eigenvalues."""
+"""Points of a damping test, judged again from what a folder keeps of them, and computed anew."""
 
-import json
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.analysis.modes import damping_ratio
 from orchestrator.binding.binding import bound_fmu
-from orchestrator.certification.acceptance import KEPT, Acceptance
-from orchestrator.certification.case_file import BASE, BINDING, CASE, FMU, WITH, WITHOUT
-from orchestrator.certification.certificate import Certificate, Judged
-from orchestrator.certification.codes.all_codes import code_for
-from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.certificate import CodeCertificate
-from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.cases.case import load_case
+from orchestrator.certification.case_file import BASE, CASE, WITH, WITHOUT
+from orchestrator.certification.certificate import Certificate, DampingTest
+from orchestrator.certification.codes.all_codes import NTS
+from orchestrator.certification.compared import (
+    TOLERANCE,
+    TOLERANCE_IDENTIFIED,
+    Compared,
+    Content,
+    Verification,
+    differ_signal,
+    request_of,
+    said_of,
+)
 from orchestrator.certification.criteria import ModeVerdict, judge_mode
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
-from orchestrator.certification.form import NORM
 from orchestrator.certification.judgement import PointVerdict, judge
-from orchestrator.certification.point import CONVERTER, PointResult
-from orchestrator.certification.request import CertificationRequest
-from orchestrator.certification.study import Certification
-from orchestrator.errors import ErrorKind, InputError
+from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult
+from orchestrator.certification.request import CertificationRequest, same_reactance
+from orchestrator.errors import InputError
 from orchestrator.fmi.description import FmuDescription
-from orchestrator.points.failure import Failure
+from orchestrator.late import xr
+from orchestrator.points.task import StudyCase
 
 
-def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certificate[Judged]:
-    made = _damping_test if content["format"] == NORM else _bench_test
-    certificate = made(folder, content, responses)
-    if content["acceptance"] is not None:
-        report = json.loads((folder / KEPT).read_text(encoding="utf-8"))
-        faults = tuple(dict.fromkeys(check["fault"] for check in report["checks"] if check["verdict"] == "fail"))
-        certificate.acceptance = Acceptance(not faults, faults, {**report, "trusted": not faults})
-    return certificate
-
-
-def _request(folder: Path, content: dict[str, Any], **of_the_norm: Any) -> CertificationRequest:
-    binding = folder / BINDING if content["binding"] else None
-    return CertificationRequest(folder / FMU, binding, content["values"], **of_the_norm)
-
-
-def _bench_test(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> CodeCertificate:
-    code, request = code_for(content["code"], content["declared"]), _request(folder, content)
-    stated = {row["row"]: row for row in content["rows"]}
-    rows = [row for row in code.rows if row.name in stated or f"time_{row.name}" in responses.coords]
-    results = {row.name: _response(row.name, stated.get(row.name), responses) for row in rows}
-    verdicts = [
-        judge_row(row, results[row.name], content["f_n"], stated.get(row.name, {}).get("criteria")) for row in rows
-    ]
-    description = bound_fmu(request.fmu, request.binding)
-    return CodeCertificate(request, description, verdicts, code, content["f_n"], results)
-
-
-def _response(row: str, stated: dict[str, Any] | None, responses: xr.Dataset) -> BenchResult:
-    said = stated or {"unknown": "", "findings": []}
-    if why := said["unknown"]:
-        return BenchResult(row, findings=said["findings"], failure=Failure(ErrorKind.OTHER, why, False))
-    prefix = f"{row}."
-    signals = {
-        str(n).removeprefix(prefix): v.values for n, v in responses.data_vars.items() if str(n).startswith(prefix)
-    }
-    return BenchResult(row, responses[f"time_{row}"].values, signals, said["findings"])
-
-
-def _damping_test(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certification:
-    request = _request(folder, content, reactances=responses["X_L"].values.tolist(),
+def rebuilt_points(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certificate:
+    request = request_of(folder, content, reactances=responses["X_L"].values.tolist(),
                        study_values=content["study_values"], black_box=content["black_box"])  # fmt: skip
     description = bound_fmu(request.fmu, request.binding)
     controllers, event = _controllers(request, description, content), content["event_time"]
@@ -82,7 +48,8 @@ def _damping_test(folder: Path, content: dict[str, Any], responses: xr.Dataset) 
         having, lacking = (_point(point, scenario, content, responses) for scenario in (WITH, WITHOUT))
         points |= {(result.scenario, result.X_L): result for result in (having, lacking)}
         verdicts.append(_verdict(point, having, lacking, controllers.pod, event))
-    return Certification(request, description, verdicts, controllers, event, folder / CASE, {}, points)
+    return Certificate(request, description, NTS, NTS.f_n, verdicts, points, folder / CASE,
+                       damping=DampingTest(controllers, event))  # fmt: skip
 
 
 def _controllers(
@@ -154,7 +121,7 @@ def _value(mode: dict[str, Any]) -> complex:
     return complex(mode["real"], mode["imag"])
 
 
-def case_faults(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Iterator[str]:
+def point_faults(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Iterator[str]:
     """Values of a damping test's case file that are others than the certificate's, and what it leaves out or adds."""
     stated = [point["X_L"] for point in content["points"]]
     if left_out := [f"{X:g}" for X in responses["X_L"].values.tolist() if X not in stated]:
@@ -169,3 +136,84 @@ def case_faults(folder: Path, content: dict[str, Any], responses: xr.Dataset) ->
         wanted = {**base[name].get("set", {}), **content["study_values"], **values}
         if scenarios[name].get("set", {}) != wanted:
             yield f"'values', 'study_values' or 'pod_values' are not those that {CASE} sets {name} the converter"
+
+
+def chosen_points(content: Content, wanted: Sequence[float] = (), *, every: bool = False) -> list[float]:
+    """Reactances of the points that are computed anew [pu]; without a wish the one with the least damped mode."""
+    points = content["points"]
+    if not wanted:
+        known = [p for p in points if p["modes"]] or points
+        least = min(known, key=lambda p: min((m["damping_percent"] for m in p["modes"]), default=0.0))
+        return [p["X_L"] for p in (points if every else [least])]
+    chosen = []
+    for X_L in wanted:
+        match = [p["X_L"] for p in points if same_reactance(p["X_L"], X_L)]
+        if not match:
+            there = ", ".join(f"{p['X_L']:g}" for p in points)
+            raise InputError(f"--points: the certificate has no X_L = {X_L:g} pu; it has: {there}")
+        chosen += match
+    return chosen
+
+
+def point_tasks(folder: Path, content: Content, reactances: Sequence[float], _: Verification) -> list[Any]:
+    """Each point with and without the converter."""
+    case = load_case(folder / CASE)
+    study = {name: StudyCase.of(case.prepare([name], {"grid.X_L": reactances[0]})[0]) for name in (WITHOUT, WITH)}
+    return [CertificatePointTask(study[scenario], X_L, bool(content["black_box"]) and scenario == WITH)
+            for X_L in reactances for scenario in (WITHOUT, WITH)]  # fmt: skip
+
+
+def compare_point(content: Content, task: CertificatePointTask, again: PointResult, data: xr.Dataset) -> Compared:
+    point, scenario, signal = (
+        next(p for p in content["points"] if p["X_L"] == task.X_L),
+        task.scenario,
+        content["signal"],
+    )
+    where = f"X_L = {task.X_L:g} pu, {scenario} the converter"
+    if again.failure or again.modes is None:
+        yield f"{where}: it cannot be computed again: {again.failure or 'there are no modes'}", ""
+        return
+    stated = point["modes_without"] if scenario == WITHOUT else [*point["modes"], *point["modes_beside"]]
+    identified = scenario == WITH and point["converter_model"]["source"] == "identified"
+    tolerance = TOLERANCE_IDENTIFIED if identified else TOLERANCE
+    yield from ((f"{where}: {text}", "") for text in _differ_figures(point, scenario, again, tolerance))
+    values = [complex(m["real"], m["imag"]) for m in stated]
+    kept = data[signal].sel(scenario=scenario, X_L=task.X_L).values
+    for what, (fault, said) in (
+        ("modes", _differ_modes(values, again.modes.eigenvalues.tolist(), tolerance)),
+        (signal, differ_signal(kept, again.signals.get(signal, np.empty(0)))),
+    ):
+        yield (f"{where}: {what}: {fault}", "") if fault else ("", f"{where}: {what}: {said}")
+
+
+def _differ_figures(point: Content, scenario: str, again: PointResult, tolerance: float) -> Iterator[str]:
+    stated, growth = point["growth"][scenario], again.growth
+    known = np.nan if stated is None else float(stated)
+    if not (np.isnan(known) and np.isnan(growth)) and not abs(known - growth) <= tolerance * max(1.0, abs(growth)):
+        yield f"a largest growth rate of {growth:.6g} 1/s comes out and {known:.6g} 1/s was certified"
+    verdicts = [s and s["stable"] for s in (point["stability"][scenario], again.stability)]
+    if verdicts[0] != verdicts[1]:
+        yield f"stable = {verdicts[1]} comes out and {verdicts[0]} was certified"
+    if scenario == WITHOUT:
+        return
+    power = [np.nan if p is None else float(p) for p in (point["power"], again.power)]
+    if not np.isnan(power).all() and not abs(power[0] - power[1]) <= TOLERANCE * max(1.0, abs(power[1])):
+        yield f"it feeds in {power[1]:.6g} MW at the start and {power[0]:.6g} MW was certified"
+    model = point["converter_model"]
+    if (model["source"], model["order"]) != (again.linearised.get(CONVERTER), again.identified):
+        yield f"its linear model is {again.linearised.get(CONVERTER)!r} and {model['source']!r} was certified"
+
+
+def _differ_modes(stated: list[complex], again: list[complex], tolerance: float) -> tuple[str, str]:
+    if len(stated) != len(again):
+        return f"{len(again)} come out and {len(stated)} were certified", ""
+    first, second = (sorted(values, key=lambda v: (round(v.imag, 4), v.real)) for values in (stated, again))
+    differences = [(abs(a - b) / max(abs(a), 1e-9), a, b) for a, b in zip(first, second, strict=True)]
+    worst = max(differences, key=lambda d: np.inf if np.isnan(d[0]) else d[0], default=(0.0, 0j, 0j))
+    if not worst[0] <= tolerance:
+        return f"{_shown(worst[2])} comes out and {_shown(worst[1])} was certified", ""
+    return "", said_of(worst[0], tolerance)
+
+
+def _shown(value: complex) -> str:
+    return f"{value.imag / (2 * np.pi):.4f} Hz with {100 * damping_ratio(value):.4f} %"
