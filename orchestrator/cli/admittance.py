@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.api.admittance import admittance
-from orchestrator.cli.arguments import option, quantity, repeatable, seconds, setting, switch
+from orchestrator.cli.arguments import add_options, switch
 from orchestrator.cli.case_arguments import add_excitation_arguments, excitation_of
 from orchestrator.cli.terminal import make_console, print_json, said_stages
 from orchestrator.errors import InputError
@@ -21,14 +21,7 @@ from orchestrator.safe_files import made_folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("fmu", type=Path, metavar="FILE.fmu", help="a device")
-    option(parser, "--binding", "vendor.toml", "maps the FMU's variables to our port", read=Path)
-    repeatable(parser, "--set", "VARIABLE=VALUE", "a value of the FMU, such as P_0=0.9 or pod_p.enabled=true "
-               "(repeatable)", read=setting)  # fmt: skip
-    option(parser, "--step", "H", "communication step [s] (100 us)", read=seconds, default=1e-4)
-    option(parser, "--out", "DIR", "folder (default: results/admittance_<file>)", read=Path)
-    option(parser, "--scan", "FILE.txt", "write Z-tool's form too, for `gfor fmu nyquist`", read=Path)
-    option(parser, "--voltage", "V", "rated voltage for --scan", read=quantity("kV"))
+    add_options(parser, "admittance")
     add_excitation_arguments(parser)
     switch(parser, "--json", "print JSON")
 

@@ -2,11 +2,13 @@
 
 import argparse
 import math
+import tomllib
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orchestrator.asked import as_number, asked_of, read_whole
+from orchestrator.asked import as_number, asked_of, read_percent, read_positive, read_range, read_whole
 from orchestrator.coupling.schedule import check_tolerance
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Executor
@@ -33,6 +35,28 @@ def repeatable(
 ) -> None:
     """An option that may be given several times; its values are a list."""
     parser.add_argument(name, metavar=metavar, help=text, type=read, action="append", default=[])
+
+
+def add_options(parser: argparse._ActionsContainer, part: str, **given: Any) -> None:
+    """Add the options that ``options.toml`` has for a part of a command.
+
+    ``given``: readers that the file names and that are not in `READERS`, and values that its help is filled in with."""
+    for name, table in _listed()[part].items():
+        how = {key: value for key, value in table.items() if key not in ("read", "several", "filled")}
+        if table.get("filled"):
+            how["help"] = how["help"].format(**given)
+        kind, _, unit = table.get("read", "").partition(" ")
+        if kind:
+            how["type"] = quantity(unit) if unit else given.get(kind) or READERS[kind]
+        if table.get("several"):
+            how |= {"action": "append", "default": []}
+        plain = how.keys() & {"metavar", "type", "choices", "nargs", "action"} or not name.startswith("-")
+        parser.add_argument(name, **how if plain else how | {"action": "store_true"})
+
+
+@cache
+def _listed() -> dict[str, dict[str, dict[str, Any]]]:
+    return tomllib.loads(Path(__file__).with_name("options.toml").read_text(encoding="utf-8"))
 
 
 def add_kept_argument(parser: argparse.ArgumentParser, name: str) -> None:
@@ -126,6 +150,14 @@ def reactances(text: str) -> tuple[float, ...]:
     if not all(1e-3 <= value <= 10 for value in values) or len(set(values)) < len(values):
         raise ValueError(f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3")
     return values
+
+
+READERS: dict[str, Callable[[str], Any]] = {
+    "path": Path, "seconds": seconds, "seconds_or_none": seconds_or_none, "setting": setting, "assignment": assignment,
+    "reactances": reactances, "positive": read_positive, "percent": read_percent, "range": read_range,
+    "value": read_value, "int": int, "float": float,
+}  # fmt: skip
+"""What makes a value of an option's text, by how ``options.toml`` calls it."""
 
 
 def add_executor_arguments(parser: argparse._ActionsContainer) -> None:

@@ -5,16 +5,14 @@ from pathlib import Path
 
 from orchestrator.api.binding import bind
 from orchestrator.binding.tables import REQUIRED
-from orchestrator.cli.arguments import option, switch
+from orchestrator.cli.arguments import add_options
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.devices import NO_BUS, is_controller_alone
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    option(parser, "--out", "FILE.toml", "binding file (default: FILE.toml, here)", read=Path)
-    switch(parser, "--force", "overwrite an existing file")
+    add_options(parser, "bind")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -15,7 +15,7 @@ from orchestrator.api.models import build, catalogue_model
 from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cli.arguments import option, repeatable, switch
+from orchestrator.cli.arguments import add_options, option
 from orchestrator.cli.terminal import make_errors, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.linear_model import linear_model_members
@@ -69,8 +69,7 @@ _NEEDS = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
     option(parser, "--dest", "DIR", "folder (default: here)", read=Path, default=Path())
-    switch(parser, "--native", "compiled FMUs with no Python in them")
-    parser.add_argument("--fmi", choices=("2.0", "3.0"), help="version of FMI (3.0: native only; default: 2.0)")
+    add_options(parser, "build")
     parser.add_argument("--for", dest="host", choices=HOSTS, metavar="HOST",
                         help=f"what suits a host, chosen by a table: {', '.join(HOSTS)}")  # fmt: skip
     parser.add_argument("--platform", action="append", choices=sorted(TARGETS), help="compile for this platform "
@@ -79,10 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--{part}", metavar="PART", help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}"
         )
-    option(parser, "--from-dll", "FILE", "a vendor's controller, delivered as IEEE/CIGRE DLL, as an FMU", read=Path)
-    repeatable(parser, "--text", "NAME=VALUE", "text parameter of that DLL (repeatable)")
-    switch(parser, "--reference", "add a smoke test with reference results (layered standard LS-REF)")
-    switch(parser, "--sources", "add the C source, for tools that compile (native only)")
+    add_options(parser, "build 2")
     add_linear_model_arguments(parser)
 
 
@@ -154,8 +150,7 @@ OPTION = "--with-linear-model"
 def add_linear_model_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(OPTION, dest="linear_case", metavar="CASE", help="pack the model's linear model at the steady "
                         "state of this case into the FMU")  # fmt: skip
-    option(parser, "--scenario", "NAME", "scenario of that case (default: its only one)")
-    option(parser, "--component", "NAME", "component of that case (default: the only one of this model)")
+    add_options(parser, "linear_model")
 
 
 def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, bytes]:

@@ -1,7 +1,6 @@
 """The arguments of every command on a case."""
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from orchestrator.api.scenario import Scenario, choose
@@ -13,7 +12,7 @@ from orchestrator.cases.parameter_files import ParameterFile, read_parameter_fil
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.cli.arguments import asked_by, assignment, option, repeatable, seconds, switch
+from orchestrator.cli.arguments import add_options, asked_by, option, repeatable, seconds, switch
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.errors import InputError
@@ -29,9 +28,7 @@ def add_case_arguments(
                         "the path of a case file or an .ssp")  # fmt: skip
     text = f"only this scenario{' (repeatable)' if several else ''}"
     repeatable(parser, "--scenario", "NAME", text)
-    repeatable(parser, "--set", "COMPONENT.PARAMETER=VALUE", "override a value (repeatable)", read=assignment)
-    repeatable(parser, "--parameters", "FILE", "values from a parameter file, as `gfor design` writes it (repeatable; "
-               "--set overrides it)", read=Path)  # fmt: skip
+    add_options(parser, "case")
     add_trust_argument(parser)
     option(parser, "--step", "H", "communication step [s], e.g. 1e-4 or '200 us'", read=seconds)
     if schedule:
@@ -52,8 +49,7 @@ def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
 
 def add_trust_argument(parser: argparse.ArgumentParser) -> None:
     """The user's own word on foreign FMUs."""
-    switch(parser, "--trust-fmus", "let FMUs of others run in gfor's own process where the case says isolated = false; "
-           "they can do there whatever you can")  # fmt: skip
+    add_options(parser, "trust")
 
 
 def case_of(options: argparse.Namespace) -> Case:

@@ -2,7 +2,6 @@
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 
 from rich.console import Console
 from rich.markup import escape
@@ -10,12 +9,10 @@ from rich.markup import escape
 from orchestrator.acceptance.checks.base import CheckResult, Verdict
 from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.api.acceptance import check
-from orchestrator.asked import read_positive
-from orchestrator.cli.arguments import add_kept_argument, option, repeatable, switch
+from orchestrator.cli.arguments import add_kept_argument, add_options
 from orchestrator.cli.terminal import keep_json, print_json
 from orchestrator.errors import InputError
 from orchestrator.fmi.protection import missing
-from orchestrator.units import read_value
 
 _COLOURS = {
     Verdict.PASS: "green", Verdict.REMARK: "yellow", Verdict.FAIL: "bold red", Verdict.NOT_APPLICABLE: "dim",
@@ -25,21 +22,9 @@ NOT_SUPPORTED = 2  # exit code where nothing failed, but the FMU could not be ru
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    option(parser, "--binding", "FILE.toml", "what its variables mean (`gfor fmu bind`)", read=Path)
-    option(parser, "--step", "H", "communication step of use [s]", read=read_positive)
-    option(parser, "--case", "CASE", "with a case's step, operating point, values and binding")
-    option(parser, "--component", "NAME", "which of the case's components it is")
-    option(parser, "--scenario", "NAME", "which of the case's scenarios (default: the first with it)")
-    option(parser, "--frequency", "HZ", "of the network (default: the FMU's f_n)", read=read_positive)
-    repeatable(parser, "--only", "CHECK", "only this check (repeatable)")
-    option(parser, "--seed", "N", "of the random dips, jumps and points (default: of the file's bytes)", read=int)
-    switch(parser, "--json", "print JSON")
+    add_options(parser, "check")
     add_kept_argument(parser, "check")
-    option(parser, "--junit", "FILE.xml", "write the results for a CI server", read=Path)
-    option(parser, "--time-limit", "S", "for one call [s] (default: 30)", read=read_positive, default=30.0)
-    option(parser, "--memory-limit", "MB", "of the FMU's process [MB], or with a unit such as '4 GB' (default: 4096)",
-           read=read_value, default=4096.0)  # fmt: skip
+    add_options(parser, "check 2")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,25 +1,18 @@
 """``gfor signal compare``: two recorded runs side by side."""
 
 import argparse
-from pathlib import Path
 
 from rich.markup import escape
 
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.api.comparison import compare
-from orchestrator.cli.arguments import add_kept_argument, option, seconds_or_none, switch
+from orchestrator.cli.arguments import add_kept_argument, add_options
 from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, saying_warnings
 from orchestrator.report.tables import make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("first", type=Path, metavar="A",
-                        help="folder of a scenario's results, its trajectory.nc, COMTRADE, CSV or Excel")  # fmt: skip
-    parser.add_argument("second", type=Path, metavar="B", help="the other one")
-    parser.add_argument("--signal", action="append", metavar="SIGNAL",
-                        help="'a.b' or 'a.b - c.d' (repeatable; default: those that differ most)")  # fmt: skip
-    option(parser, "--start", "T", "oscillations are read from here [s] (2)", read=seconds_or_none)
-    switch(parser, "--json", "print JSON")
+    add_options(parser, "compare")
     add_kept_argument(parser, "comparison")
 
 

@@ -8,7 +8,7 @@ from shutil import rmtree
 from rich.markup import escape
 
 from orchestrator.cases.idle_values import DAMPING_CONTROLLERS
-from orchestrator.cli.arguments import add_executor_arguments, add_request_arguments, option, repeatable, switch
+from orchestrator.cli.arguments import add_executor_arguments, add_options, add_request_arguments, option
 from orchestrator.cli.case_arguments import add_case_arguments, asked_of_case, case_of
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.study import shown, working_in
@@ -46,17 +46,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, several=False)
     parser.add_argument("--controller", action="append", required=True, choices=DAMPING_CONTROLLERS,
                         help="the controller to design (with --points repeatable)")  # fmt: skip
-    repeatable(parser, "--component", "NAME", "the converter, or a pattern such as 'gfor*' for several with one "
-               "setting (default: all with this POD); with --points repeatable: each gets a setting of "
-               "its own")  # fmt: skip
-    repeatable(parser, "--mode", "NAME", "the case's mode to damp (default: its first); with --points repeatable, all "
-               "from 0.1 to 2 Hz by default")  # fmt: skip
-    parser.add_argument("--gain-from", choices=("non-compensated", "compensated"), default="non-compensated",
-                        help="sensitivity that the gain is computed from, without or with the lead/lag (default: "
-                        "non-compensated)")  # fmt: skip
+    add_options(parser, "design")
     add_request_arguments(parser, DesignRequest)
-    switch(parser, "--no-margins", "leave out the margins, which take longest")
-    switch(parser, "--json", "print JSON")
+    add_options(parser, "design 2")
     add_verdict_argument(parser)
     option(parser, "--out", "FILE.toml", "parameter file (default: <case>_<controller>.toml, here)", read=Path)
     add_points_arguments(parser)

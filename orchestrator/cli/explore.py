@@ -2,14 +2,13 @@
 
 import argparse
 import webbrowser
-from pathlib import Path
 from warnings import catch_warnings, simplefilter
 
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import UnusualDataWarning
 from orchestrator.asked import read_range, read_whole
-from orchestrator.cli.arguments import assignment, option, repeatable, switch
+from orchestrator.cli.arguments import add_options, option
 from orchestrator.cli.case_arguments import add_trust_argument, values_set
 from orchestrator.cli.terminal import saying_warnings
 from orchestrator.errors import InputError
@@ -22,26 +21,15 @@ from orchestrator.sweep.axes import parse_vary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "case",
-        metavar="CASE",
-        help="a built-in case (two_area), the path of a case file or an .ssp, or a folder of "
-        "gfor run, screen, sweep, interactions or certify",
-    )
-    option(parser, "--scenario", "NAME", "the one that is shown first (default: the case's last one)")
-    repeatable(parser, "--set", "COMPONENT.PARAMETER=VALUE", "a value to begin with (repeatable)", read=assignment)
+    add_options(parser, "explore")
     option(parser, "--range", "LO:HI", "frequencies shown first [Hz] (default: 0.1:2)", read=read_range,
            default=ELECTROMECHANICAL_HZ)  # fmt: skip
-    option(parser, "--beside", "FILE", "a recording drawn beside the responses: COMTRADE, CSV, Excel, or a scenario's "
-           "folder of results", read=Path)  # fmt: skip
+    add_options(parser, "explore 2")
     option(
         parser, "--port", "N", "of the server, on this machine alone (default: any that is free)",
         read=read_whole(1, 65535, "a port"), default=0,
     )  # fmt: skip
-    switch(parser, "--no-browser", "print the address, and open no browser")
-    option(parser, "--save", "FILE.html", "write a page that needs neither server nor Python, and open none", read=Path)
-    repeatable(parser, "--vary", "COMPONENT.PARAMETER=START:STOP:COUNT",
-               "a slider of the saved page, with these values (repeatable: a full grid)", read=parse_vary)  # fmt: skip
+    add_options(parser, "explore 3", parse_vary=parse_vary)
     add_trust_argument(parser)
 
 

@@ -1,18 +1,15 @@
 """``gfor export comtrade``: recorded signals as a COMTRADE recording for other tools."""
 
 import argparse
-from pathlib import Path
 
 from orchestrator.api.comtrade import export_comtrade
 from orchestrator.asked import read_positive
-from orchestrator.cli.arguments import option
+from orchestrator.cli.arguments import add_options, option
 from orchestrator.cli.terminal import saying_warnings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a scenario's results, or its trajectory.nc")
-    parser.add_argument("--signal", action="append", metavar="SIGNAL", help="'a.b' or 'a.b - c.d' (repeatable; all)")
-    option(parser, "--out", "FILE.cfg", "the recording (default: <RUN>/trajectory.cfg)", read=Path)
+    add_options(parser, "export_comtrade")
     option(parser, "--form", "FORM",
            "ASCII, BINARY, BINARY32 or FLOAT32 (BINARY32)", read=str.upper, default="BINARY32")  # fmt: skip
     option(parser, "--frequency", "HZ", "rated frequency [Hz] (the run's)", read=read_positive)

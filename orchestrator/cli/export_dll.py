@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.api.dll import export_dll
-from orchestrator.asked import read_positive
-from orchestrator.cli.arguments import option, repeatable
+from orchestrator.cli.arguments import add_options, option
 from orchestrator.cli.terminal import said_stages
 from orchestrator.errors import InputError
 from orchestrator.units import read_value
@@ -14,11 +13,7 @@ from orchestrator.units import read_value
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", metavar="NAME", help="converter, such as gfor")
     option(parser, "--dest", "DIR", "folder (default: here)", read=Path, default=Path())
-    parser.add_argument(
-        "--platform", action="append", metavar="PLATFORM", help="linux64, win32 or win64 (repeatable; default: all)"
-    )
-    option(parser, "--sample-time", "S", "time between two calls [s] (20e-6)", read=read_positive, default=2e-5)
-    repeatable(parser, "--set", "NAME=VALUE", "default of a parameter (repeatable)")
+    add_options(parser, "export_dll")
 
 
 def run(options: argparse.Namespace) -> int:

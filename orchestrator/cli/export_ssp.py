@@ -4,16 +4,14 @@ import argparse
 from pathlib import Path
 
 from orchestrator.api.export import write_ssp
-from orchestrator.cli.arguments import option, seconds
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.errors import InputError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    option(parser, "--stop", "T", "stop time [s] (default: the case's)", read=seconds)
-    option(parser, "--out", "FILE.ssp", "the archive, or a folder for one archive a scenario (default: "
-           "<case>_<scenario>.ssp here)", read=Path)  # fmt: skip
+    add_options(parser, "export_ssp")
 
 
 def run(options: argparse.Namespace) -> int:

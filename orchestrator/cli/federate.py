@@ -4,7 +4,7 @@ import argparse
 import os
 import sys
 
-from orchestrator.cli.arguments import option, seconds
+from orchestrator.cli.arguments import add_options, option, seconds
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.errors import CosimError, InputError
 from orchestrator.federation.choice import TO_JOIN
@@ -14,8 +14,7 @@ from orchestrator.federation.layout import require_broker
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    parser.add_argument("--component", required=True, metavar="NAME", help="the component")
-    parser.add_argument("--broker", required=True, metavar="ADDRESS", help="of the broker, such as tcp://host:23405")
+    add_options(parser, "federate")
     option(parser, "--to-join", "T",
            f"how long the broker is waited for [s] (default: {TO_JOIN:g})", read=seconds, default=TO_JOIN)  # fmt: skip
 

@@ -3,7 +3,7 @@
 import argparse
 
 from orchestrator.asked import read_whole
-from orchestrator.cli.arguments import option, seconds
+from orchestrator.cli.arguments import add_options, option
 from orchestrator.cli.terminal import make_errors
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import ENGINES, PATIENCE, TO_JOIN, Federates
@@ -17,14 +17,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
            "grid)", read=names, default=())  # fmt: skip
     group.add_argument("--external", type=names, default=(), metavar="NAME,NAME",
                        help="components whose federates others start: `gfor master federate` or a program")  # fmt: skip
-    option(group, "--broker", "ADDRESS", "a broker that runs, such as tcp://host:23405 (default: gfor starts one for "
-           "this machine alone)")  # fmt: skip
+    add_options(group, "federates")
     option(group, "--broker-port", "PORT",
            "start the broker at this port of all network interfaces", read=read_whole(1, 65534, "a port"))  # fmt: skip
-    group.add_argument("--patience", type=seconds, default=None, metavar="T",
-                       help=f"longest time of a federate for one step [s] (default: {PATIENCE:g})")  # fmt: skip
-    option(group, "--to-join", "T",
-           f"how long federates are waited for [s] (default: {TO_JOIN:g})", read=seconds, default=None)  # fmt: skip
+    add_options(group, "federates 2", PATIENCE=PATIENCE, TO_JOIN=TO_JOIN)
 
 
 def names(text: str) -> tuple[str, ...]:

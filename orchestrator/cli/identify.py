@@ -1,12 +1,11 @@
 """``gfor signal identify``: the modes in a recorded signal."""
 
 import argparse
-from pathlib import Path
 
 from rich.markup import escape
 
 from orchestrator.api.identification import ambient, identify
-from orchestrator.cli.arguments import add_kept_argument, option, quantity, seconds, seconds_or_none, switch
+from orchestrator.cli.arguments import add_kept_argument, add_options
 from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, saying_warnings
 from orchestrator.errors import InputError
 from orchestrator.report.tables import eigenvalue_text, make_table
@@ -17,15 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Amplitudes are those at the start; an oscillation's is half of its peak, as it is one of two conjugate "
         "exponentials. '?' marks a mode in doubt, with the reasons below the table."
     )
-    parser.add_argument("run", type=Path, metavar="RUN",
-                        help="folder of a scenario's results, its trajectory.nc, COMTRADE, CSV or Excel")  # fmt: skip
-    parser.add_argument("signal", nargs="+", metavar="SIGNAL", help="'a.b' or 'a.b - c.d'; several with --ambient")
-    option(parser, "--start", "T", "beginning of the free response [s] (2; with --ambient 0)", read=seconds_or_none)
-    option(parser, "--stop", "T", "its end [s] (default: the run's)", read=seconds)
-    switch(parser, "--ambient", "the signals are noise, not a free response: stochastic subspace")
-    option(parser, "--window", "T", "of --ambient: length of the parts (all)", read=seconds)
-    option(parser, "--alarm", "PERCENT", "of --ambient: damping below which it is one (3 %%)", read=quantity("%"))
-    switch(parser, "--json", "print JSON")
+    add_options(parser, "identify")
     add_kept_argument(parser, "ringing")
 
 

@@ -1,14 +1,13 @@
 """``gfor fmu info``: what an FMU declares."""
 
 import argparse
-from pathlib import Path
 
 from rich.markup import escape
 
 from fmus.vendor_dll.interface import CONTROLLER
 from orchestrator.api.dll import KEPT_IN
 from orchestrator.api.fmu import info
-from orchestrator.cli.arguments import switch
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.fmi.description import FmuDescription, missing_binary
 from orchestrator.fmi.linear_model import EmbeddedModel
@@ -16,8 +15,7 @@ from orchestrator.report.tables import fmu_variables
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, metavar="FILE.fmu")
-    switch(parser, "--json", "print JSON")
+    add_options(parser, "info")
 
 
 def run(options: argparse.Namespace) -> int:

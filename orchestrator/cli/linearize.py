@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from orchestrator.analysis.stability import Stability
-from orchestrator.cli.arguments import option, switch
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import make_console, warn
 from orchestrator.cli.verdict import add_verdict_argument, exit_code, print_stability
@@ -16,12 +16,7 @@ from orchestrator.study.linear_model_files import save_linear_model
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
-    parser.add_argument("--input", action="append", metavar="COMPONENT.VARIABLE", help="tunable parameter or open "
-                        "input (repeatable; default: what the scenario's events change)")  # fmt: skip
-    parser.add_argument("--output", action="append", metavar="COMPONENT.VARIABLE", help="observed output (repeatable; "
-                        "default: what the case plots)")  # fmt: skip
-    switch(parser, "--continuous", "ẋ = A·x + B·u instead of the step map")
-    option(parser, "--out", "DIR", "folder (default: results/<case>_linear)", read=Path)
+    add_options(parser, "linearize")
     add_verdict_argument(parser)
 
 

@@ -9,9 +9,8 @@ from pathlib import Path
 from rich.markup import escape
 
 from orchestrator.api.scenario import Scenario, modes_of
-from orchestrator.asked import read_percent
 from orchestrator.cli import terminal
-from orchestrator.cli.arguments import add_request_arguments, asked_by, option, switch
+from orchestrator.cli.arguments import add_options, add_request_arguments, asked_by
 from orchestrator.cli.case_arguments import add_case_arguments, add_excitation_arguments, chosen, excitation_given
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code, print_answers, print_details
 from orchestrator.errors import InputError
@@ -28,14 +27,9 @@ from orchestrator.study.request import ModesRequest
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, schedule=True)
     add_request_arguments(parser, ModesRequest)
-    parser.add_argument("--critical", type=read_percent, nargs="?", const=0.2, metavar="PERCENT",
-                        help="only modes with less damping than this (20 by default), by sparse search instead of the "
-                        "full spectrum")  # fmt: skip
-    option(parser, "--component", "NAME", "with --black-box: take this one for a black box, beside the modes from its "
-           "states; its admittance and model go to --out (default: results/<case>_black_box)")  # fmt: skip
+    add_options(parser, "modes")
     add_excitation_arguments(parser)
-    option(parser, "--out", "DIR", "write modes, participation, shapes and plots there", read=Path)
-    switch(parser, "--json", "print JSON")
+    add_options(parser, "modes 2")
     add_verdict_argument(parser)
     add_details_argument(parser)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
-from orchestrator.cli.arguments import repeatable
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.fmi.vendor_files import is_vendor_file
@@ -18,24 +18,10 @@ _EXAMPLE = 'gfor new own.raw own.dyr --converter "bus 9, 300 MVA, 200 MW, less s
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="the network: .raw (with .dyr), .m, .mat, "
-                        "pandapower's .json, a CGMES model, tables (.csv) of lines, machines, loads and buses; "
-                        "without any, gfor asks")  # fmt: skip
-    parser.add_argument("--converter", metavar="TEXT", help="'bus 9, 300 MVA, 200 MW, less sg3'")
+    add_options(parser, "new")
     device = parser.add_mutually_exclusive_group()
-    device.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="a vendor's FMU in place of our converter")
-    device.add_argument("--dll", type=Path, metavar="FILE", help="a vendor's DLL, or the file of a device around one")
-    parser.add_argument(
-        "--binding", type=Path, metavar="FILE.toml", help="what the FMU's variables mean (`gfor fmu bind`)"
-    )
-    parser.add_argument("--models", choices=("emt", "phasor"), help="default: phasor, with a vendor's file EMT")
-    parser.add_argument("--frequency", metavar="HZ", help="'60 Hz', where the network's file does not say it")
-    parser.add_argument("--slack", metavar="NAME", help="unit or bus that feeds what is left, where no file says it")
-    parser.add_argument("--leave-out", action="append", default=[], metavar="KIND", help="elements of the network that "
-                        "may go, where a message asks for it (repeatable)")  # fmt: skip
-    repeatable(parser, "--dyr-leave-out", "MODEL", "records of dynamics data that may go (repeatable)")
-    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="the case file (default: the network's name)")
-    parser.add_argument("--force", action="store_true", help="overwrite an existing file")
+    add_options(device, "new 2")
+    add_options(parser, "new 3")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from rich.markup import escape
 from orchestrator.api.nyquist import Asked
 from orchestrator.asked import read_part
 from orchestrator.black_box.frequency_response import Excitation
-from orchestrator.cli.arguments import add_json_argument, option, quantity, repeatable, seconds, setting, switch
+from orchestrator.cli.arguments import add_json_argument, add_options, option, switch
 from orchestrator.cli.terminal import make_console, print_json, print_parts, said_stages, say
 from orchestrator.errors import NOT_MET, InputError
 from orchestrator.immittance.view import GOAL, parts
@@ -20,34 +20,13 @@ _SIDES = ("device", "network")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("device", metavar="DEVICE", help="a scan (.txt, .csv), an FMU or DLL; or a case alone")
-    parser.add_argument("network", nargs="?", metavar="NETWORK", help="a scan of the network, or a case")
-    option(parser, "--frequency", "F", "rated frequency (50 Hz)", read=quantity("Hz"), default=50.0)
+    add_options(parser, "nyquist")
     option(parser, "--compensation", "PERCENT", "series capacitors, as share of the network's reactance, such as "
            "'32 %%'", read=read_part(_SHARE, 0, 99.99), default=0.0)  # fmt: skip
-    option(parser, "--angle", "A", "of the device's frame before the network's, such as 20deg", read=quantity("rad"))
-    option(parser, "--voltage", "V", "rated voltage at the cut, between pu and S", read=quantity("kV"))
+    add_options(parser, "nyquist 2")
     for name, text in (("per-unit", "is in pu, 100 MVA"), ("generator", "counts currents out of it")):
         parser.add_argument(f"--{name}", action="append", default=[], choices=_SIDES, help=f"the side's file {text}")
-    switch(parser, "--units-checked", "two scans of very different size are meant so")
-    option(parser, "--bus", "B", "cut a case between the devices of this bus and all else")
-    repeatable(parser, "--component", "NAME", "cut a case at this component (repeatable)")
-    option(parser, "--scr", "SCR", "an ideal source of this short-circuit ratio is the network", read=quantity("1"))
-    option(parser, "--x-r", "RATIO", "its X/R (10)", read=quantity("1"), default=10.0)
-    option(parser, "--rating", "S", "of the device, for its SCR, where it states none", read=quantity("MVA"))
-    switch(parser, "--retune", "which parameters of the device would keep it farther from −1, from a few scans each")
-    repeatable(parser, "--parameter", "NAME", "only this one, tunable or fixed; also a pattern (repeatable; "
-               "default: all tunable ones, from a quarter to four times)")  # fmt: skip
-    option(parser, "--distance", "D", "from −1, that --retune is to reach (0.3)", read=quantity("1"))
-    option(parser, "--scenario", "NAME", "of a case (default: its first)")
-    repeatable(parser, "--set", "NAME=VALUE", "a value of the FMU, or COMPONENT.PARAMETER=VALUE of the case "
-               "(repeatable)", read=setting)  # fmt: skip
-    option(parser, "--binding", "vendor.toml", "maps the FMU's variables to our port", read=Path)
-    option(parser, "--step", "H", "communication step of a scan (100 us)", read=seconds, default=1e-4)
-    option(parser, "--from-hz", "F", "lowest frequency of a scan (0.05)", read=quantity("Hz"), default=0.05)
-    option(parser, "--to-hz", "F", "highest frequency of a scan (1000)", read=quantity("Hz"), default=1000.0)
-    option(parser, "--out", "DIR", "folder (default: results/nyquist_<device>)", read=Path)
-    switch(parser, "--trust-fmus", "as for `gfor run`")
+    add_options(parser, "nyquist 3")
     add_json_argument(parser)
     switch(parser, "--fail-unstable", "end with exit code 3 unless it is stable")
 

@@ -15,7 +15,7 @@ from orchestrator.api.scenario import RunEndedWarning, Scenario
 from orchestrator.asked import read_whole
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli import checkpoints, federates, run_request, terminal
-from orchestrator.cli.arguments import option, repeatable, seconds, switch, tolerance
+from orchestrator.cli.arguments import add_options, option, switch, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
@@ -44,16 +44,7 @@ from orchestrator.study.run import RunResult
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, optional=True, schedule=True)
-    option(parser, "--stop", "T", "stop time [s], e.g. 5 or '500 ms'", read=seconds)
-    option(parser, "--tolerance", "TOL", "take steps as long as this error of a coupled output allows, from 1e-8 to "
-           "0.1, such as 1e-4; needs FMUs that save their state (default: fixed steps, "
-           "or the case's tolerance)", read=tolerance)  # fmt: skip
-    repeatable(parser, "--force", "'UNIT FREQUENCY AMPLITUDE'", "let a unit's power reference swing, in the place of "
-               "the case's events: 'sg35 0.8 Hz 2 %%', or with more words 'sg35.exciter.V_ref 0.8 Hz 2 %% square from "
-               "2 s' (repeatable)")  # fmt: skip
-    option(parser, "--out", "DIR", "folder for results (default: results/<case>)", read=Path)
-    parser.add_argument("--no-csv", dest="csv", action="store_false", help="write trajectories as .nc only")
-    switch(parser, "--linear", "lay the linear model's response over the simulated one")
+    add_options(parser, "run", tolerance=tolerance)
     option(parser, "--threads", "N", "threads that step native FMUs (default: as many as are faster than one, up to "
            "one for each core); no value depends on it", read=read_whole(1, MOST_THREADS))  # fmt: skip
     option(parser, "--workers", "N", "scenarios at a time, each in a process (default: one a core, or one alone "

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.cases.case import built_in_cases
-from orchestrator.cli.arguments import option, seconds_or_none, switch
+from orchestrator.cli.arguments import add_options
 from orchestrator.errors import InputError
 from orchestrator.results.checkpoint_file import CHECKPOINT, CHECKPOINTS
 from orchestrator.results.staging import new_run_id
@@ -32,12 +32,7 @@ _NOT_WITH_RESUME: Mapping[str, Any] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    option(parser, "--checkpoint", "SECONDS", f"wall-clock time between two checkpoints (default: {EVERY:g}); 0 writes "
-           f"none", read=seconds_or_none)  # fmt: skip
-    switch(parser, "--require-checkpoint", "refuse a run that could not be resumed, because an FMU cannot serialise "
-           "its state")  # fmt: skip
-    option(parser, "--resume", "DIR", "go on with the interrupted run whose results are in DIR; case and options are "
-           "those that it had", read=Path)  # fmt: skip
+    add_options(parser, "run_request", EVERY=EVERY)
 
 
 def with_request(options: argparse.Namespace) -> argparse.Namespace:

@@ -5,9 +5,8 @@ import json
 
 from rich.markup import escape
 
-from orchestrator.asked import read_positive
 from orchestrator.cases.short_circuit import CONVENTION, weakest_first
-from orchestrator.cli.arguments import add_json_argument, add_kept_argument, option
+from orchestrator.cli.arguments import add_json_argument, add_kept_argument, add_options
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.terminal import keep_json, make_console, print_json
 from orchestrator.report.tables import make_table
@@ -15,10 +14,7 @@ from orchestrator.report.tables import make_table
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    option(parser, "--rating", "MVA", "SCR of every bus for a converter of so much (default: at the converters' buses, "
-           "for theirs)", read=read_positive)  # fmt: skip
-    option(parser, "--converter-current", "PU", "that a converter feeds into a short circuit, of its rating (default: "
-           "none)", read=read_positive, default=0.0)  # fmt: skip
+    add_options(parser, "scr")
     add_json_argument(parser)
     add_kept_argument(parser, "scr")
 

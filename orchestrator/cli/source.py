@@ -1,14 +1,13 @@
 """``gfor signal source``: where the oscillations of a run or a recording come from."""
 
 import argparse
-from pathlib import Path
 
 from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.api.case import load
 from orchestrator.api.source import contest_sources, source
-from orchestrator.cli.arguments import add_json_argument, add_kept_argument, seconds, seconds_or_none
+from orchestrator.cli.arguments import add_json_argument, add_kept_argument, add_options
 from orchestrator.cli.terminal import keep_json, make_console, print_json, print_parts, saying_warnings
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
@@ -23,19 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "A source drives alone, as only the units' own models tell; else a place that drives is named where the "
         "methods that apply agree."
     )
-    parser.add_argument("run", type=Path, nargs="?", metavar="RUN",
-                        help="folder of a scenario's results, its trajectory.nc, COMTRADE or CSV with columns NAME.vm, "
-                        "NAME.va, NAME.p, NAME.q")  # fmt: skip
-    parser.add_argument("--contest", type=Path, metavar="FOLDER",
-                        help="cases in the form of the 2021 IEEE-NASPI contest (BusVolMag.txt and so on)")  # fmt: skip
-    parser.add_argument("--case", metavar="CASE", help="the grid that was recorded: its units' own linear models tell "
-                        "which of them drives (default: that of a built-in case's run)")  # fmt: skip
-    parser.add_argument("--scenario", metavar="NAME", help="of --case, where it has several")
-    parser.add_argument("--start", type=seconds_or_none, metavar="T", help="begin of the part that is used [s]")
-    parser.add_argument("--stop", type=seconds, metavar="T", help="its end [s]")
-    parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="write a page: map of energy flows, timeline, spectrum"
-    )
+    add_options(parser, "source")
     add_json_argument(parser)
     add_kept_argument(parser, "source")
     add_details_argument(parser)

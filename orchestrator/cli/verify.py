@@ -14,7 +14,7 @@ from orchestrator.certification.inside import laid_out
 from orchestrator.certification.kinds import POINTS
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verified, verified
-from orchestrator.cli.arguments import add_executor_arguments, choose_executor, option, reactances
+from orchestrator.cli.arguments import add_executor_arguments, add_options, choose_executor, option
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import INTERRUPTED
 from orchestrator.report.progress import progress_bar
@@ -26,19 +26,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "verdict as with gfor certify: 0 the converter passes; 1 it fails; 3 the test is incomplete; 4 it passes, and "
         f"an acceptance test of the FMU failed; {INTERRUPTED} interrupted."
     )
-    parser.add_argument(
-        "certificate",
-        type=Path,
-        metavar="CERTIFICATE",
-        help="its folder, its certificate.json, or an FMU with certificates in it",
-    )
+    add_options(parser, "verify")
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--points", type=reactances, metavar="X,X,…",
-                       help="line reactances that are computed anew [pu] (default: the least damped one)")  # fmt: skip
+    add_options(which, "verify 2")
     option(which, "--rows", "ROW,ROW,…", "of a code's certificate: rows that are computed anew (default: the one with "
            "the narrowest margin, and one that chance draws)", read=lambda text: tuple(text.split(",")))  # fmt: skip
-    which.add_argument("--all", action="store_true", help="compute every point or row anew")
-    which.add_argument("--files-only", action="store_true", help="compute nothing: compare hashes, and judge again")
+    add_options(which, "verify 3")
     add_executor_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
