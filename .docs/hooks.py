@@ -137,14 +137,15 @@ def _command(name: str, words: str) -> str:
 
 
 def studies() -> str:
-    """The methods that are made from the requests of their studies; mkdocstrings reads files, and sees none."""
+    """What is made from the requests of studies; mkdocstrings reads files, and sees none."""
     from orchestrator.added import rooms  # noqa: PLC0415 - only the page of Python needs the package
     from orchestrator.api.case import Case  # noqa: PLC0415 - as above
+    from orchestrator.api.certification import certify  # noqa: PLC0415 - as above
     from orchestrator.api.scenario import Scenario  # noqa: PLC0415 - as above
 
     of_case = [(f"Case.{name}", getattr(Case, name)) for name in sorted({*rooms(), "design_over_points"})]
     of_scenario = [(f"Scenario.{name}", getattr(Scenario, name)) for name in ("modes", "sensitivities", "steps")]
-    return "\n\n".join(_method(name, function) for name, function in (*of_case, *of_scenario))
+    return "\n\n".join(_method(name, function) for name, function in (*of_case, *of_scenario, ("certify", certify)))
 
 
 def _method(name: str, function: Callable[..., object]) -> str:

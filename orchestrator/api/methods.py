@@ -1,11 +1,11 @@
-"""Methods of a case made from the requests of its studies, with their signature and documentation."""
+"""Methods and functions made from requests, with their signature and documentation."""
 
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields
 from inspect import Parameter, Signature, cleandoc, get_annotations
 from textwrap import indent
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar, cast
 
 from orchestrator.asked import Asked, asked_of, checked, require_known
 
@@ -19,27 +19,41 @@ def method(
     """A method; ``name`` is such as ``Case.sweep``.
 
     Its keywords are the fields of the request, and ``call`` computes what is asked of an object."""
-    assert isinstance(request, type)
-    signature, (owner, _, last) = _signature(request), name.partition(".")
+    owner, _, last = name.partition(".")
+    made = _made(request, [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)], call, last)
+    return cast("Callable[Concatenate[Any, Asks], Shown]", _named(made, name, owner.lower()))
 
-    def studied(self: Any, /, *given: Asks.args, **wanted: Asks.kwargs) -> Shown:
-        require_known(wanted, asked_of(request), last)
-        bound = signature.bind(self, *given, **wanted).arguments
-        return call(self, request(**checked(request, bound)))
 
-    studied.__name__, studied.__qualname__, studied.__module__ = last, name, f"orchestrator.api.{owner.lower()}"
+def function(
+    name: str, module: str, request: Callable[Asks, Any], call: Callable[[Any], Shown]
+) -> Callable[Asks, Shown]:
+    """As `method`, a function of a ``module`` of the public face."""
+    return cast("Callable[Asks, Shown]", _named(_made(request, [], call, name), name, module))
+
+
+def _made(request: Any, before: list[Parameter], call: Callable[..., Any], who: str) -> Any:
+    signature = Signature([*before, *_parameters(request)])
+
+    def studied(*given: Any, **wanted: Any) -> Any:
+        require_known(wanted, asked_of(request), who)
+        bound = signature.bind(*given, **wanted).arguments
+        return call(*given[: len(before)], request(**checked(request, bound)))
+
     studied.__signature__ = signature  # type: ignore[attr-defined] # what `help` and notebooks show
     studied.__doc__ = _documentation(request)
     return studied
 
 
-def _signature(request: type) -> Signature:
-    listed = [Parameter("self", Parameter.POSITIONAL_OR_KEYWORD)]
+def _named(made: Any, name: str, module: str) -> Any:
+    made.__name__, made.__qualname__, made.__module__ = name.rpartition(".")[2], name, f"orchestrator.api.{module}"
+    return made
+
+
+def _parameters(request: type) -> Iterable[Parameter]:
     for one, asks in _listed(request):
         kind = Parameter.KEYWORD_ONLY if one.kw_only else Parameter.POSITIONAL_OR_KEYWORD
         default = Parameter.empty if asks.default is MISSING else asks.shown_default
-        listed.append(Parameter(one.name, kind, default=default, annotation=one.type))
-    return Signature(listed)
+        yield Parameter(one.name, kind, default=default, annotation=one.type)
 
 
 def _listed(request: type) -> Iterable[tuple[Any, Asked]]:

@@ -26,7 +26,7 @@ from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.files import JSON, read_record
 from orchestrator.certification.form import NORM
 from orchestrator.certification.point import CONVERTER
-from orchestrator.certification.points_again import chosen_points
+from orchestrator.certification.points_again import choose
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.errors import CosimError, FmuFileError, InputError
@@ -62,7 +62,7 @@ def experiments_of(folder: Path, content: dict[str, Any]) -> dict[str, bytes]:
     """Files of the experiments by name: one a row, or the least damped point of the damping test."""
     case, found = folder / CASE, dict[str, bytes]()
     if content["format"] == NORM:
-        (X_L,) = chosen_points(content)
+        (X_L,) = choose(content)
         prepared = load_case(case).prepare([WITH], {"grid.X_L": X_L})
         return _files(f"X_L_{X_L:g}", prepared[0])
     for row in content["rows"]:

@@ -2,36 +2,33 @@
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, MISSING, dataclass
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from orchestrator.asked import FILE, FLAG, FieldKind, asked, number_in, one_of, path
+from orchestrator.cases.given import binding_path, plain
 from orchestrator.cases.schema import Value
+from orchestrator.certification import points_again
 from orchestrator.certification.acceptance import KEPT, Acceptance
 from orchestrator.certification.certificate import Certificate
+from orchestrator.certification.codes import rows_again
 from orchestrator.certification.codes.all_codes import BY_DECLARATION, CODES, NTS631, code_for
 from orchestrator.certification.codes.bench_point import BenchTask, compute_row
 from orchestrator.certification.codes.certificate import certify_code
-from orchestrator.certification.codes.rows_again import chosen_rows, compare_row, rebuilt_rows, row_faults, row_tasks
-from orchestrator.certification.compared import Compared, Content, Verification
+from orchestrator.certification.compared import Content, Verification
 from orchestrator.certification.files import RESPONSES
 from orchestrator.certification.form import NORM
 from orchestrator.certification.point import CertificatePointTask, compute_point
-from orchestrator.certification.points_again import (
-    chosen_points,
-    compare_point,
-    point_faults,
-    point_tasks,
-    rebuilt_points,
-)
-from orchestrator.certification.request import REACTANCES, STUDY, CertificationRequest
+from orchestrator.certification.request import PODS, REACTANCES, STUDY, CertificationRequest, read_reactances
 from orchestrator.certification.study import certify
 from orchestrator.errors import InputError
 from orchestrator.fmi.devices import as_device
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, Work, nobody
+from orchestrator.points.request import ANYTHING
 from orchestrator.points.task import Task
 
 
@@ -42,13 +39,9 @@ class Parts:
     one: str  # what a part is called; the record has a list of them
     task: type[Task]
     option: str  # with which `gfor verify` takes some of them
-    rebuilt: Callable[[Path, dict[str, Any], xr.Dataset], Certificate]
-    faults: Callable[[Path, dict[str, Any], xr.Dataset], Iterable[str]]  # what speaks against it beside the judgement
-    choose: Callable[..., list[Any]]  # from content, wishes and ``every``: the parts that are computed anew
-    # tasks of the chosen parts of a folder; a verification takes what speaks against one before
-    tasks: Callable[[Path, Content, Sequence[Any], Verification], Sequence[Any]]
+    # the module that judges them again: ``rebuilt``, ``faults``, ``choose``, ``tasks`` and ``compare``
+    again: Any
     compute: Callable[[Any], Any]
-    compare: Callable[[Content, Any, Any, xr.Dataset], Compared]  # with content, task, what was computed, responses
 
     def chosen(self, folder: Path, content: Content, wanted: Sequence[Any], *, every: bool) -> list[Any]:
         """Line reactances, or names of rows; ``wanted``: those that were asked for."""
@@ -59,24 +52,22 @@ class Parts:
             raise InputError(
                 f"{given}: {folder} is the certificate of {kind}, which has {self.one}s; give {self.option}"
             )
-        return self.choose(content, wanted, every=every)
+        return list(self.again.choose(content, wanted, every=every))
 
     def verify(
         self, folder: Path, content: Content, chosen: Sequence[Any], executor: Executor, report: CountReport = nobody
     ) -> Verification:
         found = Verification()
-        tasks = self.tasks(folder, content, chosen, found)
+        tasks = self.again.tasks(folder, content, chosen, found)
         with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
             for index, again in Work(executor, report=report).each(self.compute, tasks):
-                for fault, said in self.compare(content, tasks[index], again, data):
+                for fault, said in self.again.compare(content, tasks[index], again, data):
                     (found.faults if fault else found.agreed).append(fault or said)
         return found
 
 
-POINTS = Parts("point", CertificatePointTask, "--points, with line reactances", rebuilt_points, point_faults,
-               chosen_points, point_tasks, compute_point, compare_point)  # fmt: skip
-ROWS = Parts("row", BenchTask, "--rows, with their names", rebuilt_rows, row_faults, chosen_rows, row_tasks,
-             compute_row, compare_row)  # fmt: skip
+POINTS = Parts("point", CertificatePointTask, "--points, with line reactances", points_again, compute_point)
+ROWS = Parts("row", BenchTask, "--rows, with their names", rows_again, compute_row)
 
 
 def parts_of(content: Content) -> Parts:
@@ -86,7 +77,7 @@ def parts_of(content: Content) -> Parts:
 def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certificate:
     """The certificate anew from what its folder keeps, by the judgement that made it: from the FMU, the case file, the
     responses and, of a damping test, the eigenvalues."""
-    certificate = parts_of(content).rebuilt(folder, content, responses)
+    certificate: Certificate = parts_of(content).again.rebuilt(folder, content, responses)
     if content["acceptance"] is not None:
         report = json.loads((folder / KEPT).read_text(encoding="utf-8"))
         faults = tuple(dict.fromkeys(check["fault"] for check in report["checks"] if check["verdict"] == "fail"))
@@ -97,32 +88,100 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
 WITH_VERDICT = (NTS631, *CODES, *BY_DECLARATION)  # codes that a converter passes or fails
 
 
+def _reactances(given: Any, argument: str) -> tuple[float, ...]:
+    rule = "line reactances in pu, such as (0.1, 0.2)"
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise InputError(f"{argument} = {given!r}; give {rule}")
+    return tuple(number_in(x, "pu", argument, rule) for x in given)
+
+
+@dataclass(frozen=True)
+class CertifyRequest:
+    """Test a converter's FMU under a grid code, and write its certificate.
+
+    Raises
+    ------
+    InputError
+        If there is no such code, or the FMU, the binding or a value cannot be used.
+
+    Examples
+    --------
+    >>> import orchestrator as gfor
+    >>> gfor.certify("vendor.fmu", "miso", folder="certificate").verdict  # doctest: +SKIP
+    'passes'
+    >>> gfor.certify("vendor.fmu", "misa")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    orchestrator.errors.InputError: code = 'misa'; give one of nts631, miso, ...
+    """
+
+    fmu: str | Path = asked(FieldKind("", str, path), MISSING, "the converter", option=None)
+    code: str = asked(one_of(WITH_VERDICT), NTS631, f'``"{NTS631}"``, the damping test, or another that ``gfor certify '
+                      "--code`` names, with a verdict", option=None)  # fmt: skip
+    _: KW_ONLY
+    binding: str | Path | None = asked(
+        FieldKind("", str, lambda given, _: binding_path(given)), None, "file that says what the FMU's variables mean "
+        "at our port", option=None,
+    )  # fmt: skip
+    values: Mapping[str, Any] | None = asked(
+        FieldKind("", str, plain), None, 'of the converter, such as ``{"pod_p.K": 150}``; or of the damping test\'s '
+        "study, which makes it another test", option=None,
+    )  # fmt: skip
+    declared: Mapping[str, float] | None = asked(
+        FieldKind("", str, plain), None, "what the applicant declares, for codes that compare the converter with that",
+        option=None,
+    )  # fmt: skip
+    pod: str | None = asked(
+        one_of(PODS), None, "damping controllers that are to be active: set in the FMU where it has pod_p.enabled and "
+        "pod_q.enabled, else declared by the applicant (default: as the FMU shows them)", f"{{{','.join(PODS)}}}",
+        python=f"active damping controllers, one of {', '.join(PODS)}; as the FMU shows them by default",
+    )  # fmt: skip
+    reactances: Sequence[float] | None = asked(
+        FieldKind("X,X,…", read_reactances, _reactances), None, "line reactances X_L [pu] (default: the norm's 13, "
+        "0.01 and 0.05 to 0.60; less is incomplete)", python="line reactances of the damping test [pu]; the norm's 13 "
+        "by default, less is incomplete",
+    )  # fmt: skip
+    black_box: bool = asked(FLAG, False, "do not use the converter's states for the modes, even if it shows them")
+    check: bool = asked(FLAG, True, "whether the acceptance tests of the FMU are run", option=None)
+    folder: str | Path | None = asked(
+        FILE, None, "for the certificate; ``results/certify_<file>[_<code>]`` by default. Points that are there are "
+        "kept", option=None,
+    )  # fmt: skip
+    into: str | Path | None = asked(
+        FILE, None, "write the FMU with its certificate in it, and with experiments that any tool can repeat; "
+        "certificates by other codes that OUT.fmu holds stay", "OUT.fmu", python="where the FMU is written with the "
+        "certificate in it, and with experiments that any tool can repeat",
+    )  # fmt: skip
+    workers: int | None = asked(ANYTHING, 1, "processes; one for each core where None", option=None)
+    progress: bool = asked(FLAG, False, "show a bar", option=None)
+
+    def issue(self) -> "Issue":
+        """How it is computed."""
+        binding = None if self.binding is None else Path(self.binding)
+        fmu, values = Path(self.fmu), self.values or {}
+        if self.code != NTS631:
+            code, bench = code_for(self.code, self.declared or {}), bench_request(fmu, binding, values)
+            return Issue(bench, ROWS, lambda work, folder, say: certify_code(bench, code, work, folder, report=say))
+        if self.declared:
+            raise InputError(f"--declare {next(iter(self.declared))}: the damping test takes no declared value; leave "
+                             f"it out, or choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
+        study = {name: value for name, value in values.items() if name.split(".")[0] in STUDY}
+        own = {name: value for name, value in values.items() if name not in study}
+        reactances = self.reactances or REACTANCES
+        norm = CertificationRequest(as_device(fmu, binding), binding, own, self.pod, reactances, study, self.black_box)
+        norm.check()
+        return Issue(norm, POINTS, lambda executor, folder, report: certify(norm, executor, folder, report))
+
+
+def usual_folder(name: str, code: str) -> Path:
+    return Path("results") / f"certify_{name}{'' if code == NTS631 else f'_{code}'}"
+
+
 @dataclass(frozen=True)
 class Issue:
     request: CertificationRequest
     parts: Parts
     compute: Callable[[Executor, Path, CountReport], Certificate]
-
-
-def issue_of(
-    key: str, fmu: Path, binding: Path | None, values: Mapping[str, Value], *, declared: Mapping[str, object],
-    pod: str | None = None, reactances: Sequence[float] = REACTANCES, black_box: bool = False,
-) -> Issue:  # fmt: skip
-    if key != NTS631:
-        code, bench = code_for(key, declared), bench_request(fmu, binding, values)
-        return Issue(
-            bench, ROWS,
-            lambda executor, folder, report: certify_code(bench, code, executor, folder, report=report),
-        )  # fmt: skip
-    if declared:
-        raise InputError(f"--declare {next(iter(declared))}: the damping test takes no declared value; leave it out, "
-                         f"or choose --code {', '.join(BY_DECLARATION)}")  # fmt: skip
-    study = {name: value for name, value in values.items() if name.split(".")[0] in STUDY}
-    own = {name: value for name, value in values.items() if name not in study}
-    norm = CertificationRequest(as_device(fmu, binding), binding, own, pod, reactances, study, black_box)
-    norm.check()
-    return Issue(norm, POINTS,
-                 lambda executor, folder, report: certify(norm, executor, folder, report))  # fmt: skip
 
 
 def bench_request(fmu: Path, binding: Path | None, values: Mapping[str, Value]) -> CertificationRequest:

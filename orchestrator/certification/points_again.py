@@ -37,7 +37,7 @@ from orchestrator.late import xr
 from orchestrator.points.task import StudyCase
 
 
-def rebuilt_points(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certificate:
+def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certificate:
     request = request_of(folder, content, reactances=responses["X_L"].values.tolist(),
                        study_values=content["study_values"], black_box=content["black_box"])  # fmt: skip
     description = bound_fmu(request.fmu, request.binding)
@@ -121,7 +121,7 @@ def _value(mode: dict[str, Any]) -> complex:
     return complex(mode["real"], mode["imag"])
 
 
-def point_faults(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Iterator[str]:
+def faults(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Iterator[str]:
     """Values of a damping test's case file that are others than the certificate's, and what it leaves out or adds."""
     stated = [point["X_L"] for point in content["points"]]
     if left_out := [f"{X:g}" for X in responses["X_L"].values.tolist() if X not in stated]:
@@ -138,7 +138,7 @@ def point_faults(folder: Path, content: dict[str, Any], responses: xr.Dataset) -
             yield f"'values', 'study_values' or 'pod_values' are not those that {CASE} sets {name} the converter"
 
 
-def chosen_points(content: Content, wanted: Sequence[float] = (), *, every: bool = False) -> list[float]:
+def choose(content: Content, wanted: Sequence[float] = (), *, every: bool = False) -> list[float]:
     """Reactances of the points that are computed anew [pu]; without a wish the one with the least damped mode."""
     points = content["points"]
     if not wanted:
@@ -155,7 +155,7 @@ def chosen_points(content: Content, wanted: Sequence[float] = (), *, every: bool
     return chosen
 
 
-def point_tasks(folder: Path, content: Content, reactances: Sequence[float], _: Verification) -> list[Any]:
+def tasks(folder: Path, content: Content, reactances: Sequence[float], _: Verification) -> list[Any]:
     """Each point with and without the converter."""
     case = load_case(folder / CASE)
     study = {name: StudyCase.of(case.prepare([name], {"grid.X_L": reactances[0]})[0]) for name in (WITHOUT, WITH)}
@@ -163,7 +163,7 @@ def point_tasks(folder: Path, content: Content, reactances: Sequence[float], _: 
             for X_L in reactances for scenario in (WITHOUT, WITH)]  # fmt: skip
 
 
-def compare_point(content: Content, task: CertificatePointTask, again: PointResult, data: xr.Dataset) -> Compared:
+def compare(content: Content, task: CertificatePointTask, again: PointResult, data: xr.Dataset) -> Compared:
     point, scenario, signal = (
         next(p for p in content["points"] if p["X_L"] == task.X_L),
         task.scenario,

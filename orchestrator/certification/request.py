@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from orchestrator.asked import as_number
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError
@@ -58,6 +59,14 @@ def rated_frequency(request: CertificationRequest, wanted: float) -> float:
     if isinstance(description, BoundDescription):
         return description.port.f_n
     return wanted if "f_n" in description.variables else 50.0
+
+
+def read_reactances(text: str) -> tuple[float, ...]:
+    """Different reactances of a line [pu], separated by commas."""
+    values = tuple(as_number(part) for part in text.split(","))
+    if not all(1e-3 <= value <= 10 for value in values) or len(set(values)) < len(values):
+        raise ValueError(f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3")
+    return values
 
 
 def row_of(X_L: float) -> str:

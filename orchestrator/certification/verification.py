@@ -69,7 +69,7 @@ def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
     try:
         with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
             again = json.loads(json.dumps(figures_of(rebuilt(folder, content, data))))
-            return [*faults_of(content, again), *parts_of(content).faults(folder, content, data)]
+            return [*faults_of(content, again), *parts_of(content).again.faults(folder, content, data)]
     except (InputError, OSError, KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         return [f"the certificate cannot be judged again from {FMU}, its case files and {RESPONSES}: "
                 f"{type(error).__name__}: {error}"]  # fmt: skip

@@ -40,11 +40,13 @@ def repeatable(
 def add_options(parser: argparse._ActionsContainer, part: str, **given: Any) -> None:
     """Add the options that ``options.toml`` has for a part of a command.
 
-    ``given``: readers that the file names and that are not in `READERS`, and values that its help is filled in with."""
+    ``given``: readers and choices that the file names and that are not here, and what its help is filled in with."""
     for name, table in _listed()[part].items():
         how = {key: value for key, value in table.items() if key not in ("read", "several", "filled")}
         if table.get("filled"):
             how["help"] = how["help"].format(**given)
+        if isinstance(how.get("choices"), str):
+            how["choices"] = given[how["choices"]]
         kind, _, unit = table.get("read", "").partition(" ")
         if kind:
             how["type"] = quantity(unit) if unit else given.get(kind) or READERS[kind]
@@ -144,17 +146,9 @@ def tolerance(text: str) -> float:
     return value
 
 
-def reactances(text: str) -> tuple[float, ...]:
-    """Different reactances of a line [pu], separated by commas."""
-    values = tuple(as_number(part) for part in text.split(","))
-    if not all(1e-3 <= value <= 10 for value in values) or len(set(values)) < len(values):
-        raise ValueError(f"{text!r} are no reactances; write different numbers from 0.001 to 10, such as 0.1,0.3")
-    return values
-
-
 READERS: dict[str, Callable[[str], Any]] = {
     "path": Path, "seconds": seconds, "seconds_or_none": seconds_or_none, "setting": setting, "assignment": assignment,
-    "reactances": reactances, "positive": read_positive, "percent": read_percent, "range": read_range,
+    "positive": read_positive, "percent": read_percent, "range": read_range,
     "value": read_value, "int": int, "float": float,
 }  # fmt: skip
 """What makes a value of an option's text, by how ``options.toml`` calls it."""

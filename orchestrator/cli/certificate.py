@@ -23,11 +23,11 @@ from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.files import JSON, save
 from orchestrator.certification.inside import check_target, put_inside
 from orchestrator.certification.judgement import PointVerdict
-from orchestrator.certification.kinds import WITH_VERDICT, bench_request, issue_of
+from orchestrator.certification.kinds import WITH_VERDICT, CertifyRequest, bench_request, usual_folder
 from orchestrator.certification.margins import margin_of, narrowest
-from orchestrator.certification.request import REACTANCES, STUDY, rated_frequency
+from orchestrator.certification.request import STUDY, rated_frequency
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, exit_code
-from orchestrator.cli.arguments import choose_executor
+from orchestrator.cli.arguments import asked_by, choose_executor
 from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.study import Progressing
@@ -139,7 +139,7 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
     key = options.code
     if key != NTS631:
         check_code_options(options, [device])
-    folder = options.out or Path("results") / f"certify_{device.name}{'' if key == NTS631 else f'_{key}'}"
+    folder = options.out or usual_folder(device.name, key)
     console = make_console(stderr=options.json)
     if options.into:
         check_target(device.file, options.into)
@@ -158,8 +158,7 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
 
 
 def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
-    reactances = options.reactances != REACTANCES
-    asked = {"--pod": options.pod, "--black-box": options.black_box, "--reactances": reactances}
+    asked = {"--pod": options.pod, "--black-box": options.black_box, "--reactances": options.reactances}
     if other := [name for name, value in asked.items() if value]:
         raise InputError(
             f"{', '.join(other)}: only --code {NTS631} has it; leave it out, and set a damping controller by --set"
@@ -172,10 +171,9 @@ def certified(
     options: argparse.Namespace, device: Device, key: str, folder: Path, console: Console
 ) -> tuple[Certificate, list[Path]]:
     """Compute a certificate with its acceptance tests, and write its files; points are kept as they come."""
-    issue = issue_of(
-        key, device.file, device.binding, device.values, declared=dict(options.declare), pod=options.pod,
-        reactances=options.reactances, black_box=options.black_box,
-    )  # fmt: skip
+    given = {"fmu": device.file, "code": key, "binding": device.binding, "values": device.values,
+             "declared": dict(options.declare)}  # fmt: skip
+    issue = CertifyRequest(**asked_by(options, CertifyRequest) | given).issue()
     request = issue.request
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None

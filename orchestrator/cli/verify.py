@@ -12,9 +12,10 @@ from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.compared import TOLERANCE, TOLERANCE_IDENTIFIED
 from orchestrator.certification.inside import laid_out
 from orchestrator.certification.kinds import POINTS
+from orchestrator.certification.request import read_reactances
 from orchestrator.certification.verdict import DOES_NOT_HOLD, PASSES, exit_code
 from orchestrator.certification.verification import Verified, verified
-from orchestrator.cli.arguments import add_executor_arguments, add_options, choose_executor, option
+from orchestrator.cli.arguments import add_executor_arguments, add_options, choose_executor
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import INTERRUPTED
 from orchestrator.report.progress import progress_bar
@@ -27,11 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"an acceptance test of the FMU failed; {INTERRUPTED} interrupted."
     )
     add_options(parser, "verify")
-    which = parser.add_mutually_exclusive_group()
-    add_options(which, "verify 2")
-    option(which, "--rows", "ROW,ROW,…", "of a code's certificate: rows that are computed anew (default: the one with "
-           "the narrowest margin, and one that chance draws)", read=lambda text: tuple(text.split(",")))  # fmt: skip
-    add_options(which, "verify 3")
+    add_options(parser.add_mutually_exclusive_group(), "verify which", reactances=read_reactances,
+                rows=lambda text: tuple(text.split(",")))  # fmt: skip
     add_executor_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 

@@ -73,7 +73,10 @@ def test_modes_need_no_plots():
 def test_the_reference_page_lists_every_name():
     page = (ROOT / ".docs" / "reference" / "python.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^::: (orchestrator\.\S+)$", page, re.MULTILINE))
-    assert {f"orchestrator.{home}.{name}" for name, home in orchestrator._HOMES.items()} <= listed
+    made = {name for name in orchestrator._HOMES if hasattr(getattr(orchestrator, name), "__signature__")}
+    assert made == {"certify"}  # from a request: a hook lists it
+    homes = {f"orchestrator.{home}.{name}" for name, home in orchestrator._HOMES.items() if name not in made}
+    assert homes <= listed
 
 
 def test_each_command_has_its_twin_or_the_page_says_why_not():

@@ -7,8 +7,10 @@ from dataclasses import dataclass, fields
 import pytest
 
 from orchestrator.api.case import Case
+from orchestrator.api.certification import certify
 from orchestrator.api.scenario import Scenario
 from orchestrator.asked import DAMPING, FLAG, NAMES, STAGES, asked, asked_of, checked
+from orchestrator.certification.kinds import CertifyRequest
 from orchestrator.cli.arguments import add_request_arguments, asked_by
 from orchestrator.coordinated_design.study import PointsDesignRequest
 from orchestrator.errors import InputError
@@ -85,6 +87,11 @@ def test_a_method_has_the_keywords_and_the_words_of_its_request(method, request_
     assert sorted(explained(inspect.cleandoc(method.__doc__))) == sorted(keywords)
     by_place = [one.name for one in fields(request_class) if not one.kw_only]
     assert keywords[: len(by_place)] == by_place
+
+
+def test_a_function_has_the_keywords_and_the_words_of_its_request():
+    assert list(inspect.signature(certify).parameters) == list(asked_of(CertifyRequest))
+    assert sorted(explained(inspect.cleandoc(certify.__doc__))) == sorted(asked_of(CertifyRequest))
 
 
 def test_defaults_are_shown_in_pythons_units():

@@ -223,7 +223,7 @@ def test_values_may_be_numpys_and_have_units():
         (lambda: face.load("infinite_bus").scenario("dip").modes((0, 2), 20), "begin above 0 Hz"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": []}), "grid.X: a sweep needs values"),
         (lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=0), "workers = 0; it must be"),
-        (lambda: face.certify("vendor.fmu", pod="z"), "pod = 'z'; choose from none, p, q, pq"),
+        (lambda: face.certify("vendor.fmu", pod="z"), "pod = 'z'; give one of none, p, q, pq"),
         (lambda: face.load("two_area_rms").site(below=0.1), "below = 0.1; it is in percent"),
         (
             lambda: face.load("infinite_bus").sweep({"grid.X": [0.1]}, workers=2, scheduler="tcp://host:1"),

@@ -27,7 +27,7 @@ from orchestrator.watch.finding import UNSTABLE
 DRAWN = 1  # so many rows are drawn by chance beside the one with the narrowest margin
 
 
-def rebuilt_rows(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certificate:
+def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certificate:
     code, request = code_for(content["code"], content["declared"]), request_of(folder, content)
     stated = {row["row"]: row for row in content["rows"]}
     rows = [row for row in code.rows if row.name in stated or f"time_{row.name}" in responses.coords]
@@ -51,7 +51,7 @@ def _response(row: str, stated: dict[str, Any] | None, responses: xr.Dataset) ->
     return BenchResult(row, responses[f"time_{row}"].values, signals, said["findings"])
 
 
-def row_faults(folder: Path, content: dict[str, Any], data: xr.Dataset) -> list[str]:
+def faults(folder: Path, content: dict[str, Any], data: xr.Dataset) -> list[str]:
     """Rows of the record against the code's table, the files and the responses: `gfor certify` writes all of a table.
 
     Row files of another code may lie in the folder, from an earlier certificate; those of the record's files may not.
@@ -71,7 +71,7 @@ def row_faults(folder: Path, content: dict[str, Any], data: xr.Dataset) -> list[
     return [*faults, *(f"{name}: the record does not know it; take it away, or certify anew" for name in strangers)]
 
 
-def chosen_rows(content: Content, wanted: Sequence[str] = (), *, every: bool = False) -> list[str]:
+def choose(content: Content, wanted: Sequence[str] = (), *, every: bool = False) -> list[str]:
     """Names of the rows that are computed anew.
 
     ``wanted``: Names that were asked for; where empty, the row with the narrowest margin that is met, and `DRAWN`
@@ -91,7 +91,7 @@ def chosen_rows(content: Content, wanted: Sequence[str] = (), *, every: bool = F
     return narrowest + random.SystemRandom().sample(others, min(DRAWN, len(others)))
 
 
-def row_tasks(folder: Path, content: Content, names: Sequence[str], found: Verification) -> list[Any]:
+def tasks(folder: Path, content: Content, names: Sequence[str], found: Verification) -> list[Any]:
     """Rows whose case file is the one that the code's table and the certificate's values give."""
     code = code_for(content["code"], content["declared"])
     rows = {row.name: row for row in code.rows}
@@ -112,7 +112,7 @@ def _as_the_table(folder: Path, content: Content, code: GridCode[CodeRow], row: 
     return same
 
 
-def compare_row(content: Content, task: BenchTask, again: BenchResult, data: xr.Dataset) -> Compared:
+def compare(content: Content, task: BenchTask, again: BenchResult, data: xr.Dataset) -> Compared:
     row = next(row for row in code_for(content["code"], content["declared"]).rows if row.name == task.row)
     until = min((float(f["time"]) for f in again.findings if f["kind"] in UNSTABLE), default=np.inf)
     if fault := _fault_of_row(content, row, again, data, until):

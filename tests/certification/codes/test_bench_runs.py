@@ -11,7 +11,7 @@ from orchestrator.certification.codes import bench_point
 from orchestrator.certification.codes.all_codes import CODES, ERCOT
 from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.codes.certificate import certify_code
-from orchestrator.certification.codes.rows_again import chosen_rows
+from orchestrator.certification.codes.rows_again import choose
 from orchestrator.certification.files import save
 from orchestrator.certification.kinds import ROWS
 from orchestrator.certification.request import CertificationRequest
@@ -118,11 +118,11 @@ def test_rows_are_drawn_by_their_margin_and_by_chance():
         for name, margin, accepted in (("a", 0.5, True), ("b", 0.1, True), ("c", -3.0, False), ("d", 0.9, True))
     ]
     rows.append({"row": "e", "unknown": "no licence", "accepted": None, "criteria": []})
-    drawn = [chosen_rows({"rows": rows}) for _ in range(60)]
+    drawn = [choose({"rows": rows}) for _ in range(60)]
     assert {first for first, _ in drawn} == {"b"}
     assert {other for _, other in drawn} == {"a", "c", "d"}
-    assert chosen_rows({"rows": rows}, every=True) == ["a", "b", "c", "d"]
-    assert chosen_rows({"rows": rows}, ("d",)) == ["d"]
+    assert choose({"rows": rows}, every=True) == ["a", "b", "c", "d"]
+    assert choose({"rows": rows}, ("d",)) == ["d"]
 
 
 def test_a_converter_without_damping_does_not_settle(converter, tmp_path):
