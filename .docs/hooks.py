@@ -144,7 +144,7 @@ def studies() -> str:
     from orchestrator.api.scenario import Scenario  # noqa: PLC0415 - as above
 
     of_case = [(f"Case.{name}", getattr(Case, name)) for name in sorted({*rooms(), "design_over_points"})]
-    of_scenario = [(f"Scenario.{name}", getattr(Scenario, name)) for name in ("modes", "sensitivities", "steps")]
+    of_scenario = [(f"Scenario.{name}", getattr(Scenario, name)) for name in ("modes", "run", "sensitivities", "steps")]
     return "\n\n".join(_method(name, function) for name, function in (*of_case, *of_scenario, ("certify", certify)))
 
 

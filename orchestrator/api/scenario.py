@@ -14,7 +14,7 @@ from orchestrator.api.linear import LinearSystem
 from orchestrator.api.methods import method
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.results import Modes, Run
-from orchestrator.asked import Names, flag, number_between, whole_number
+from orchestrator.asked import Names, flag, number_between
 from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.cases.case import Case as CaseFile
@@ -23,21 +23,20 @@ from orchestrator.cases.load_models import as_powers, is_open
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.cases.short_circuit import BusStrength, ShortCircuit
-from orchestrator.cores import MOST_THREADS
-from orchestrator.coupling.observers import Observer, Progress
+from orchestrator.coupling.observers import Progress
 from orchestrator.coupling.schedule import ScheduleName
 from orchestrator.errors import InputError
-from orchestrator.federation.choice import Federates
 from orchestrator.late import pd, xr
 from orchestrator.report.notebook import page
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import IN_MEMORY
-from orchestrator.results.recording import RecordingFolder, recorded_size, temporary_recording
+from orchestrator.results.recording import recorded_size, temporary_recording
 from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.sensitivities.view import Sensitivities
 from orchestrator.study.checkpoints import EVERY, Checkpoints, not_kept
 from orchestrator.study.modes import ModesResult, compute_modes, running
 from orchestrator.study.request import ModesRequest, Preparing, StepsRequest
+from orchestrator.study.run_request import RunRequest
 from orchestrator.study.step_choice import Allowed, StepChoice, choose_step
 
 
@@ -67,6 +66,34 @@ def modes_of(scenario: Scenario, request: ModesRequest) -> ModesResult:
 
     with running(prepared) as master:
         return modes_with_boxes(prepared, master, seen, critical, report=request.report)
+
+
+def _run(scenario: Scenario, request: RunRequest) -> Run:
+    from orchestrator.study.run import run_scenario  # noqa: PLC0415 - only runs need it
+
+    prepared, recording = scenario._until(cast("float | None", request.stop)), request.recording
+    if request.checkpoints is not None and request.federates is not None:
+        raise InputError("a run with federates keeps no checkpoints; leave out federates or checkpoints")
+    with ExitStack() as stack:
+        kept = request.checkpoints if isinstance(request.checkpoints, Checkpoints) else None
+        if request.checkpoints is not None and kept is None:
+            folder = path_of(request.checkpoints, "checkpoints", "folder")
+            stack.enter_context(held(folder))
+            kept = _checkpoints(prepared, folder, cast("float | None", request.checkpoint_every) or EVERY)
+        if recording is None and recorded_size(prepared, csv=False) > IN_MEMORY:
+            recording = temporary_recording(prepared) if kept is None else kept.recording(prepared)
+        with shown_progress(scenario.title, shown=request.progress) as report:
+            bars = [Progress(report)] if request.progress else []
+            result = run_scenario(
+                prepared, observers=[*bars, *request.observers], linear=request.linear, recording=recording,
+                checkpoints=kept, federates=request.federates, threads=request.threads,
+                boxes=_boxes("modes_with_boxes", request.black_box),
+            )  # fmt: skip
+        if kept is not None and kept is not request.checkpoints and result.failure is None:
+            kept.clear()
+    if result.failure is not None:
+        warnings.warn(f"scenario {scenario.name!r}: {result.failure}", RunEndedWarning, stacklevel=3)
+    return Run(result)
 
 
 def sensitivities_of(scenario: Scenario, request: SensitivitiesRequest) -> Sensitivities:
@@ -164,92 +191,7 @@ class Scenario:
 
     modes = method("Scenario.modes", ModesRequest, _modes)
 
-    def run(
-        self, stop: Time | None = None, *, linear: bool = False, progress: bool = False,
-        observers: Sequence[Observer] = (), recording: RecordingFolder | None = None,
-        checkpoints: str | Path | Checkpoints | None = None, checkpoint_every: Time = EVERY,
-        federates: Federates | None = None, threads: int | None = None, black_box: bool = False,
-    ) -> Run:  # fmt: skip
-        """Modes, and the response to the scenario's events.
-
-        A component that fails in the middle ends the run, and so does Ctrl-C: a `RunEndedWarning` says it, and what
-        was recorded until then is in the result.
-
-        With a folder for checkpoints, the same call goes on where an interrupted or killed one was left, and gives the
-        same values as an undisturbed one. What should be known of that is a `CheckpointWarning`.
-
-        Parameters
-        ----------
-        stop
-            Time at which the run ends [s]; the case's by default.
-        linear
-            Compute the linear model's response as well.
-        progress
-            Show a bar.
-        observers
-            What else looks on at every communication step.
-        recording
-            A folder on the disk that takes the rows while the run goes on. By default they stay in memory; those of a
-            run that would need more than 256 MB go to a temporary folder, which is removed when Python ends.
-        checkpoints
-            Folder in which the run is kept while it goes on; by default none. It is empty again at the end, but for the
-            recording of a run that would need more than 256 MB.
-        checkpoint_every
-            Wall-clock time between two checkpoints [s].
-        federates
-            Components that run as federates at HELICS, such as ``Federates(("gfor",))`` of
-            `orchestrator.federation.choice`; by default everything runs here.
-        threads
-            How many step native FMUs, from 1 to 64. By default as many as make a step shortest, up to one for each
-            core, and only while they are seen to be faster than one. No value depends on it.
-        black_box
-            Identify the components that hide their states, for the modes before the events; else there are none.
-
-        Raises
-        ------
-        InputError
-            If ``threads`` is no such number, both checkpoints and federates are asked for, if what was left in the
-            folder is damaged, or if the run is made of something else now: another case, FMU or library.
-
-        Examples
-        --------
-        >>> import orchestrator as gfor
-        >>> run = gfor.load("infinite_bus").scenario("dip").run(stop=1.2)
-        >>> print(f"the voltage falls to {run.dataset['grid.v'].min().item():.2f} pu")
-        the voltage falls to 0.92 pu
-        """
-        from orchestrator.study.run import run_scenario  # noqa: PLC0415 - only runs need it
-
-        prepared = self._until(in_seconds(stop, "stop"))
-        _check_observers(observers)
-        if threads is not None:
-            whole_number(threads, "threads", 1, MOST_THREADS)
-        _check_kind(
-            recording, RecordingFolder, "recording", "give a RecordingFolder; `checkpoints` takes a folder's path"
-        )
-        _check_kind(federates, Federates, "federates", 'give Federates(("gfor",)) of orchestrator.federation.choice')
-        if checkpoints is not None and federates is not None:
-            raise InputError("a run with federates keeps no checkpoints; leave out federates or checkpoints")
-        with ExitStack() as stack:
-            kept = checkpoints if isinstance(checkpoints, Checkpoints) else None
-            if checkpoints is not None and kept is None:
-                folder = path_of(checkpoints, "checkpoints", "folder")
-                every = in_seconds(checkpoint_every, "checkpoint_every") or EVERY
-                stack.enter_context(held(folder))
-                kept = _checkpoints(prepared, folder, every)
-            if recording is None and recorded_size(prepared, csv=False) > IN_MEMORY:
-                recording = temporary_recording(prepared) if kept is None else kept.recording(prepared)
-            with shown_progress(self.title, shown=progress) as report:
-                bars = [Progress(report)] if progress else []
-                result = run_scenario(
-                    prepared, observers=[*bars, *observers], linear=linear, recording=recording, checkpoints=kept,
-                    federates=federates, threads=threads, boxes=_boxes("modes_with_boxes", black_box),
-                )  # fmt: skip
-            if kept is not None and kept is not checkpoints and result.failure is None:
-                kept.clear()
-        if result.failure is not None:
-            warnings.warn(f"scenario {self.name!r}: {result.failure}", RunEndedWarning, stacklevel=2)
-        return Run(result)
+    run = method("Scenario.run", RunRequest, _run)
 
     def response(self, stop: Time | None = None) -> xr.Dataset:
         """The linear model's response to the scenario's events, over the time [s]; no FMU is stepped for it.
@@ -382,17 +324,6 @@ def _boxes(name: str, wanted: bool) -> Any:
     return getattr(import_module("orchestrator.black_box.coupled_modes"), name) if wanted else None
 
 
-def _check_observers(given: Sequence[Observer]) -> None:
-    parts = ("every", "begin", "observe", "end")
-    if not isinstance(given, Sequence) or not all(hasattr(one, part) for one in given for part in parts):
-        raise InputError(f"observers = {given!r}; give a list of observers, or leave it out")
-
-
-def _check_kind(given: object, kind: type, argument: str, rule: str) -> None:
-    if given is not None and not isinstance(given, kind):
-        raise InputError(f"{argument} = {given!r}; {rule}, or leave it out")
-
-
 def _differences(one: PreparedScenario, other: PreparedScenario) -> list[str]:
     """Values and FMUs, by name, in which two preparations of a scenario differ."""
     names = [name for name in {**one.values, **other.values} if one.values.get(name) != other.values.get(name)]
@@ -403,7 +334,7 @@ def _differences(one: PreparedScenario, other: PreparedScenario) -> list[str]:
 
 def _checkpoints(prepared: PreparedScenario, folder: Path, every: float) -> Checkpoints:
     def say(text: str) -> None:
-        warnings.warn(text, CheckpointWarning, stacklevel=4)
+        warnings.warn(text, CheckpointWarning, stacklevel=5)
 
     for name, reason in not_kept(prepared).items():
         say(f"scenario {prepared.name!r} cannot be resumed within its run, because of component {name!r}: {reason}")

@@ -15,13 +15,13 @@ from orchestrator.api.scenario import RunEndedWarning, Scenario
 from orchestrator.asked import read_whole
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cli import checkpoints, federates, run_request, terminal
-from orchestrator.cli.arguments import add_options, option, switch, tolerance
+from orchestrator.cli.arguments import add_options, add_request_arguments, tolerance
 from orchestrator.cli.case_arguments import add_case_arguments, chosen
 from orchestrator.cli.interrupted import is_interrupt, saying_how_it_goes_on
 from orchestrator.cli.run_tables import print_run
 from orchestrator.cli.side_by_side import Outcome, Report, SideBySide, number_of_workers
 from orchestrator.cli.verdict import add_details_argument, add_verdict_argument, exit_code
-from orchestrator.cores import MOST_THREADS, number_of_cores
+from orchestrator.cores import number_of_cores
 from orchestrator.coupling.observers import Progress
 from orchestrator.errors import INTERRUPTED, CosimError, InputError, ResultsError, RunInterruptedError
 from orchestrator.federation.choice import Federates
@@ -40,20 +40,17 @@ from orchestrator.study.answers import EarlyEnd
 from orchestrator.study.files import save_run, save_study, summary_of
 from orchestrator.study.like import run_like
 from orchestrator.study.run import RunResult
+from orchestrator.study.run_request import RunRequest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, optional=True, schedule=True)
-    add_options(parser, "run", tolerance=tolerance)
-    option(parser, "--threads", "N", "threads that step native FMUs (default: as many as are faster than one, up to "
-           "one for each core); no value depends on it", read=read_whole(1, MOST_THREADS))  # fmt: skip
-    option(parser, "--workers", "N", "scenarios at a time, each in a process (default: one a core, or one alone "
-           "with an FMU that is not ours; Linux only); no value depends on it", read=read_whole(1, 1000))  # fmt: skip
-    switch(parser, "--json", "print the summary as JSON")
+    workers = read_whole(1, 1000)
+    add_options(parser, "run", tolerance=tolerance, workers=workers, masters=", ".join(MASTERS))
+    add_request_arguments(parser, RunRequest)
     add_verdict_argument(parser)
     add_details_argument(parser)
     run_request.add_arguments(parser)
-    _add_like_arguments(parser)
     federates.add_arguments(parser)
 
 
@@ -237,11 +234,6 @@ def _end(stopped: Mapping[str, BaseException], folder: Path) -> int:
         text += f"{head}{escape(f'scenario {scenario!r}: {str(error) or calls.how}')}\n"
     terminal.make_errors().print(f"{text}{escape(f'What was computed until then is in {folder}{where}')}")
     return INTERRUPTED if any(map(_is_interrupt, stopped.values())) else 1
-
-
-def _add_like_arguments(parser: argparse.ArgumentParser) -> None:
-    option(parser, "--like", "MASTER", f"only trajectories, as another master would give them: {', '.join(MASTERS)}")
-    option(parser, "--order", "A,B,…", "with --like: in which order components step, where they take turns")
 
 
 def _rules_of(options: argparse.Namespace) -> MasterRules | None:

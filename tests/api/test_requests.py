@@ -20,6 +20,7 @@ from orchestrator.screening.request import ScreeningRequest
 from orchestrator.sensitivities.request import SensitivitiesRequest
 from orchestrator.siting.study import SiteRequest
 from orchestrator.study.request import ModesRequest, StepsRequest
+from orchestrator.study.run_request import RunRequest
 from orchestrator.sweep.request import SweepRequest
 from tests.test_docstrings import explained
 
@@ -76,6 +77,7 @@ def test_a_field_without_an_option_is_set_in_python_alone():
         (Case.design, DesignRequest),
         (Case.design_over_points, PointsDesignRequest),
         (Scenario.modes, ModesRequest),
+        (Scenario.run, RunRequest),
         (Scenario.sensitivities, SensitivitiesRequest),
         (Scenario.steps, StepsRequest),
     ],
