@@ -45,8 +45,9 @@ def add_options(parser: argparse._ActionsContainer, part: str, **given: Any) -> 
         how = {key: value for key, value in table.items() if key not in ("read", "several", "filled")}
         if table.get("filled"):
             how["help"] = how["help"].format(**given)
-        if isinstance(how.get("choices"), str):
-            how["choices"] = given[how["choices"]]
+        for key in ("choices", "default"):
+            if isinstance(how.get(key), str):
+                how[key] = given.get(how[key], how[key])
         kind, _, unit = table.get("read", "").partition(" ")
         if kind:
             how["type"] = quantity(unit) if unit else given.get(kind) or READERS[kind]

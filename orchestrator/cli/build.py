@@ -15,7 +15,7 @@ from orchestrator.api.models import build, catalogue_model
 from orchestrator.cases.build_choices import PARTS
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.cli.arguments import add_options, option
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import make_errors, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.linear_model import linear_model_members
@@ -67,19 +67,11 @@ _NEEDS = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("names", nargs="*", metavar="NAME", help="models (default: all that need no further data)")
-    option(parser, "--dest", "DIR", "folder (default: here)", read=Path, default=Path())
-    add_options(parser, "build")
-    parser.add_argument("--for", dest="host", choices=HOSTS, metavar="HOST",
-                        help=f"what suits a host, chosen by a table: {', '.join(HOSTS)}")  # fmt: skip
-    parser.add_argument("--platform", action="append", choices=sorted(TARGETS), help="compile for this platform "
-                        "(repeatable; default: this machine's, for native FMUs all)")  # fmt: skip
+    add_options(parser, "build", hosts=HOSTS, listed=", ".join(HOSTS), platforms=sorted(TARGETS))
     for part in PARTS:
         parser.add_argument(
             f"--{part}", metavar="PART", help=f"{part} of synchronous_generator, such as {_SUCH_AS[part]}"
         )
-    add_options(parser, "build 2")
-    add_linear_model_arguments(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -145,12 +137,6 @@ def _from_dll(options: argparse.Namespace) -> int:
 
 
 OPTION = "--with-linear-model"
-
-
-def add_linear_model_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(OPTION, dest="linear_case", metavar="CASE", help="pack the model's linear model at the steady "
-                        "state of this case into the FMU")  # fmt: skip
-    add_options(parser, "linear_model")
 
 
 def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, bytes]:

@@ -33,18 +33,11 @@ def add_case_arguments(
     option(parser, "--step", "H", "communication step [s], e.g. 1e-4 or '200 us'", read=seconds)
     if schedule:
         add_schedule_argument(parser)
-        parser.add_argument("--sharing", choices=[str(rule) for rule in SharingRule], help="how the other units feed "
-                            "what units fed that --set takes out of service (default: as the case says, which is by "
-                            "droop)")  # fmt: skip
-    parser.add_argument("--native", dest="set", action="append_const", const=("*.native", True),
-                        help="run native FMUs instead of Python-backed ones; short for --set "
-                        "'*.native=true'")  # fmt: skip
+        add_options(parser, "sharing", rules=[str(rule) for rule in SharingRule])
 
 
 def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--schedule", choices=SCHEDULES, help="in which order components step, and what their inputs "
-                        "do meanwhile: midpoint and newton are of second order in the step (default: the "
-                        "case's)")  # fmt: skip
+    add_options(parser, "schedule", schedules=SCHEDULES)
 
 
 def add_trust_argument(parser: argparse.ArgumentParser) -> None:

@@ -13,7 +13,7 @@ from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes import needs_record
 from orchestrator.certification.codes.change_point import ChangeTask
 from orchestrator.certification.codes.what_it_takes import CHANGE, confirm_changes, plan_changes, run_changes
-from orchestrator.cli.arguments import add_options, choose_executor, switch
+from orchestrator.cli.arguments import add_options, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.study import Progressing
 from orchestrator.errors import InputError
@@ -22,12 +22,8 @@ from orchestrator.results.lock import held
 
 def add_sensitivity_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("what a failed criterion would take")
-    add_options(group, "sensitivity")
-    group.add_argument(
-        "--change", type=read_part("a change in percent from 0.01 to 50, such as 5", 0.01, 50), metavar="PERCENT",
-        help=f"by so much of itself a parameter is changed to either side (default: {100 * CHANGE:g} percent)",
-    )  # fmt: skip
-    switch(group, "--confirm", "run the single change predicted to help most")
+    change = read_part("a change in percent from 0.01 to 50, such as 5", 0.01, 50)
+    add_options(group, "sensitivity", change=change, usual=100 * CHANGE)
 
 
 def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str], norm: str) -> None:

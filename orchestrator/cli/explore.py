@@ -7,8 +7,8 @@ from warnings import catch_warnings, simplefilter
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.api.progress import shown_progress
 from orchestrator.api.scenario import UnusualDataWarning
-from orchestrator.asked import read_range, read_whole
-from orchestrator.cli.arguments import add_options, option
+from orchestrator.asked import read_whole
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.case_arguments import add_trust_argument, values_set
 from orchestrator.cli.terminal import saying_warnings
 from orchestrator.errors import InputError
@@ -21,15 +21,7 @@ from orchestrator.sweep.axes import parse_vary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "explore")
-    option(parser, "--range", "LO:HI", "frequencies shown first [Hz] (default: 0.1:2)", read=read_range,
-           default=ELECTROMECHANICAL_HZ)  # fmt: skip
-    add_options(parser, "explore 2")
-    option(
-        parser, "--port", "N", "of the server, on this machine alone (default: any that is free)",
-        read=read_whole(1, 65535, "a port"), default=0,
-    )  # fmt: skip
-    add_options(parser, "explore 3", parse_vary=parse_vary)
+    add_options(parser, "explore", port=read_whole(1, 65535, "a port"), parse_vary=parse_vary)
     add_trust_argument(parser)
 
 

@@ -3,16 +3,12 @@
 import argparse
 
 from orchestrator.api.comtrade import export_comtrade
-from orchestrator.asked import read_positive
-from orchestrator.cli.arguments import add_options, option
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import saying_warnings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "export_comtrade")
-    option(parser, "--form", "FORM",
-           "ASCII, BINARY, BINARY32 or FLOAT32 (BINARY32)", read=str.upper, default="BINARY32")  # fmt: skip
-    option(parser, "--frequency", "HZ", "rated frequency [Hz] (the run's)", read=read_positive)
+    add_options(parser, "export_comtrade", upper=str.upper)
 
 
 def run(options: argparse.Namespace) -> int:

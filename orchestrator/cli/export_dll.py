@@ -1,18 +1,15 @@
 """``gfor export dll``: a converter's control part as IEEE/CIGRE DLL for EMT programs."""
 
 import argparse
-from pathlib import Path
 
 from orchestrator.api.dll import export_dll
-from orchestrator.cli.arguments import add_options, option
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import said_stages
 from orchestrator.errors import InputError
 from orchestrator.units import read_value
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", metavar="NAME", help="converter, such as gfor")
-    option(parser, "--dest", "DIR", "folder (default: here)", read=Path, default=Path())
     add_options(parser, "export_dll")
 
 

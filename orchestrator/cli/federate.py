@@ -4,7 +4,7 @@ import argparse
 import os
 import sys
 
-from orchestrator.cli.arguments import add_options, option, seconds
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.case_arguments import add_case_arguments, prepare
 from orchestrator.errors import CosimError, InputError
 from orchestrator.federation.choice import TO_JOIN
@@ -14,9 +14,7 @@ from orchestrator.federation.layout import require_broker
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser)
-    add_options(parser, "federate")
-    option(parser, "--to-join", "T",
-           f"how long the broker is waited for [s] (default: {TO_JOIN:g})", read=seconds, default=TO_JOIN)  # fmt: skip
+    add_options(parser, "federate", TO_JOIN=TO_JOIN)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,7 +3,7 @@
 import argparse
 
 from orchestrator.asked import read_whole
-from orchestrator.cli.arguments import add_options, option
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import make_errors
 from orchestrator.errors import InputError
 from orchestrator.federation.choice import ENGINES, PATIENCE, TO_JOIN, Federates
@@ -11,16 +11,8 @@ from orchestrator.federation.choice import ENGINES, PATIENCE, TO_JOIN, Federates
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("federates over HELICS (extra `federation`)")
-    group.add_argument("--engine", choices=ENGINES, default="local",
-                       help="local: all components here; helics: some of them as federates")  # fmt: skip
-    option(group, "--federate", "NAME,NAME", "components that become federates on this machine (default: all but the "
-           "grid)", read=names, default=())  # fmt: skip
-    group.add_argument("--external", type=names, default=(), metavar="NAME,NAME",
-                       help="components whose federates others start: `gfor master federate` or a program")  # fmt: skip
-    add_options(group, "federates")
-    option(group, "--broker-port", "PORT",
-           "start the broker at this port of all network interfaces", read=read_whole(1, 65534, "a port"))  # fmt: skip
-    add_options(group, "federates 2", PATIENCE=PATIENCE, TO_JOIN=TO_JOIN)
+    add_options(group, "federates", engines=ENGINES, names=names, none=(), port=read_whole(1, 65534, "a port"),
+                PATIENCE=PATIENCE, TO_JOIN=TO_JOIN)  # fmt: skip
 
 
 def names(text: str) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from rich.markup import escape
 from orchestrator.api.nyquist import Asked
 from orchestrator.asked import read_part
 from orchestrator.black_box.frequency_response import Excitation
-from orchestrator.cli.arguments import add_json_argument, add_options, option, switch
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import make_console, print_json, print_parts, said_stages, say
 from orchestrator.errors import NOT_MET, InputError
 from orchestrator.immittance.view import GOAL, parts
@@ -20,15 +20,7 @@ _SIDES = ("device", "network")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "nyquist")
-    option(parser, "--compensation", "PERCENT", "series capacitors, as share of the network's reactance, such as "
-           "'32 %%'", read=read_part(_SHARE, 0, 99.99), default=0.0)  # fmt: skip
-    add_options(parser, "nyquist 2")
-    for name, text in (("per-unit", "is in pu, 100 MVA"), ("generator", "counts currents out of it")):
-        parser.add_argument(f"--{name}", action="append", default=[], choices=_SIDES, help=f"the side's file {text}")
-    add_options(parser, "nyquist 3")
-    add_json_argument(parser)
-    switch(parser, "--fail-unstable", "end with exit code 3 unless it is stable")
+    add_options(parser, "nyquist", share=read_part(_SHARE, 0, 99.99), sides=_SIDES)
 
 
 def run(options: argparse.Namespace) -> int:
