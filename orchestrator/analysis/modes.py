@@ -41,8 +41,24 @@ def damping_percent(eigenvalue: complex) -> float:
     return -100 * eigenvalue.real / abs(eigenvalue) if eigenvalue else 0.0
 
 
+class OfEigenvalue:
+    """What has an eigenvalue [rad/s]; mixed into records of modes."""
+
+    eigenvalue: complex
+
+    @property
+    def frequency_hz(self) -> float:
+        """Im λ/2π."""
+        return self.eigenvalue.imag / (2 * np.pi)
+
+    @property
+    def damping_percent(self) -> float:
+        """Damping ratio [%]."""
+        return damping_percent(self.eigenvalue)
+
+
 @dataclass(frozen=True, repr=False)
-class Mode:
+class Mode(OfEigenvalue):
     """One eigenvalue λ [rad/s] with its participation factors and its shape."""
 
     eigenvalue: complex
@@ -54,11 +70,6 @@ class Mode:
     def __repr__(self) -> str:
         led = ", ".join(f"{state} {factor:.2f}" for state, factor in self.participation[:2])
         return f"<Mode {self.frequency_hz:.3f} Hz, {self.damping_percent:.2f} %: {led}>"
-
-    @property
-    def frequency_hz(self) -> float:
-        """Im λ/2π."""
-        return self.eigenvalue.imag / (2 * np.pi)
 
     @property
     def damping_ratio(self) -> float:
