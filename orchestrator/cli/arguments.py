@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from orchestrator.asked import as_number, asked_of, read_percent, read_positive, read_range, read_whole
 from orchestrator.coupling.schedule import check_tolerance
@@ -42,6 +42,9 @@ def add_options(parser: argparse._ActionsContainer, part: str, **given: Any) -> 
 
     ``given``: readers and choices that the file names and that are not here, and what its help is filled in with."""
     for name, table in _listed()[part].items():
+        if name == "epilog":
+            cast("argparse.ArgumentParser", parser).epilog = str(table).format(**given)
+            continue
         how = {key: value for key, value in table.items() if key not in ("read", "several", "filled")}
         if table.get("filled"):
             how["help"] = how["help"].format(**given)

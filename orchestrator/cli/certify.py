@@ -14,12 +14,7 @@ from orchestrator.errors import INTERRUPTED, InputError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.epilog = (
-        "Exit codes: 0 the converter passes; 1 it fails; 2 an input cannot be used; 3 the test is incomplete, as with "
-        f"fewer than 13 reactances; 4 it passes, and an acceptance test of the FMU failed; {INTERRUPTED} interrupted. "
-        "Of several certificates, with --code all or several files, the first of 1, 2, 3, 4 that one of them has."
-    )
-    add_options(parser, "certify", codes=CODE_NAMES)
+    add_options(parser, "certify", codes=CODE_NAMES, INTERRUPTED=INTERRUPTED)
     add_options(parser.add_mutually_exclusive_group(), "certify checks")
     add_request_arguments(parser, CertifyRequest)
     add_executor_arguments(parser)

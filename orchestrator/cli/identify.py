@@ -12,10 +12,6 @@ from orchestrator.report.tables import eigenvalue_text, make_table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.epilog = (
-        "Amplitudes are those at the start; an oscillation's is half of its peak, as it is one of two conjugate "
-        "exponentials. '?' marks a mode in doubt, with the reasons below the table."
-    )
     add_options(parser, "identify")
     add_kept_argument(parser, "ringing")
 

@@ -18,10 +18,6 @@ _SHOWN = 5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.epilog = (
-        "A source drives alone, as only the units' own models tell; else a place that drives is named where the "
-        "methods that apply agree."
-    )
     add_options(parser, "source")
     add_json_argument(parser)
     add_kept_argument(parser, "source")

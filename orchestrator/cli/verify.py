@@ -22,12 +22,7 @@ from orchestrator.report.progress import progress_bar
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.epilog = (
-        f"Exit codes: {DOES_NOT_HOLD} the certificate does not hold; 2 it cannot be read. Where it holds, that of its "
-        "verdict as with gfor certify: 0 the converter passes; 1 it fails; 3 the test is incomplete; 4 it passes, and "
-        f"an acceptance test of the FMU failed; {INTERRUPTED} interrupted."
-    )
-    add_options(parser, "verify")
+    add_options(parser, "verify", INTERRUPTED=INTERRUPTED, DOES_NOT_HOLD=DOES_NOT_HOLD)
     add_options(parser.add_mutually_exclusive_group(), "verify which", reactances=read_reactances,
                 rows=lambda text: tuple(text.split(",")))  # fmt: skip
     add_executor_arguments(parser)

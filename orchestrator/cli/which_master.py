@@ -9,7 +9,7 @@ from rich.console import Console
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.compiler import TARGETS, host_platform
 from fmus.toolchain.extras import require
-from orchestrator.cli.arguments import add_options, option
+from orchestrator.cli.arguments import add_options
 from orchestrator.cli.terminal import make_console, print_json
 from orchestrator.errors import InputError
 from orchestrator.interop.probe_result import Candidate, read_probe_result
@@ -35,13 +35,7 @@ _WORDS: dict[str, tuple[str, dict[Any, str]]] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "which_master")
-    parser.add_argument("--platform", action="append", choices=sorted(TARGETS),
-                        help="with --build: compile for this one (repeatable; default: this machine's)")  # fmt: skip
-    option(parser, "--step", "H",
-           f"communication step that the tool had [s] ({STEP_SIZE:g})", read=float, default=STEP_SIZE)  # fmt: skip
-    option(parser, "--stop", "T", f"its duration [s] ({STOP_TIME:g})", read=float, default=STOP_TIME)
-    add_options(parser, "which_master 2")
+    add_options(parser, "which_master", platforms=sorted(TARGETS), STEP_SIZE=STEP_SIZE, STOP_TIME=STOP_TIME)
 
 
 def run(options: argparse.Namespace) -> int:
