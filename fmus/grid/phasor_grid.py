@@ -2,15 +2,14 @@
 
     (Y + Σ y)·v = Σ y·e          solved directly from the newest emfs whenever an output is read: there is no state
 
-Networks of up to `WRITTEN_OUT` buses are solved operation by operation, in code. In larger ones the matrix is data,
-which is factorised anew where a parameter or an admittance changes.
+The matrix is data, which the kernel factorises anew where a parameter or an admittance changes. Only a native FMU has
+the solution written out, operation by operation.
 
 Elements, parameters and outputs are those of `grid`. Constant-impedance loads, ratios and open lines behave as
 described there."""
 
 from functools import partial
 from math import pi
-from typing import Literal
 
 from fmus.grid import elements
 from fmus.grid.fault import declare_fault_outputs, fault_admittance
@@ -18,7 +17,6 @@ from fmus.grid.load_laws import FollowingLoad, declare_following_load, following
 from fmus.grid.network import Line, Network, Port
 from fmus.grid.nodal import Admittances, add_admittance, solve, solved_as_data
 from fmus.grid.three_winding import add_windings, declare_winding_powers, declare_windings
-from fmus.toolchain.catalogue import SKETCH
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -31,30 +29,10 @@ LEAST_CONDUCTANCE = 1e-12
 voltage is 0 and not 0/0."""
 
 
-WRITTEN_OUT = 1_000
-"""Buses up to which the solution is code. With 1,354 buses as data a step takes a seventh of the time."""
+def phasor_grid(network: Network, *, as_data: bool = True) -> Model:
+    """Build the model of a network; parameters are named after its elements, as in `grid`.
 
-
-_sketched: dict[Network, Model] = {}
-"""A large network whose model was asked for as a sketch, which costs as much, and which most often is built next."""
-
-
-def phasor_grid(network: Network) -> Model:
-    """Build the model of a network; parameters are named after its elements, as in `grid`."""
-    large = len(network.buses) > WRITTEN_OUT
-    return _sketched.pop(network, None) or _phasor_grid(network, "data" if large else "code")
-
-
-def _sketch(network: Network) -> Model:
-    if len(network.buses) <= WRITTEN_OUT:
-        return _phasor_grid(network, "none")
-    _sketched.clear()
-    return _sketched.setdefault(network, _phasor_grid(network, "data"))
-
-
-def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) -> Model:
-    """The model, solved by code or from data; or its variables with the voltages that a power flow gives, at which
-    nothing is solved."""
+    ``as_data``: whether the kernel solves for the voltages, or the solution is written out."""
     m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency", kind="network")
     following: list[FollowingLoad] = []
     omega_b: Expr | None = None
@@ -84,7 +62,7 @@ def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) ->
     transformers = [declare_windings(m, data) for data in network.transformers]
     for transformer in transformers:
         add_windings(Y, transformer)
-    _settle(m, network, buses, Y, solution)
+    _settle(m, network, buses, Y, as_data=as_data)
     for following_load in following:
         following_load_equations(m, following_load)
     drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
@@ -97,25 +75,17 @@ def _phasor_grid(network: Network, solution: Literal["code", "data", "none"]) ->
     return m.build()
 
 
-setattr(phasor_grid, SKETCH, _sketch)
-
-
 def _settle(
-    m: ModelBuilder,
-    network: Network,
-    buses: dict[str, elements.Bus],
-    Y: Admittances,
-    solution: Literal["code", "data", "none"],
+    m: ModelBuilder, network: Network, buses: dict[str, elements.Bus], Y: Admittances, *, as_data: bool
 ) -> None:
     """Give every bus its voltage."""
     currents = {name: bus.injected for name, bus in buses.items()}
-    voltages: dict[str, Phasor] = {}
-    if solution == "code":  # X_C may be set above X in the FMU, and the branch is an equivalent then
+    if as_data:
+        voltages = solved_as_data(m, Y, currents, partial(phasor_grid, network, as_data=False))
+    else:  # X_C may be set above X in the FMU, and the branch is an equivalent then
         voltages = solve(Y, currents, checked=any(line.is_equivalent or line.X_C for line in network.lines))
-    elif solution == "data":
-        voltages = solved_as_data(m, Y, currents, partial(_phasor_grid, network, "code"))
     for name, bus in buses.items():
-        bus.v = voltages.get(name, bus.v_0)
+        bus.v = voltages[name]
 
 
 def _declare_source(

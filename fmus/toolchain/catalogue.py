@@ -10,9 +10,6 @@ from fmus.toolchain.notes import noted
 
 GROUP = "gfor_cosim.models"
 
-SKETCH = "sketch"
-"""Attribute of a factory whose equations take long: another one that gives the same variables without them."""
-
 
 def model_names() -> tuple[str, ...]:
     return tuple(sorted(_entries()))
@@ -38,18 +35,7 @@ def entry_of(name: str) -> EntryPoint:
 
 
 def build_model(name: str, **arguments: Any) -> Model:
-    return _made(name, _factory(name), arguments)
-
-
-def sketch_model(name: str, **arguments: Any) -> Model:
-    """A model with the variables of one of the catalogue's, whose equations may be left out: `SKETCH` of its factory
-    makes it where that has one."""
-    factory = _factory(name)
-    return _made(name, getattr(factory, SKETCH, factory), arguments)
-
-
-def _made(name: str, factory: Any, arguments: dict[str, Any]) -> Model:
-    model = factory(**arguments)
+    model = _factory(name)(**arguments)
     if not isinstance(model, Model):
         raise TypeError(f"catalogue entry {name!r} returned {type(model).__name__}, not a Model")
     return model

@@ -2,11 +2,14 @@
 
 Variables are named by their FMI value reference."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from itertools import accumulate
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from fmus.toolchain.model import Model
 from fmus.toolchain.symbols import Function
@@ -36,8 +39,8 @@ class Structure:
 def structure(model: Model) -> Structure:
     """Dependence of outputs and derivatives on inputs and states, and of initial unknowns on parameters and inputs.
 
-    Where there would be more than `MOST` dependencies, or a network is solved as data, nothing is listed, which means
-    in both versions of FMI that there may be any."""
+    Where there would be more than `MOST` dependencies nothing is listed, which means in both versions of FMI that there
+    may be any."""
     sizes = (len(group) for group in (model.parameters, model.calculated, model.inputs, model.states))
     first_calculated, first_input, first_state, first_output = accumulate(sizes)
     p, c, u, x = (partial(_mark, first) for first in (0, first_calculated, first_input, first_state))
@@ -47,18 +50,35 @@ def structure(model: Model) -> Structure:
     def of(function: Function, first: int) -> tuple[tuple[Unknown, ...], tuple[Unknown, ...]]:
         """Dependence of a function's rows while it runs, and at the start."""
         running = start = _all_unknown(first, len(function.outputs[0]))
-        if model.nodal is None:
-            (by,) = function.dependence(x, u, p, c)
-            if _count(by, inputs) <= MOST:
-                running = _unknowns(first, [known & (inputs | states) for known in by])
-                if _count(by, (1 << first_calculated) - 1) <= MOST:
-                    start = _unknowns(first, function.dependence(x_p.__getitem__, u, p, c_p.__getitem__)[0])
+        if model.nodal and len(model.inputs) * len(model.outputs) > MOST:
+            return running, start
+        (by,) = function.dependence(x, u, p, c, *_voltages(model, x, u, p, c))
+        if _count(by, inputs) <= MOST:
+            running = _unknowns(first, [known & (inputs | states) for known in by])
+            if _count(by, (1 << first_calculated) - 1) <= MOST:
+                at_start = x_p.__getitem__, u, p, c_p.__getitem__
+                start = _unknowns(first, function.dependence(*at_start, *_voltages(model, *at_start))[0])
         return running, start
 
     outputs, first_outputs = of(model.outputs_function, first_output)
     derivatives, first_derivatives = of(model.derivatives, first_output + len(model.outputs))
     initial = (*_unknowns(first_calculated, c_p), *_unknowns(first_state, x_p), *first_outputs, *first_derivatives)
     return Structure(outputs, derivatives, initial)
+
+
+def _voltages(model: Model, *marks: Callable[[int], int]) -> list[Callable[[int], int]]:
+    """What each voltage of a network that is solved as data depends on: all elements and currents of its island."""
+    if (nodal := model.nodal) is None:
+        return []
+    (matrix,), (currents,) = nodal.values.dependence(*marks[1:]), nodal.currents.dependence(*marks)
+    n, entries = len(nodal.plan.order), nodal.plan.entries
+    _, island = connected_components(coo_array((np.ones(len(entries)), np.array(entries).T), shape=(n, n)), False)
+    found = [0] * n
+    for bus, mark in enumerate(currents):
+        found[island[bus % n]] |= mark
+    for k, mark in enumerate(matrix):
+        found[island[entries[k % len(entries)][0]]] |= mark
+    return [lambda element: found[island[element % n]]]
 
 
 def unlisted(model: Model) -> Structure:

@@ -141,6 +141,8 @@ class Kernel:
         return z[: self._x] + x + self._blank + [gh] + t.values + self._fixed
 
     def _at_states(self, which, z, x):
+        if which == DERIVATIVES and not x:
+            return []
         slots = self._slots(z, x)
         if self._tape.buses:
             slots[self._y : self._y + 2 * self._tape.buses] = self._voltages(slots)

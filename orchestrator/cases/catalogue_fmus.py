@@ -6,12 +6,15 @@ from functools import cache, partial
 from typing import Any
 
 from fmus.grid.network import Network
-from fmus.toolchain.catalogue import build_model, entry_of, sketch_model
+from fmus.toolchain.catalogue import build_model, entry_of
 from fmus.toolchain.extras import require
 from fmus.toolchain.notes import known, noted
 from orchestrator.fmi.description import FmuDescription, parse_description, read_description
 
 _TO_COME = "not-built"  # identity of an FMU that is not there
+_FEW = 8
+_described: dict[str, Any] = {}
+"""The newest models whose description was asked for, by what was asked; most of them are built next."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +49,13 @@ def plan_fmu(
 
 
 def _sketch(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> tuple[str, str]:
-    """Name of an FMU that is not there, and its description as far as it is known without equations."""
+    """Name of an FMU that is not there, and its description without dependencies, which take long."""
     from fmus.toolchain.description import model_description  # noqa: PLC0415 - imports what writes equations
 
-    sketch = sketch_model(model, **_arguments(network, parts))
+    sketch = build_model(model, **_arguments(network, parts))
+    while len(_described) >= _FEW:
+        _described.pop(next(iter(_described)))
+    _described[_asked(model, network, native, parts)] = sketch
     return sketch.name, model_description(sketch, _TO_COME, sketch.name, "", native=native, listed=False).decode()
 
 
@@ -66,7 +72,8 @@ def _recipe(planned: PlannedFmu) -> Any:
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
-    made = build_model(planned.model, **_arguments(planned.network, planned.parts))
+    made = _described.pop(_asked(planned.model, planned.network, planned.native, planned.parts), None)
+    made = made or build_model(planned.model, **_arguments(planned.network, planned.parts))
     return (NativeFmu if planned.native else PythonFmu)(made)
 
 

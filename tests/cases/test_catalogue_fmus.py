@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from fmus.grid import phasor_grid
 from fmus.grid.network import Line, Load, Network, Port, Shunt, Zip
 from fmus.grid.two_area import TWO_AREA
 from fmus.toolchain import notes
@@ -77,7 +76,7 @@ def test_no_model_is_built_to_find_its_kept_fmu(monkeypatch):
 def test_each_argument_names_a_note_of_its_own(tmp_path, monkeypatch):
     """A line's reactance counts to its last bit."""
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(catalogue_fmus, "sketch_model", lambda *asked, **_: pytest.fail(repr(asked)))
+    monkeypatch.setattr(catalogue_fmus, "build_model", lambda *asked, **_: pytest.fail(repr(asked)))
     asked = []
     monkeypatch.setattr(catalogue_fmus, "known", lambda *one: asked.append(one))
     for arguments in WANTED:
@@ -105,6 +104,7 @@ def test_a_plan_says_of_the_variables_what_the_fmu_says(model, network, tmp_path
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
     planned = plan_fmu(model, network)
     assert not planned.is_there
+    monkeypatch.setattr(catalogue_fmus, "build_model", lambda *_, **__: pytest.fail("it is built twice"))
     built = build_fmu(planned)
     assert planned.description.variables == built.variables
     assert planned.description.states == built.states
@@ -113,11 +113,9 @@ def test_a_plan_says_of_the_variables_what_the_fmu_says(model, network, tmp_path
     assert planned.description.guid != built.guid
 
 
-def test_a_power_flow_that_fails_builds_no_model(tmp_path, monkeypatch):
-    """Not even the equations of its grid are written, though nothing of it was built before."""
+def test_a_power_flow_that_fails_builds_no_fmu(tmp_path, monkeypatch):
     monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(catalogue_fmus, "build_model", lambda *_, **__: pytest.fail("a model is built"))
-    monkeypatch.setattr(phasor_grid, "solve", lambda *_: pytest.fail("the grid is solved with symbols"))
+    monkeypatch.setattr(catalogue_fmus, "_recipe", lambda *_: pytest.fail("an FMU is built"))
     path = tmp_path / "case.toml"
     path.write_text(TOO_MUCH, encoding="utf-8")
     with pytest.raises(CaseError, match="power flow: no solution"):

@@ -11,7 +11,7 @@ from fmus.converter_parts.usual import FOLLOWING
 from fmus.regfm_a1.model import USUAL
 from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.dyr_fields import DYR_RECORDS
-from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, sketch_model
+from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 from fmus.toolchain.description import model_description
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import RATED
@@ -120,13 +120,13 @@ RECORDED_PARTS = [
 
 @pytest.mark.parametrize("parts", RECORDED_PARTS, ids=lambda parts: "-".join(parts.values()))
 def test_the_defaults_of_every_part_that_a_record_can_be_are_plausible(parts):
-    for v in sketch_model("synchronous_generator_phasor", **parts).parameters:
+    for v in build_model("synchronous_generator_phasor", **parts).parameters:
         assert v.usual is None or v.usual.fits(v.start), v.name
 
 
 def test_every_range_and_rule_is_of_a_variable_that_some_model_has():
     known = {v.name for name in model_names() if not needs_arguments(name) for v in build_model(name).parameters}
-    recorded = [sketch_model("synchronous_generator_phasor", **parts) for parts in RECORDED_PARTS]
+    recorded = [build_model("synchronous_generator_phasor", **parts) for parts in RECORDED_PARTS]
     known |= {v.name for model in recorded for v in model.parameters}
     ranged = {*FOLLOWING, *FORMING, *MACHINE, *USUAL, *(v.name for v in RATED)}
     assert {*ranged, *(r.larger for r in RULES), *(r.smaller for r in RULES)} <= known

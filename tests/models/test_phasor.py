@@ -12,6 +12,7 @@ from orchestrator.errors import ComponentError
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent
 from tests.support.jacobians import jacobians
+from tests.support.kernels import taped, vector
 
 GENERATORS = [f"synchronous_generator_{exciter}" for exciter in ("ac4a", "st1", "st4b")]
 DEVICES = ["gfor", "gfl", *GENERATORS]
@@ -237,18 +238,15 @@ def admittances(scale, ca_closed=True):
 @pytest.mark.parametrize("closed", [True, False])
 def test_the_network_solves_its_nodal_equations(closed):
     model = phasor_grid(NETWORK)
-    values = VALUES | {"ca.connected": float(closed)}
-    p = np.array([values.get(v.name, v.start) for v in model.parameters])
-    c, x = model.initialise(p)
     assert len(model.states) == 0
     given = {}
     for name, pair in SOURCES.items():
         for letter, value in zip("ey", pair, strict=True):
             given |= {f"{name}.{letter}_re": value.real, f"{name}.{letter}_im": value.imag}
-    u = [given[i.name] for i in model.inputs]
-    y = dict(
-        zip((o.name for o in model.outputs), np.array(model.outputs_function(x, u, p, c)).ravel(), strict=True)
-    )  # fmt: skip
+    z, kernel = vector(model, **VALUES, **{"ca.connected": float(closed)}, **given), taped(model)
+    kernel.initialise(z)
+    kernel.outputs(z)
+    y = dict(zip(model.value_references, z, strict=True))
     found = np.array([complex(y[f"{bus}.v_re"], y[f"{bus}.v_im"]) for bus in "abcd"])
     Y, current = admittances(1.2, closed)
     assert found == pytest.approx(np.linalg.solve(Y, current), rel=1e-12)

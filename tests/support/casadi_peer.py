@@ -69,6 +69,8 @@ def made():
     """All models of the catalogue that need no data, and a network, by name."""
     from fmus.grid.grid import grid
     from fmus.grid.network import Line, Load, Network, Port, Zip
+    from fmus.grid.phasor_grid import phasor_grid
+    from fmus.grid.two_area import TWO_AREA_PHASOR
     from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
 
     lines = (
@@ -77,8 +79,9 @@ def made():
     )
     loads = (Load("power", "c", 50.0, 10.0, active=Zip(p=0.5, i=0.5), k_pf=1.0), Load("plain", "b", 20.0, 5.0))
     network = Network("chain", ("a", "b", "c"), lines, loads, (Port("unit", "a"),), faults=("b",))
-    models = {name: build_model(name) for name in model_names() if not needs_arguments(name)}
-    return models | {NETWORK: grid(network)}
+    written_out = {NETWORK: grid(network), "two_area_phasor_grid": phasor_grid(TWO_AREA_PHASOR, as_data=False)}
+    names = {name for name in model_names() if not needs_arguments(name)} - {*written_out}
+    return {name: build_model(name) for name in sorted(names)} | written_out
 
 
 def functions(model):

@@ -10,7 +10,6 @@ from fmus.grid.network import Line, Load, Network, Port, Zip
 from fmus.toolchain.dependencies import structure
 from fmus.toolchain.elimination_plan import plan_pattern
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.native_fmu import NativeFmu
 from tests.support.kernels import compiled, in_python, taped, vector
 
 BUSES = 12
@@ -37,7 +36,8 @@ def meshed() -> Network:
 @pytest.fixture(scope="module")
 def models():
     """The same network, solved by code and from data."""
-    return {how: phasor_grid._phasor_grid(meshed(), how) for how in ("code", "data")}
+    data = phasor_grid.phasor_grid(meshed())
+    return {"code": data.written_out, "data": data}
 
 
 @pytest.fixture(scope="module")
@@ -100,14 +100,17 @@ def test_the_factors_of_one_instance_do_not_serve_another(models, kernels):
     assert [voltage(z) for z in (first, second, first, second)] == [*alone, *alone]
 
 
-def test_large_networks_are_data_and_small_ones_code(monkeypatch):
-    network = meshed()
-    assert phasor_grid.phasor_grid(network).nodal is None
-    monkeypatch.setattr(phasor_grid, "WRITTEN_OUT", BUSES - 1)
-    model = phasor_grid.phasor_grid(network)
-    assert model.nodal is not None
-    assert {u.known for u in structure(model).outputs} == {None}  # any output may depend on anything
-    assert NativeFmu(model).model.nodal is None  # with exact derivatives, in code
+def test_both_have_one_description(models):
+    """With all that each output depends on, of which an island reaches no other."""
+    assert models["code"].nodal is None is not models["data"].nodal
+    assert structure(models["data"]) == structure(models["code"])
+    lines = Line("ab", "a", "b", X=0.1), Line("cd", "c", "d", X=0.1)
+    islands = Network("two", tuple("abcd"), lines, (), (Port("g", "a"), Port("h", "d")), phasors=True)
+    model = phasor_grid.phasor_grid(islands)
+    reached = {u.reference: u.known for u in structure(model).outputs}
+    at = model.value_references
+    assert {at["g.e_re"], at["h.e_re"]} & {*reached[at["b.v_re"]]} == {at["g.e_re"]}
+    assert structure(model) == structure(model.written_out)
 
 
 def test_a_matrix_that_is_singular_gives_no_finite_voltage(models, kernels):

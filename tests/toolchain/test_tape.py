@@ -36,7 +36,7 @@ def bits(values):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_tape_has_the_bits_of_compiled_code(name):
     """At random parameters, inputs and states, through steps, with parameters that change between them."""
-    model = build_model(name)
+    model = build_model(name).written_out
     by_code, by_tape, random = compiled(model), taped(model), np.random.default_rng(3)
     first, nu, nx = len(model.parameters) + len(model.calculated), len(model.inputs), len(model.states)
     step = model.parameters[0].start

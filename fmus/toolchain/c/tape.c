@@ -101,6 +101,7 @@ static void enter(const double *z, double *w) {
 
 /* A function of states, at the voltages that these give. */
 static void at_states(double *w, int which, const double *x, double *value) {
+    if (!OF(w)->size.section[which].results) return; /* most phasor networks have no states */
     memcpy(SLOT + X, x, NX * sizeof *x);
     if (NB) solve_nodes(w);
     evaluate(w, which, value);

@@ -29,7 +29,7 @@ def _after(source, model):
 
 @pytest.mark.parametrize("name", ["synchronous_generator_ac4a", "two_area_phasor_grid", "gfor"])
 def test_parts_compute_the_same_to_the_last_bit(name, monkeypatch):
-    model = build_model(name)
+    model = build_model(name).written_out
     source = kernel.c_source(model)
     assert "noinline" not in source
     monkeypatch.setattr(kernel, "LONGEST", 20)
