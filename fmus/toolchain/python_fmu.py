@@ -24,6 +24,8 @@ _SLAVE, _WRAPPER, _TAPE_KERNEL = (
     Path(__file__).with_name(name) for name in ("slave.py", "wrapper.py", "tape_kernel.py")
 )
 
+_IN_C = Path(__file__).with_name("c") / "slave.c"
+
 _EXECUTED = """import ctypes
 from {} import Slave
 ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
@@ -42,7 +44,8 @@ class PythonFmu:
     def __init__(self, model: Model) -> None:
         self.model = model
         self._tape = tape_of(model)
-        self._c = c_source(model) if model.compiled and installed_version("ziglang") else ""
+        compiled = model.compiled and installed_version("ziglang")
+        self._c = c_source(model) + _IN_C.read_text(encoding="utf-8") if compiled else ""
         code = self._c or joined_source(LIBRARY)
         self._python = _TAPE_KERNEL.read_text(encoding="utf-8")
         self._slave = _SLAVE.read_text(encoding="utf-8")

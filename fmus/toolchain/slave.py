@@ -35,12 +35,21 @@ POINTER = ctypes.c_void_p
 DAMAGED = "resources/tape.bin is damaged ({}); build or copy the FMU again"
 
 
-def rising(references):
-    """Value references, of which there is one at least, if they rise by one each, as those of all states do."""
-    if references[-1] - references[0] != len(references) - 1:
-        return None
-    row = list(range(references[0], references[-1] + 1))
-    return row if references == row else None
+PYTHON = ("PyLong_AsVoidPtr", "PyList_Size", "PyList_GetItem", "PyList_New", "PyList_SetItem", "PyLong_AsLong",
+          "PyFloat_AsDouble", "PyFloat_FromDouble", "PyBool_FromLong", "PyErr_Occurred", "PyErr_Clear",
+          "PyObject_CallMethod", "Py_IncRef")  # fmt: skip
+"""Functions of Python that ``c/slave.c`` calls, in its order."""
+
+
+class Now(ctypes.Structure):
+    """What a step goes by; the functions in C read and write it, too."""
+
+    _fields_ = [
+        ("size", ctypes.c_double),  # that the next step may have without a further look, or none
+        ("part", ctypes.c_double),
+        *((name, ctypes.c_int32) for name in ("parts", "stale", "first_input", "first_state", "first_derivative")),
+        *((name, POINTER) for name in ("variables", "workspace", "advance", "slave")),
+    ]
 
 
 class Slave(Fmi2Slave):
@@ -78,10 +87,9 @@ class Slave(Fmi2Slave):
         self._internal_step = model["internal_step"]
         self._phase = INSTANTIATED
         self._failure = None
-        self._outputs_stale = True
         self._parameters_changed = True
-        self._step_size = self._of = None  # the size that the next step may have without a further look
-        self._read = self._written = None  # value references that were seen to follow each other, of _row and _entry
+        firsts = self._first_input, self._first_state, self._first_derivative
+        self._now, self._of = Now(math.nan, math.nan, 0, True, *firsts), None
         self._load_kernel(resources, model["kernel_module"])
 
     def _load_kernel(self, resources, python_kernel):
@@ -123,6 +131,19 @@ class Slave(Fmi2Slave):
         kernel.begin(tape, ctypes.addressof(workspace))
         self._use(kernel, workspace, ctypes.addressof(workspace))
 
+    def _quicken(self, functions, *addresses):
+        """Lay functions in C before the three methods that a master calls in every step."""
+        self._now.variables, self._now.workspace, self._now.advance = addresses
+        self._now.slave = id(self)
+        addresses = [ctypes.cast(getattr(ctypes.pythonapi, name), POINTER).value for name in PYTHON]
+        functions.restype = POINTER
+        first = functions((POINTER * (len(PYTHON) + 1))(*addresses, id(None)))
+        make = ctypes.PYFUNCTYPE(ctypes.py_object, POINTER, ctypes.py_object, POINTER)
+        made = make(("PyCFunction_NewEx", ctypes.pythonapi))
+        for place, name in enumerate(("do_step", "get_real", "set_real")):
+            own = made(first + place * 4 * ctypes.sizeof(POINTER), ctypes.addressof(self._now), None)
+            setattr(self, name, own)
+
     def _use(self, kernel, workspace, *further):
         """``further``: arguments of its functions behind the variables."""
         # The cheapest call is one of objects without a prototype, then one of addresses as integers.
@@ -134,6 +155,8 @@ class Slave(Fmi2Slave):
             function.argtypes, function.restype = [POINTER] * len(self._arguments), None
         kernel.requirements.argtypes = [POINTER] * (len(self._arguments) + 1)
         self._margins_address = ctypes.addressof(self._margins)
+        if sys.implementation.name == "cpython" and sys.version_info >= (3, 7):
+            self._quicken(kernel.python_functions, z, own, ctypes.cast(advance, POINTER))
 
     @classmethod
     def _read_tape(cls, resources):
@@ -147,7 +170,7 @@ class Slave(Fmi2Slave):
 
     def _fail(self, text):
         """Report a problem after which no step may succeed."""
-        self._failure, self._step_size = self._failure or text, None
+        self._failure, self._now.size = self._failure or text, math.nan
         self._report(text)
 
     def _discard(self, text, reported=False):
@@ -166,7 +189,7 @@ class Slave(Fmi2Slave):
             self._fail("parameters cannot be used: " + "; ".join(broken))
 
     def enter_initialization_mode(self):
-        self._phase, self._step_size = INITIALISING, None
+        self._phase, self._now.size = INITIALISING, math.nan
 
     def exit_initialization_mode(self):
         try:
@@ -182,16 +205,18 @@ class Slave(Fmi2Slave):
 
     def do_step(self, current_time, step_size):
         try:
-            if step_size != self._step_size and not self._begin(step_size):
+            if step_size != self._now.size and not self._begin(step_size):
                 return False
             status = self._again()
-            self._outputs_stale = False
-            if not status:
-                return True
-            self._failure = self._describe_divergence(status - 1, current_time)
+            self._now.stale = False
+            return not status or self._stop(status, current_time)
         except Exception as error:
-            self._failure = f"step from {current_time} s failed: {error!r}"
-        self._step_size = None
+            self._failure, self._now.size = f"step from {current_time} s failed: {error!r}", math.nan
+        return self._discard(self._failure)
+
+    def _stop(self, status, time):
+        """Discard a step that left a state without a finite value, with all that may follow."""
+        self._failure, self._now.size = self._describe_divergence(status - 1, time), math.nan
         return self._discard(self._failure)
 
     def _begin(self, step_size):
@@ -213,11 +238,11 @@ class Slave(Fmi2Slave):
         parts = max(1, math.ceil(step_size / self._z[self._internal_step] - 1e-9))
         if self._of != (step_size, parts):
             self._of, self._again = (step_size, parts), self._advance(step_size / parts, parts)
-        self._step_size = step_size
+        self._now.size, self._now.part, self._now.parts = step_size, step_size / parts, parts
         return True
 
     def terminate(self):
-        self._phase, self._step_size = TERMINATED, None
+        self._phase, self._now.size = TERMINATED, math.nan
 
     def _describe_divergence(self, state, time):
         inputs = range(self._first_input, self._first_state)
@@ -233,17 +258,12 @@ class Slave(Fmi2Slave):
             self._check_requirements()  # before partners see what follows from values that cannot be used
             self._parameters_changed = False
         self._kernel.outputs(*self._arguments)
-        self._outputs_stale = False
+        self._now.stale = False
 
     def get_real(self, vrs):
         try:
-            if self._outputs_stale:
+            if self._now.stale:
                 self._refresh()
-            if vrs == self._read:
-                return self._z[self._row]
-            if vrs and vrs[0] >= 0 and vrs[-1] < self._first_derivative and (row := rising(vrs)):
-                self._read, self._row = row, slice(vrs[0], vrs[-1] + 1)
-                return self._z[self._row]
             if vrs and max(vrs) >= self._first_derivative:
                 self._kernel.derivatives(*self._arguments)
             if vrs and min(vrs) < 0:  # references above 2**31 arrive so, and Python would count from the end
@@ -256,21 +276,16 @@ class Slave(Fmi2Slave):
 
     def set_real(self, vrs, values):
         try:
-            z, first, end = self._z, self._first_input, self._first_state
-            if vrs == self._written:
-                z[self._entry] = values
-            elif vrs and first <= vrs[0] and vrs[-1] < end and (row := rising(vrs)):
-                self._written, self._entry = row, slice(vrs[0], vrs[-1] + 1)
-                z[self._entry] = values
-            else:
-                for reference, value in zip(vrs, values):
-                    if first <= reference < end:
-                        z[reference] = value
-                    else:
-                        self._set_guarded(reference, value, "Real")
-            self._outputs_stale = True
+            for reference, value in zip(vrs, values):
+                if self._first_input <= reference < self._first_state:
+                    self._z[reference] = value
+                else:
+                    self._set_guarded(reference, value, "Real")
+            self._now.stale = True
         except Exception as error:
             self._fail(f"setting value references {list(vrs)} failed: {error!r}")
+
+    _step, _get_real, _set_real = do_step, get_real, set_real  # for what the functions in C leave to them
 
     def get_integer(self, vrs):
         return self._get_discrete(vrs, "Integer", int)
@@ -297,7 +312,7 @@ class Slave(Fmi2Slave):
         try:
             for reference, value in zip(vrs, values):
                 self._set_guarded(reference, float(value), kind)
-            self._outputs_stale = True
+            self._now.stale = True
         except Exception as error:
             self._fail(f"setting value references {list(vrs)} failed: {error!r}")
 
@@ -337,11 +352,11 @@ class Slave(Fmi2Slave):
         else:
             self._z[reference] = value
             self._parameters_changed = True
-            self._step_size = None  # internal_step may be what changed
+            self._now.size = math.nan  # internal_step may be what changed
 
     def _get_fmu_state(self):
         """Everything that this instance is, as bytes: identity, phase, variables."""
-        if self._outputs_stale and self._phase < STEPPING:
+        if self._now.stale and self._phase < STEPPING:
             self.get_real([])
         check_again = self._parameters_changed or self._failure is not None
         return self._identity + bytes((self._phase, check_again)) + bytes(self._z)
@@ -352,7 +367,7 @@ class Slave(Fmi2Slave):
             return
         self._phase, self._parameters_changed = state[16], bool(state[17])
         ctypes.memmove(self._z, state[18:], ctypes.sizeof(self._z))
-        self._outputs_stale, self._step_size, self._failure = True, None, None
+        self._now.stale, self._now.size, self._failure = True, math.nan, None
 
     @staticmethod
     def _fmu_state_to_bytes(state):

@@ -2,6 +2,7 @@
 
 import functools
 import importlib
+import inspect
 import json
 import math
 import os
@@ -441,8 +442,10 @@ def test_a_step_of_more_parts_than_a_c_int_holds_is_refused(slave_class):
 
 
 def test_what_a_slave_remembers_of_earlier_calls_changes_nothing(slave_class):
-    def told(forgetful):
+    def told(forgetful, in_c=True):
         slave, found = slave_class(), []
+        for name in () if in_c else ("do_step", "get_real", "set_real"):
+            delattr(slave, name)  # the function in C, before the method
         new = slave._get_fmu_state()
         slave.enter_initialization_mode()
         slave.exit_initialization_mode()
@@ -451,7 +454,7 @@ def test_what_a_slave_remembers_of_earlier_calls_changes_nothing(slave_class):
 
         def done(call, *arguments):
             if forgetful:
-                slave._read = slave._written = slave._step_size = slave._of = None
+                slave._now.size, slave._of = math.nan, None
             found.append((call, getattr(slave, call)(*arguments), bytes(slave._z)))
 
         def steps():
@@ -481,3 +484,18 @@ def test_what_a_slave_remembers_of_earlier_calls_changes_nothing(slave_class):
     runs = [what for call, what, _ in forgetful if call == "do_step"]
     assert runs[::3] == [True, True, False, True, False, True, False, True, False]
     assert told(forgetful=False) == forgetful
+    assert told(forgetful=False, in_c=False) == forgetful
+
+
+def test_functions_in_c_refuse_as_methods_what_is_no_call(slave_class):
+    slave = slave_class()
+    assert not inspect.ismethod(slave.do_step)
+    for call, *wrong in (("do_step", 0.0), ("get_real",), ("set_real", [0])):
+        with pytest.raises(TypeError):
+            getattr(slave, call)(*wrong)
+    first = slave._first_input
+    slave.set_real((first, first + 1), (0.5, 0.25))
+    assert slave.get_real((first, first + 1)) == [0.5, 0.25]
+    slave.set_real([first, first + 1], [0.75, None])
+    assert slave.get_real([first, first + 1]) == [0.75, 0.25]
+    assert "must be real number" in slave._failure

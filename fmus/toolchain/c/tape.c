@@ -275,3 +275,5 @@ EXPORT int advance(double *z, double h, int n, double *w) {
     enter(z, w);
     return OF(w)->size.implicit ? advance_implicitly(z, h, n, w) : advance_explicitly(z, h, n, w);
 }
+
+#include "slave.c"
