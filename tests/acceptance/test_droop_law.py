@@ -58,3 +58,13 @@ def test_only_an_answer_that_has_settled_has_a_sign(moving, said):
     )
     found = signs._wrong(law.POINT, falls, rises)
     assert (found[0] if found else "") == said
+
+
+@pytest.mark.parametrize(
+    ("P", "falls", "said"), [(0.6, 2e-3, ""), (0.6, 4e-3, "wrong sign"), (0.0, 2e-3, "wrong sign")]
+)
+def test_a_constant_torque_gives_less_power_at_less_frequency(P, falls, said):
+    rest = (Way(0j, 0.0, 0.05, None, 0.0, (0.0, 0.0, 0)),) * 2
+    answers = [DroopAnswer(power, power, power, 0.0, 0.05, rest) for power in (0.05j, -falls)]
+    found = signs._wrong(law.OperatingAt(1.0, 0.0, P, 0.1), *answers)
+    assert (found[0] if found else "") == said

@@ -266,7 +266,7 @@ def _wrong(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.Dr
     least = _least(point)
     if steady[0] and voltage.power.imag < -least:
         return "wrong sign", "its reactive power falls with the voltage, and should rise"
-    if steady[1] and frequency.power.real < -_SOME:
+    if steady[1] and frequency.power.real < -_SOME - 3 * droops.FREQUENCY * abs(point.P):  # a constant torque's
         return "wrong sign", "its active power falls with the frequency, and should rise"
     for sign, word, by_voltage, by_frequency in zip(_SIGNS, _WORDS, voltage.ways, frequency.ways, strict=True):
         if _rests(by_voltage) and sign * by_voltage.power.imag < -least - _EACH:
