@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
+from orchestrator.immittance import judgement, study
 from orchestrator.immittance import loop as looping
-from orchestrator.immittance import study
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.poles import unstable_poles
@@ -225,3 +225,7 @@ def test_capacitors_compensate_the_reactance_at_one_port():
         loop.network.at = lambda s, other=other: other
         with pytest.raises(InputError, match="net has no inductive reactance at one port"):
             study._capacitors(loop, request)
+
+
+def test_a_device_that_is_a_model_has_its_frame():
+    assert judgement._frames(SimpleNamespace(device=object()), None, 0) == []
