@@ -222,7 +222,7 @@ class _Runner:
             self._deadline = monotonic() + _PATIENCE * crowded() * self._limits.seconds
             result = self._answer(CHECKS[name])
             if cause := likely_cause(self._subject.description, result.fault):
-                result = replace(result, evidence=f"{result.evidence}; {cause}")
+                result = replace(result, evidence=f"{result.evidence}; {cause}", whose=base.Whose.BINDING)
             results.append(self._with_whom(result))
             self._asked.append(name)
             if name == "runs" and (because := self._too_bad(result)):

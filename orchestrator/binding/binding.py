@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from math import cos, radians, sin
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,9 @@ def bound_fmu(fmu: Path | str, binding: Path | str | None = None) -> FmuDescript
 
 def bind(fmu: FmuDescription, binding: Path | str) -> BoundDescription:
     path = Path(binding)
-    return BoundDescription.of(fmu, _Reader(fmu, read_table(path), str(path)).port_map())
+    table = read_table(path)
+    described = BoundDescription.of(fmu, _Reader(fmu, table, str(path)).port_map())
+    return replace(described, kind=table.fmu.kind or described.kind)
 
 
 def read_table(path: Path) -> BindingTable:

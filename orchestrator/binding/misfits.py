@@ -21,8 +21,7 @@ NO_LIMIT = 3.3
 """Current [pu, S_n] over the last cycle of a disturbance that no converter with a current limit gives.
 
 Semiconductors carry 1.0 to 1.5 times the rated current, 2 where they are overrated; ours, with limits of 1.1 in either
-axis, gives up to 1.7 at the grid's side of its filter, and a machine at a stiff bus up to 3.1. More must be declared
-(`I_max` of the binding).
+axis, gives up to 1.7 at the grid's side of its filter. More must be declared (`I_max` of the binding), but of machines.
 """
 
 FREQUENCY_APART = 0.02  # deviation of omega at rest from 1 above which a device is made for another frequency

@@ -30,6 +30,7 @@ class DraftedTable(Table):
 class FileTable(DraftedTable):
     file: str | None = None
     guid: str | None = None
+    kind: Literal["converter", "machine"] | None = None
 
 
 class RatingTable(DraftedTable):

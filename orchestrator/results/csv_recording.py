@@ -25,6 +25,7 @@ _TIMES = ("time", "t", "timestamp", "datetime", "utc", "soc", "epoch", "zeit", "
 _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
 _TIME = re.compile(rf"\s*([-+]?\d*[.,]?\d+([eE][-+]?\d+)?|{_DATE.pattern})\s*")
+_SAMPLED = 0.11  # times farther apart [s] are slower than phasors are sent: perhaps ms
 _EPOCH = 1e8  # numbers of seconds above it count from 1970, and are taken from the first sample on
 
 
@@ -48,7 +49,7 @@ def read_table(path: Path) -> xr.Dataset:
             f"{path}: the time of its {len(times)} rows does not rise from each row to the next; sort them"
         )
     apart = float(np.median(np.diff(times)))
-    if stamps is None and not unit and (apart > 1 or kind == "i"):
+    if stamps is None and not unit and (apart > _SAMPLED or kind == "i"):
         raise InputError(
             f"{path}: its times are {apart:g} apart, perhaps in ms, and {first!r} says no unit; "
             f"write '{first} [s]' or '{first} [ms]'"

@@ -58,3 +58,24 @@ def test_only_an_answer_that_has_settled_has_a_sign(moving, said):
     )
     found = signs._wrong(law.POINT, falls, rises)
     assert (found[0] if found else "") == said
+
+
+@pytest.mark.parametrize(
+    ("P", "falls", "said"), [(0.6, 2e-3, ""), (0.6, 4e-3, "wrong sign"), (0.0, 2e-3, "wrong sign")]
+)
+def test_a_constant_torque_gives_less_power_at_less_frequency(P, falls, said):
+    rest = (Way(0j, 0.0, 0.05, None, 0.0, (0.0, 0.0, 0)),) * 2
+    answers = [DroopAnswer(power, power, power, 0.0, 0.05, rest) for power in (0.05j, -falls)]
+    found = signs._wrong(law.OperatingAt(1.0, 0.0, P, 0.1), *answers)
+    assert (found[0] if found else "") == said
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [(1.0, ""), (1.2, "wrong rated frequency"), (50 / 60, "wrong rated frequency"), (1.4, "wrong frequency"),
+     (0.0, "wrong frequency"), (-1.0, "wrong frequency")],
+)  # fmt: skip
+def test_an_omega_of_another_rated_frequency_is_told_as_such(part, said):
+    ways = tuple(Way(0j, 0.0, 0.05, 1 - sign * part * FREQUENCY, 0.0, (0.0, 0.0, 0)) for sign in (1, -1))
+    found = signs._wrong_omega(DroopAnswer(0.05, 0.05, 0.05, 0.0, 0.05, ways))
+    assert (found[0] if found else "") == said

@@ -160,6 +160,14 @@ def test_a_mistake_is_told_with_its_place(old, new, words, fmu_path, binding):
     assert caught.value.exit_code == 2
 
 
+def test_a_binding_says_what_the_fmu_is(fmu_path, binding):
+    own = read_description(fmu_path("gfor"))
+    kind = {said: bind(own, binding(f"{said}\n{OURS}")).kind for said in ("", 'fmu.kind = "machine"')}
+    assert list(kind.values()) == ["converter", "machine"]
+    with pytest.raises(BindingError, match=r"fmu\.kind: .*'converter' or 'machine'"):
+        bind(own, binding(f'fmu.kind = "engine"\n{OURS}'))
+
+
 def test_all_mistakes_are_told_together(fmu_path, binding):
     text = OURS.replace('"v_re", "v_im"', '"v_re", "x"').replace('variable = "omega"', 'variable = "y"')
     with pytest.raises(BindingError, match="2 problems"):

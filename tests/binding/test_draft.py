@@ -67,6 +67,13 @@ def test_filled_in_the_draft_can_be_bound(tmp_path):
     assert set(bind(fmu, path).port.start) == {"P_0", "Q_0", "v_0", "theta_0"}
 
 
+def test_a_draft_names_the_fmu_from_its_own_folder(tmp_path):
+    (tmp_path / "fmus").mkdir()
+    fmu = described(tmp_path / "fmus")
+    assert f'file = "fmus/{fmu.path.name}"' in draft_binding(fmu, tmp_path)
+    assert f'file = "{fmu.path.resolve().as_posix()}"' in draft_binding(fmu, tmp_path / "elsewhere")
+
+
 def test_what_no_description_says_is_to_be_filled_in(tmp_path):
     text = draft_binding(described(tmp_path, {"vq": "Voltage [kV]", "vd": "Voltage [kV]"}))
     assert 'value = "REQUIRED: line-to-line rms' in text

@@ -2,6 +2,7 @@
 
 import pytest
 
+from orchestrator.binding.binding import _Reader
 from orchestrator.binding.scales import Bases
 
 BASES = Bases(1500.0, 230.0, 60.0)
@@ -59,3 +60,10 @@ def test_what_is_not_said_is_asked_for():
         BASES.voltage_unit("kV", None, None, "v")
     with pytest.raises(ValueError, match="needs the rated voltage"):
         Bases(1500.0, None, 50.0).current_unit("kA", None, "rms", "i")
+
+
+def test_powers_need_one_sign():
+    assert _Reader._power_matrix((-1.0, 0.0, 0.0, -2.0), 3.0) == (-3.0, 0.0, 0.0, -1.5)
+    for signs in ((-1.0, 0.0, 0.0, 2.0), (1.0, 0.0, 0.0, -2.0)):
+        with pytest.raises(ValueError, match="P and Q need one sign"):
+            _Reader._power_matrix(signs, 3.0)

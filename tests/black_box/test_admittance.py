@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from orchestrator.black_box.fitting import fit
 from orchestrator.black_box.frequency_response import Excitation, measure
+from orchestrator.cli.admittance import _summary
 from orchestrator.errors import AnalysisError
 from tests.black_box import boxes
 
@@ -68,3 +70,11 @@ def test_a_device_that_never_comes_to_rest_is_refused():
     bench.parameters = dict(bench.parameters) | {"P_0": 0.9, "Q_0": 0.0, "theta_0": 0.3}  # not where it is held
     with pytest.raises(AnalysisError, match="alone at an ideal bus its current still moves"):
         measure(bench, Excitation(lowest_hz=5.0, lines=10))
+
+
+def test_the_summary_begins_with_its_heading(capsys):
+    model = {"order": 2, "error": 1e-3, "poles": [{"real": -1.0, "imag": 2 * np.pi}]}
+    content = {"method": "noise", "lines": 9, "range_hz": [1, 9], "largest_relative_bound": 0.1, "model": model}
+    Console(width=200).print(_summary(content))
+    shown = capsys.readouterr().out
+    assert -1 < shown.index("9 lines from 1 to 9 Hz") < shown.index("Poles of the fitted model") < shown.index("15.72")

@@ -3,9 +3,11 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from orchestrator.black_box import bench
 from orchestrator.black_box.bench import Runs
+from orchestrator.black_box.frequency_response import odd_lines
 
 
 def test_the_direct_effect_is_half_the_difference_of_both_ways(monkeypatch):
@@ -28,3 +30,10 @@ def test_the_direct_effect_is_half_the_difference_of_both_ways(monkeypatch):
     monkeypatch.setattr(run, "_rewind", lambda: None)
     np.testing.assert_allclose(run.feedthrough(0.01), D, atol=1e-12)
     assert at["u"].tolist() == rest.tolist(), "and everything is put back"
+
+
+@pytest.mark.parametrize(("highest", "last"), [(101.0, 101), (102.9, 101), (100.0, 99)])
+def test_the_highest_odd_multiple_in_the_range_is_a_line(highest, last):
+    lines = odd_lines(1.0, highest, 9)
+    assert (lines[0], lines[-1]) == (1, last)
+    assert (lines % 2 == 1).all()

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from orchestrator.certification import report_criteria
+from orchestrator.certification import report, report_criteria
 
 
 def test_marks_of_modes_with_the_converter_are_the_large_ones(monkeypatch):
@@ -14,3 +14,20 @@ def test_marks_of_modes_with_the_converter_are_the_large_ones(monkeypatch):
     certificate = SimpleNamespace(results={("with", 0.1): point, ("without", 0.1): point}, verdicts=[])
     report_criteria.eigenvalues(certificate, SimpleNamespace(add=lambda picture, words: (picture, "")))
     assert [(mark.large, mark.text.split()[0]) for mark in seen] == [(False, "without"), (True, "with")]
+
+
+def test_the_findings_name_where_each_criterion_is_not_accepted(monkeypatch):
+    for name in ("converter_model", "signal_name"):
+        monkeypatch.setattr(report, name, lambda *_: "")
+    for name in ("_least_and_growth", "_remark"):
+        monkeypatch.setattr(report, name, lambda c: [])
+    good, bad = (SimpleNamespace(accepted=accepted) for accepted in (True, False))
+    times = {0.1: (True, good), 0.2: (True, None), 0.3: (True, bad), 0.4: (False, bad), 0.5: (False, None)}
+    verdicts = [SimpleNamespace(X_L=X, judged=judged, time=time, eigenvalues_accepted=X < 0.3)
+                for X, (judged, time) in times.items()]  # fmt: skip
+    c = SimpleNamespace(passed=False, refused=False, verdicts=verdicts, sentence=lambda: "", acceptance=None, signal="",
+                        points={("with", X): SimpleNamespace(warnings=()) for X in times}, pod=next(iter(report.PODS)),
+                        controllers=SimpleNamespace(source=""))  # fmt: skip
+    text = report._findings(c)
+    assert "Eigenvalue criterion: not accepted at X_L = 0.3 pu" in text
+    assert "not accepted at X_L = 0.2, 0.3 pu" in text

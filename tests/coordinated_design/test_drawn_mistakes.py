@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eig
 
+from orchestrator.coordinated_design import view
 from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, RatedPoint, Worth, band_of, floors_of
 from orchestrator.coordinated_design.search import SettingSearch, Tried
 from orchestrator.coordinated_design.settings import PodGroup
@@ -55,3 +56,13 @@ def test_as_many_starts_as_were_asked_for_are_improved(groups, alone, monkeypatc
     monkeypatch.setattr(search, "improved", lambda one: improved.append(one) or one)
     search.best(3, polish=False)
     assert len(improved) == alone + 3
+
+
+def test_the_table_of_points_says_what_is_allowed_and_why_not():
+    modes = SimpleNamespace(computed=True, status="computed", warnings=("w",))
+    where = {"point": SimpleNamespace(name="p1", hours=2), "outage": SimpleNamespace(name="tie")}
+    point = SimpleNamespace(**where, before=modes, after=modes, stable=True, target_before=None, target=None,
+                            worth=SimpleNamespace(allowed=False), why_not="n")  # fmt: skip
+    table = view.points_table(SimpleNamespace(points=[point]))
+    assert {c.name: c.cell(point) for c in table.columns if c.name in ("outage", "allowed", "why", "stable")} == {
+        "outage": "tie", "allowed": "false", "why": "n; w", "stable": "true"}  # fmt: skip

@@ -20,9 +20,9 @@ import pytest
 
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.errors import ComponentError
-from orchestrator.fmi import confined, process_tree, seccomp
+from orchestrator.fmi import confined, process_tree, protection, seccomp
 from orchestrator.fmi.component import RealBatch
-from orchestrator.fmi.confinement import LAYERS
+from orchestrator.fmi.confinement import LAYERS, Means, protections
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.isolation import IsolatedComponent
 from orchestrator.fmi.limits import Limits
@@ -464,3 +464,9 @@ def test_the_numbers_of_refused_calls_are_the_kernels(header, column):
     assert {name: ours[name] for name in known} == {name: kernel[name] for name in known}
     assert len(known) > 70
     assert {"memfd_create", "ptrace", "clone3"} <= known
+
+
+@pytest.mark.parametrize("supervised", [True, False])
+def test_what_only_a_supervisor_limits_is_said_not_to_be_without_one(supervised):
+    found = {p.name: p.in_force for p in protections(Means(namespaces="refused", supervised=supervised), ())}
+    assert found[protection.TASKS] is (supervised and sys.platform == "linux")

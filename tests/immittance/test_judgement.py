@@ -1,10 +1,13 @@
 """The count of encirclements against eigenvalues, and every planted reason for which a verdict is not known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from orchestrator.errors import InputError
+from orchestrator.immittance import judgement, study
 from orchestrator.immittance import loop as looping
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
@@ -209,3 +212,20 @@ def test_a_gain_at_which_it_grows_without_a_swing_is_a_margin():
     for k, stable in ((0.995, True), (1.005, False)):
         scaled = replace(line, R=k * margin.value * line.R, L=k * margin.value * line.L)
         assert is_stable(plant, scaled) == stable
+
+
+def test_capacitors_compensate_the_reactance_at_one_port():
+    """A line of R + jX in the frame of the network: X = 0.2 pu stands beside its diagonal."""
+    Z = np.array([[[0.01, -0.2], [0.2, 0.01]]])
+    request = SimpleNamespace(compensation=0.5, frequency=50.0)
+    loop = SimpleNamespace(network=SimpleNamespace(name="net", is_exact=True, at=lambda s: Z))
+    made = study._capacitors(loop, request)
+    assert (made.reactance, made.omega) == pytest.approx((0.1, 100 * np.pi))
+    for other in (np.kron(np.eye(2), Z[0])[None], -Z):
+        loop.network.at = lambda s, other=other: other
+        with pytest.raises(InputError, match="net has no inductive reactance at one port"):
+            study._capacitors(loop, request)
+
+
+def test_a_device_that_is_a_model_has_its_frame():
+    assert judgement._frames(SimpleNamespace(device=object()), None, 0) == []

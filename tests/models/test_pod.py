@@ -47,3 +47,12 @@ def test_output_is_clamped(state, wanted):
     x[names.index("pod.low_pass")] = state
     assert model.outputs_function(x, [0.0], p, [])[0][0] == pytest.approx(wanted)
     assert model.outputs_function(x, [0.0], vector(model, enabled=0, N_S=0), [])[0][0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("T_S1", "T_S2", "kept"), [(0.0, 0.0, True), (0.2, 0.0, False), (0.2, 0.05, True), (0.2, 1e-6, False)]
+)
+def test_a_stage_without_a_lag_has_no_lead(T_S1, T_S2, kept):
+    model = controller(1)
+    p = vector(model, T_S1=T_S1, T_S2=T_S2)
+    assert bool((np.array(model.requirements(p, model.initialise(p)[0])) > 0).all()) is kept

@@ -90,6 +90,7 @@ def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
         ("time,f\n1,2\n1,3\n", "the time of its 2 rows does not rise"),
         ("time,f\n1,2\n2,3,4,5\n", "and '2,3,4,5' has 4; name them all"),
         ("time,f\n0,00,50,1\n0,02,50,2\n", "the comma both parts the columns and stands in the numbers"),
+        ("time,f\n0.0,1\n0.5,2\n1.0,3\n", "its times are 0.5 apart, perhaps in ms"),
         ("time,f\n0.1,1,\n0.2,2,\n", "names 2 columns, and '0.1,1,' has 3; name them all"),
         (
             "time,f\n0,1\n20,2\n40,3\n",

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -16,7 +17,7 @@ import xarray as xr
 
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError, ResultsError
-from orchestrator.results import recorded
+from orchestrator.results import recorded, storage
 from orchestrator.results.recorded import open_recording, open_whole
 from orchestrator.results.recording import RecordingFolder, parts_of
 from orchestrator.results.signals import signal as signal_of
@@ -254,3 +255,10 @@ def test_the_attributes_say_of_which_run_a_part_is(tmp_path, prepared):
     found = open_recording(tmp_path / "recording").attrs
     assert (found["run"], found["scenario"]) == ("r1", "dip")
     assert json.loads(found["values"]) == prepared.values
+
+
+def test_a_recording_says_how_far_its_rows_are_apart(monkeypatch):
+    monkeypatch.setattr(storage, "provenance", lambda prepared: {})
+    monkeypatch.setattr(storage, "measuring_places", lambda prepared: {})
+    prepared = SimpleNamespace(record_filtered=True, record_every=40, step_size=1e-4)
+    assert storage.origin_of_rows(prepared)["record_interval_s"] == pytest.approx(4e-3)

@@ -3,11 +3,12 @@
 import itertools
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from orchestrator.study.mode_plots import damping_rays, draw_eigenvalues
+from orchestrator.study.mode_plots import damping_rays, draw_eigenvalues, draw_mode_shape
 
 SHAPES = {"two_area": (-2.1, 1.02), "ieee118": (-1.23, 1.12), "infinite_bus": (-1.0, 1.0), "slow": (-3.3, 0.2)}
 """Left edge [1/s] and upper edge [Hz] of pictures."""
@@ -100,3 +101,14 @@ def test_another_persons_mode_is_a_circle_at_its_damping_and_frequency():
     ((real, hertz),) = axis.collections[1].get_offsets().tolist()
     assert hertz == 0.5
     assert -real / abs(complex(real, 2 * 3.14159265 * hertz)) == pytest.approx(0.1, rel=1e-6)
+
+
+def test_a_mode_shape_names_the_components_of_either_side():
+    sides = (["sg1.omega"], ["sg2.omega", "gfor.theta"])
+    mode = SimpleNamespace(
+        swing=lambda states, least: sides, shape={"sg1.omega": 2, "sg2.omega": -1, "gfor.theta": -1j}
+    )
+    axis = Figure().subplots(subplot_kw={"projection": "polar"})
+    draw_mode_shape(axis, SimpleNamespace(named={"tie": mode}, swing=()), "tie", "k")
+    assert axis.get_xlabel() == "→ sg1\n← sg2, gfor"
+    assert [tuple(np.round(line.get_data(), 6).ravel()) for line in axis.lines[::2]][1] == (3.141593, 3.141593, 0, 0.5)

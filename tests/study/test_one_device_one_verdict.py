@@ -156,6 +156,7 @@ def test_check_names_the_rating_beside_the_limit_that_is_exceeded(typed):
     assert found["fault"] == "above its current limit"
     assert "likely cause: the binding has another V_n" in found["evidence"]
     assert "(22 kV, and 20 kV by itself)" in found["evidence"]
+    assert found["whose"] == "the binding"
     assert "likely cause" not in checked(typed, "limits", i_max=1.5)["limits"]["evidence"]
 
 

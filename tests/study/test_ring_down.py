@@ -1,8 +1,12 @@
 """The ring-down table shows the mode, or nothing and why."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.study import signal_modes
 from orchestrator.study.run import run_scenario
 
 
@@ -35,3 +39,14 @@ def test_what_is_no_ring_down_of_the_mode_is_not_shown(tmp_path, events, stop, w
     assert result.ring_down is None
     (said,) = [text for text in result.modes.warnings if "no ring-down" in text]
     assert why in said
+
+
+@pytest.mark.parametrize("hertz", [(0.5,), (0.5, 0.9)])
+def test_how_far_two_modes_are_told_apart_is_said_of_two(hertz):
+    modes = [SimpleNamespace(eigenvalue=complex(-0.2, 2 * np.pi * f), frequency_hz=f, amplitude=1.0, doubts=(),
+                             damping_ratio=0.06) for f in hertz]  # fmt: skip
+    own = SimpleNamespace(interval=0.02, modes=modes, start=0.0, stop=20.0, line=None, is_trend=lambda m: False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(signal_modes, "over_a_trend", lambda *_: "")
+        said = signal_modes.SignalModes.remarks.fget(own)
+    assert sum("tell two modes apart" in text for text in said) == len(hertz) - 1

@@ -63,3 +63,16 @@ def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch,
 def test_shares_are_shown_in_percent():
     assert plots._percent_of("a")({"states": {"a": 0.25}}) == 25
     assert np.isnan(plots._percent_of("a")({"states": {}}))
+
+
+def test_a_curve_stands_over_the_last_axis():
+    axes = [
+        SimpleNamespace(values=[0.0, 1.0], logarithmic=False),
+        SimpleNamespace(values=[5.0, 7.0], logarithmic=False),
+    ]
+    curve = [((1, k), {"named": True, "damping": d}) for k, d in enumerate((40.0, 60.0))]
+    axis = Figure().subplots()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plots, "_rows", lambda given: [given])
+        plots._draw(axis, SimpleNamespace(axes=axes), curve, lambda sample: sample["damping"])
+    assert [(list(line.get_xdata()), list(line.get_ydata())) for line in axis.lines] == [([5.0, 7.0], [40.0, 60.0])] * 2

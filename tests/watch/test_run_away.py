@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.coupling.events import ParameterChange
+from orchestrator.watch import run_away
 from orchestrator.watch.finding import Finding
 from orchestrator.watch.run_away import still_moving_away
 from orchestrator.watch.settings import Settings
@@ -194,3 +195,8 @@ def test_a_voltage_that_collapses_is_told():
     assert (finding.kind, finding.component, finding.variable) == ("run_away", "a", "v_re")
     assert "the voltage runs away from t = 1 s on: |a.v| is" in finding.message
     assert found(voltage=lambda t: 1 - 0.1 * (1 - np.exp(-since(t) / 5))) == []
+
+
+def test_a_short_end_of_a_long_run_is_not_judged(monkeypatch):
+    monkeypatch.setattr(run_away, "_speeds", lambda *_: iter([None]))
+    assert still_moving_away(None, None, None, Stretch(19.9, 20.0)) == []

@@ -48,6 +48,7 @@ def evenness(subject: Subject) -> CheckResult:
     if not subject.starts:
         return not_applicable("evenness", WHY["no start" if subject.port else "no port"])
     found: dict[OperatingAt, Complex] = {}
+    machine = subject.description.kind == "machine"
     for point in _points(subject):
         try:
             way = -1.0 if point.P > _MUCH else 1.0  # away from its limit
@@ -56,7 +57,7 @@ def evenness(subject: Subject) -> CheckResult:
             if point is _GIVES:
                 raise
             continue  # which 'power_balance' and 'operating_points' tell
-        if fault := _other(found[_GIVES].real, found[point].real):
+        if fault := _other(found[_GIVES].real, found[point].real, machine):
             says = f"{fault[1]} from P_0 = {point.P:g}, Q_0 = {point.Q:g}, v_0 = {point.v:g}"
             return failed("evenness", fault[0], f"{says}, and not from P_0 = {_GIVES.P:g}")
     for larger, word in ((_LARGER, "less"), (-_LARGER, "more")):
@@ -133,13 +134,15 @@ def _effects(subject: Subject, setting: Setting, found: dict[OperatingAt, Comple
     return gives, takes
 
 
-def _other(usual: Numbers, here: Numbers) -> tuple[str, str] | None:
-    """The fault where an answer is another one than the usual, and what shows it."""
+def _other(usual: Numbers, here: Numbers, machine: bool) -> tuple[str, str] | None:
+    """The fault where an answer is another one than the usual, and what shows it.
+
+    A machine's field, and with it the damping of its swing, follows its operating point."""
     size = max(np.abs(usual).max(), np.abs(here).max())
     if not np.isfinite(size) or size < _SOME:
         return None
     late, before = np.ptp(here[len(here) // 2 :]), np.ptp(usual[len(usual) // 2 :])
-    if max(late, before) > _LATE * size and max(late, before) > _MORE * min(late, before):
+    if not machine and max(late, before) > _LATE * size and max(late, before) > _MORE * min(late, before):
         return "uneven damping", f"its power still moves by {late:.2g} pu, not {before:.2g} pu, after a small change"
     if np.abs(here - usual).max() > _EVEN * size:
         return "uneven droop", f"its active power answers the frequency by {np.abs(here).max():.2g} pu"

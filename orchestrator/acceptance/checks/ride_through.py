@@ -210,17 +210,20 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     }  # fmt: skip
     if declared is not None and worst.mean > 1.05 * declared:
         return failed("limits", "above its current limit", f"{seen}; {declared:g} pu is declared", **figures)
-    if declared is None and worst.mean > NO_LIMIT:
+    machine = subject.description.kind == "machine"
+    unsaid = declared is None and not machine
+    seen += "; it is a machine, whose current nothing limits" if machine and declared is None else ""
+    if unsaid and worst.mean > NO_LIMIT:
         return failed("limits", "no current limit", seen, **figures)
     early, late = (
         [a.early for a in answers if a.event.factor.imag and bool(a.event.before) is b] for b in (False, True)
     )
-    if max(late, default=0.0) > _UNEVEN * max(early, default=np.inf):
+    if not machine and max(late, default=0.0) > _UNEVEN * max(early, default=np.inf):
         says = f"{max(late):.3g} pu in a phase jump's third cycle in a voltage that lasts, {max(early):.3g} pu without"
         return failed("limits", "no current limit", f"{says}; {seen}", **figures)
     bolted = max((a.mean for a in answers if a.event.factor == 0), default=worst.mean)
     deep = max((a for a in answers if 0 < abs(a.event.factor) < _HEALTHY), key=lambda a: a.mean, default=worst)
-    if declared is None and deep.mean > max(_UNEVEN * bolted, _MUCH):
+    if unsaid and deep.mean > max(_UNEVEN * bolted, _MUCH):
         says = f"{deep.mean:.3g} pu in {deep.event}, and no more than {bolted:.3g} pu in a dip to no voltage"
         return failed("limits", "no current limit", f"a limit that acts in some dips only: {says}; {seen}", **figures)
     longest = max(answers, key=lambda a: a.blocked)

@@ -40,6 +40,7 @@ _OMEGA_APART = 2e-4
 """Deviation of a settled omega from the network's [pu]: a fifth of the change; a wrong sign or base leaves 0.6 or more
 of the change, a frequency meter's own error far less."""
 
+_OTHER_F_N = 0.02  # by which the part of 50 or 60 Hz in the other may be missed
 _HIGH, _LOW = (1.095, 1.105), (0.895, 0.905)  # voltages [pu] of which one is drawn: the ends of what is usual
 _DROOP_OF_Q = "the sign of its droop of reactive power"
 _SIGNS, _WORDS = (1.0, -1.0), ("less", "more")  # of the changes of voltage and frequency
@@ -266,7 +267,7 @@ def _wrong(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.Dr
     least = _least(point)
     if steady[0] and voltage.power.imag < -least:
         return "wrong sign", "its reactive power falls with the voltage, and should rise"
-    if steady[1] and frequency.power.real < -_SOME:
+    if steady[1] and frequency.power.real < -_SOME - 3 * droops.FREQUENCY * abs(point.P):  # a constant torque's
         return "wrong sign", "its active power falls with the frequency, and should rise"
     for sign, word, by_voltage, by_frequency in zip(_SIGNS, _WORDS, voltage.ways, frequency.ways, strict=True):
         if _rests(by_voltage) and sign * by_voltage.power.imag < -least - _EACH:
@@ -303,6 +304,10 @@ def _wrong_omega(frequency: droops.DroopAnswer) -> tuple[str, str] | None:
         if way.omega is None or not _rests(way) or way.omega_moving > _OMEGA_APART / 10:
             continue
         network = 1 - sign * droops.FREQUENCY
+        part = (way.omega - 1) / (network - 1)
+        if min(abs(part - 1.2), abs(1 / part - 1.2) if part else 1.0) < _OTHER_F_N:
+            says = f"omega moves by {part:.4g} times what the network's frequency does"
+            return "wrong rated frequency", f"{says}, so it is made for {1 / part:.4g} times the f_n that is bound"
         if abs(way.omega - network) > _OMEGA_APART:
             return "wrong frequency", f"omega settles at {way.omega:.6g} where the network's frequency is {network:.6g}"
     return None

@@ -1,7 +1,10 @@
 """Devices that cheat on the test bench: whatever they show, no verdict becomes better."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from orchestrator.certification import anew
 from orchestrator.certification.codes.all_codes import ERCOT
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.request import CertificationRequest
@@ -54,3 +57,12 @@ def test_what_goes_wrong_without_a_word_is_told_and_nothing_reads_as_accepted(ju
 def test_a_current_that_is_held_opposes_no_jump(jumped):
     assert [f.criterion for f in jumped(cheat__holds=True, cheat__at=0.5).failed] == [
         "opposes the jump at 1 s", "opposes the jump at 6 s"]  # fmt: skip
+
+
+def test_a_row_is_compared_with_its_own_entry():
+    content = {"rows": [{"row": "b", "findings": [{"kind": "growth"}]}, {"row": "a", "findings": []}]}
+    again = SimpleNamespace(failure="", findings=[{"kind": "growth"}])
+    row = SimpleNamespace(name="a")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(anew, "UNSTABLE", frozenset({"growth"}))
+        assert anew._fault_of_row(content, row, again, None, 1.0) == "the watch finds growth, and nothing was certified"

@@ -354,3 +354,10 @@ def test_figures_without_a_certificate_refuse_what_a_certificate_has(words, gfor
         "--pdf, --details", "--details, --pdf"
     )
     assert "--code gb gives figures and no certificate; leave it out" in " ".join(said.split())
+
+
+def test_after_a_step_of_the_grids_strength_an_underdamped_plant_comes_to_rest():
+    bounds = e.strength_bounds(e.Swinging(20.0, 4.0, 0.5, 100 * math.pi), 0.3)(np.array([0.1, 0.5, 30.0]))
+    assert bounds.allowed[0] > bounds.allowed[1] > bounds.allowed[2] == pytest.approx(e.TUNNEL, abs=1e-3)
+    assert (bounds.asked <= bounds.ideal).all()
+    assert (bounds.ideal <= bounds.allowed).all()
