@@ -469,9 +469,10 @@ EventTable = Annotated[
 
 
 class ScenarioTable(Table):
-    """A scenario: its differences from the case."""
+    """A scenario: its differences from the case; ``beside`` is the one that its damping is compared with."""
 
     title: str = ""
+    beside: str | None = None
     remove: list[str] = []
     parameters: list[str] = []
     set: dict[str, Value] = {}
