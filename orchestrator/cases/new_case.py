@@ -77,8 +77,12 @@ class WantedCase:
 class NewCase:
     text: str
     assumed: tuple[str, ...]
-    scenarios: tuple[str, ...]
+    prepared: tuple[PreparedScenario, ...]
     black_box: bool = False  # whether its modes need --black-box
+
+    @property
+    def scenarios(self) -> tuple[str, ...]:
+        return tuple(prepared.name for prepared in self.prepared)
 
 
 def read_converter(text: str) -> WantedConverter:
@@ -132,7 +136,7 @@ def write_case(wanted: WantedCase) -> NewCase:
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
     text = _commented(draft.text, list(questions), sources)
     black_box = device is not None and not device.can_save_state
-    return NewCase(text, tuple(draft.assumed(len(questions))), tuple(p.name for p in scenarios), black_box)
+    return NewCase(text, tuple(draft.assumed(len(questions))), tuple(scenarios), black_box)
 
 
 def _switched(device: FmuDescription | None) -> dict[str, bool]:

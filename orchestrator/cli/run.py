@@ -51,6 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     repeatable(parser, "--force", "'UNIT FREQUENCY AMPLITUDE'", "let a unit's power reference swing, in the place of "
                "the case's events: 'sg35 0.8 Hz 2 %%', or with more words 'sg35.exciter.V_ref 0.8 Hz 2 %% square from "
                "2 s' (repeatable)")  # fmt: skip
+    repeatable(parser, "--fault", "'BUS, DURATION'", "a three-phase short circuit in the place of the case's events: "
+               "'bus_9, 150 ms', with more words 'bus_9, 150 ms, opens line_7_9, from 2 s' (repeatable)")  # fmt: skip
     option(parser, "--out", "DIR", "folder for results (default: results/<case>)", read=Path)
     parser.add_argument("--no-csv", dest="csv", action="store_false", help="write trajectories as .nc only")
     switch(parser, "--linear", "lay the linear model's response over the simulated one")

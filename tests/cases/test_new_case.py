@@ -84,6 +84,16 @@ def test_what_the_device_brings_is_told_apart_from_the_dispatch(files):
         load_case(case.path).prepare(["base"])
 
 
+def test_a_case_that_cannot_start_is_said_at_once(gfor, files):
+    five_machines(files[0].parent, highest=0.3)  # the valves' end, below what the machines feed
+    code, out, err = gfor(*files, "--out", files[0].parent / "case.toml")
+    assert code == 2
+    assert "scenario 'base': sg" in err
+    assert "governor.V_MAX: the operating point of the power flow lies at or above this limit" in err
+    assert "Next:" not in out
+    assert (files[0].parent / "case.toml").exists()
+
+
 def test_emt_models_come_from_the_same_file(files):
     case, _ = made(files)
     emt = case._of_kind({"models": "emt"}, ()).table
