@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.analysis.identification import IdentifiedMode
-from orchestrator.analysis.modes import Mode, eigenvalues
+from orchestrator.analysis.modes import ZERO, Mode, eigenvalues
 from orchestrator.arrays import Complex
 from orchestrator.cases.given import Time
-from orchestrator.errors import CosimError, InputError
+from orchestrator.errors import AnalysisError, CosimError, InputError
 from orchestrator.late import pd, xr
 from orchestrator.oscillations.view import Sources, sources_of
 from orchestrator.report.notebook import Axes, axes_or_new, curves_on, page
@@ -22,6 +22,7 @@ from orchestrator.safe_files import made_folder
 from orchestrator.study.comparison import recorded
 
 if TYPE_CHECKING:
+    from orchestrator.analysis.linear_model import LinearModel
     from orchestrator.analysis.stability import Stability
     from orchestrator.study.modes import ModesResult
     from orchestrator.study.run import RunResult
@@ -29,6 +30,12 @@ if TYPE_CHECKING:
 
 _STATES = 3
 """States with the largest participation that stand in a table."""
+
+
+def _sorted(model: LinearModel) -> Complex:
+    found = eigenvalues(model)
+    found = found[np.abs(found) > ZERO]
+    return np.asarray(found[np.argsort(-found.real, kind="stable")])
 
 
 class Modes:
@@ -78,7 +85,8 @@ class Modes:
         return self.named[index] if isinstance(index, str) else self.result.modes[index]
 
     def table(self) -> pd.DataFrame:
-        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states."""
+        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states; row 1
+        is ``modes[0]``."""
         rows = [
             {
                 **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
@@ -112,9 +120,28 @@ class Modes:
 
     @property
     def eigenvalues(self) -> Complex:
-        """All eigenvalues [rad/s] of the model that the verdict is on, complex, the largest real part first."""
-        found = eigenvalues(self.result.model)
-        return np.asarray(found[np.argsort(-found.real, kind="stable")])
+        """All eigenvalues but zeros, such as the free angle's [rad/s], complex, the largest real part first: ln(μ)/h of
+        the step map, as those of the modes and of the verdict."""
+        return _sorted(self.result.model)
+
+    @property
+    def continuous_eigenvalues(self) -> Complex:
+        """The same without a communication step; an error where a component gives no derivatives."""
+        if self.result.system is None:
+            raise AnalysisError("a component gives no derivatives, so that only eigenvalues of the step map are known")
+        return _sorted(self.result.system)
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Labelled by mode, as in `table`, and by state: eigenvalue [rad/s], shape, participation."""
+        modes, states = self.result.modes, list(self.result.model.names)
+        shapes = [[mode.shape[state] for state in states] for mode in modes]
+        numbers = range(1, len(modes) + 1)
+        return xr.Dataset(
+            {"eigenvalue": ("mode", [mode.eigenvalue for mode in modes]), "shape": (("mode", "state"), shapes),
+             "participation": (("mode", "state"), self.participation().to_numpy().T)},
+            {"mode": list(numbers), "state": states},
+        )  # fmt: skip
 
     def save(self, folder: str | Path) -> Path:
         """Write what ``gfor modes --out`` leaves into a folder."""

@@ -114,6 +114,9 @@ def read_converter(text: str) -> WantedConverter:
     rating, power = to_unit(found["MVA"], "MVA"), to_unit(found["MW"], "MW")
     if not 0 < rating < math.inf or not abs(power) <= rating:
         raise InputError(f"--converter {text!r}: {power:g} MW with a rating of {rating:g} MVA; {how}")
+    if 0 < abs(power) < 0.01 * rating:
+        raise InputError(f"--converter {text!r}: {power:g} MW is {100 * power / rating:.2g} % of its rating; is "
+                         f"{1000 * power:g} MW meant? A converter that only holds the voltage has 0 MW")  # fmt: skip
     return WantedConverter(found["bus"], rating, power, found.get("less"), replaces)
 
 
