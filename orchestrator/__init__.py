@@ -10,10 +10,8 @@ Examples
 """
 
 import re
-import sys
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {
@@ -30,28 +28,6 @@ def __getattr__(name: str) -> object:
     value: object = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
     globals()[name] = value
     return value
-
-
-_OF_A_CASE = ("sweep", "sensitivities", "interactions", "explore", "report")
-
-
-class _Room(ModuleType):
-    """A package with the name of a study, which somebody may call for the study."""
-
-    def __call__(self, *given: object, **named: object) -> object:
-        name = self.__name__.rpartition(".")[2]
-        way = f"`gfor {name}` at the terminal" if name in ("explore", "report") else f"gfor.load('two_area').{name}(…)"
-        raise import_module("orchestrator.errors").InputError(f"{name} is a package here; take {way}")
-
-
-class _Face(ModuleType):
-    def __setattr__(self, name: str, value: object) -> None:
-        if name in _OF_A_CASE and type(value) is ModuleType:
-            value.__class__ = _Room
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Face
 
 
 def __dir__() -> list[str]:

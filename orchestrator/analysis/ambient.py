@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from orchestrator.analysis.modes import damping_percent
+from orchestrator.analysis.modes import OfEigenvalue, damping_percent
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import AnalysisError
 
@@ -26,7 +26,7 @@ _STUDENT = 2.262  # standard errors to the end of a 95 % interval from so many p
 
 
 @dataclass(frozen=True, slots=True)
-class AmbientMode:
+class AmbientMode(OfEigenvalue):
     """A mode with half-widths of 95 % intervals, the part of the signals' variance that it makes, and its shape."""
 
     eigenvalue: complex
@@ -35,14 +35,6 @@ class AmbientMode:
     share: float
     shape: tuple[complex, ...]  # by signal, each as a part of its own deviation, the largest 1
     forced: bool = False  # whether it is a steady sine, whose damping says nothing
-
-    @property
-    def frequency_hz(self) -> float:
-        return self.eigenvalue.imag / (2 * np.pi)
-
-    @property
-    def damping_percent(self) -> float:
-        return damping_percent(self.eigenvalue)
 
 
 def ambient_modes(times: Numbers, values: Numbers, highest_hz: float = 2.5) -> list[AmbientMode]:

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from orchestrator.analysis.modes import damping_percent
+from orchestrator.analysis.modes import OfEigenvalue
 from orchestrator.errors import AnalysisError
 
 TOLERANCE = 1e-6  # singular values below this fraction of the largest are taken for noise
@@ -22,20 +22,12 @@ numbers."""
 
 
 @dataclass(frozen=True, slots=True)
-class IdentifiedMode:
+class IdentifiedMode(OfEigenvalue):
     """One component A·e^{λt} of a signal: λ [rad/s], and |A| at the window's start [unit of the signal]."""
 
     eigenvalue: complex
     amplitude: float
     doubts: tuple[str, ...] = ()  # why it may be no mode of the system, where that was asked; see `mode_doubts`
-
-    @property
-    def frequency_hz(self) -> float:
-        return self.eigenvalue.imag / (2 * np.pi)
-
-    @property
-    def damping_percent(self) -> float:
-        return damping_percent(self.eigenvalue)
 
 
 def identify_modes(

@@ -41,19 +41,11 @@ def damping_percent(eigenvalue: complex) -> float:
     return -100 * eigenvalue.real / abs(eigenvalue) if eigenvalue else 0.0
 
 
-@dataclass(frozen=True, repr=False)
-class Mode:
-    """One eigenvalue λ [rad/s] with its participation factors and its shape."""
+class OfEigenvalue:
+    """What has an eigenvalue λ [rad/s]."""
 
+    __slots__ = ()
     eigenvalue: complex
-    participation: tuple[tuple[str, float], ...]  # factor of every state, largest first; the factors of a mode sum to 1
-    shape: dict[str, complex]  # right eigenvector by state name, scaled so that its largest element is 1
-    # left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere
-    left: dict[str, complex] = field(default_factory=dict)
-
-    def __repr__(self) -> str:
-        led = ", ".join(f"{state} {factor:.2f}" for state, factor in self.participation[:2])
-        return f"<Mode {self.frequency_hz:.3f} Hz, {self.damping_percent:.2f} %: {led}>"
 
     @property
     def frequency_hz(self) -> float:
@@ -69,6 +61,21 @@ class Mode:
     def damping_percent(self) -> float:
         """Damping ratio [%]."""
         return 100 * self.damping_ratio
+
+
+@dataclass(frozen=True, repr=False)
+class Mode(OfEigenvalue):
+    """One eigenvalue λ [rad/s] with its participation factors and its shape."""
+
+    eigenvalue: complex
+    participation: tuple[tuple[str, float], ...]  # factor of every state, largest first; the factors of a mode sum to 1
+    shape: dict[str, complex]  # right eigenvector by state name, scaled so that its largest element is 1
+    # left eigenvector l by state name, scaled so that lᴴ·shape is 1: it recognises the mode elsewhere
+    left: dict[str, complex] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        led = ", ".join(f"{state} {factor:.2f}" for state, factor in self.participation[:2])
+        return f"<Mode {self.frequency_hz:.3f} Hz, {self.damping_percent:.2f} %: {led}>"
 
     @property
     def is_oscillation(self) -> bool:

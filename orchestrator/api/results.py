@@ -12,7 +12,7 @@ from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.analysis.modes import ZERO, Mode, eigenvalues
 from orchestrator.arrays import Complex
 from orchestrator.cases.given import Time
-from orchestrator.errors import AnalysisError, CosimError, InputError
+from orchestrator.errors import CosimError, InputError
 from orchestrator.late import pd, xr
 from orchestrator.oscillations.view import Sources, sources_of
 from orchestrator.report.notebook import Axes, axes_or_new, curves_on, page
@@ -22,7 +22,6 @@ from orchestrator.safe_files import made_folder
 from orchestrator.study.comparison import recorded
 
 if TYPE_CHECKING:
-    from orchestrator.analysis.linear_model import LinearModel
     from orchestrator.analysis.stability import Stability
     from orchestrator.study.modes import ModesResult
     from orchestrator.study.run import RunResult
@@ -30,12 +29,6 @@ if TYPE_CHECKING:
 
 _STATES = 3
 """States with the largest participation that stand in a table."""
-
-
-def _sorted(model: LinearModel) -> Complex:
-    found = eigenvalues(model)
-    found = found[np.abs(found) > ZERO]
-    return np.asarray(found[np.argsort(-found.real, kind="stable")])
 
 
 class Modes:
@@ -104,6 +97,11 @@ class Modes:
         table = pd.DataFrame(columns, index=list(self.result.model.names))
         return table.rename_axis(index="state", columns="mode")
 
+    def shapes(self) -> pd.DataFrame:
+        """Right eigenvectors: every state (row) in every mode (column, as in `table`)."""
+        columns = {number: mode.shape for number, mode in enumerate(self.result.modes, start=1)}
+        return pd.DataFrame(columns, index=list(self.result.model.names)).rename_axis(index="state", columns="mode")
+
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor modes --json`` prints of this scenario, as JSON's types."""
         from orchestrator.study.modes import modes_json  # noqa: PLC0415 - imports the reading of cases
@@ -122,26 +120,9 @@ class Modes:
     def eigenvalues(self) -> Complex:
         """All eigenvalues but zeros, such as the free angle's [rad/s], complex, the largest real part first: ln(μ)/h of
         the step map, as those of the modes and of the verdict."""
-        return _sorted(self.result.model)
-
-    @property
-    def continuous_eigenvalues(self) -> Complex:
-        """The same without a communication step; an error where a component gives no derivatives."""
-        if self.result.system is None:
-            raise AnalysisError("a component gives no derivatives, so that only eigenvalues of the step map are known")
-        return _sorted(self.result.system)
-
-    @property
-    def dataset(self) -> xr.Dataset:
-        """Labelled by mode, as in `table`, and by state: eigenvalue [rad/s], shape, participation."""
-        modes, states = self.result.modes, list(self.result.model.names)
-        shapes = [[mode.shape[state] for state in states] for mode in modes]
-        numbers = range(1, len(modes) + 1)
-        return xr.Dataset(
-            {"eigenvalue": ("mode", [mode.eigenvalue for mode in modes]), "shape": (("mode", "state"), shapes),
-             "participation": (("mode", "state"), self.participation().to_numpy().T)},
-            {"mode": list(numbers), "state": states},
-        )  # fmt: skip
+        found = eigenvalues(self.result.model)
+        found = found[np.abs(found) > ZERO]
+        return np.asarray(found[np.argsort(-found.real, kind="stable")])
 
     def save(self, folder: str | Path) -> Path:
         """Write what ``gfor modes --out`` leaves into a folder."""

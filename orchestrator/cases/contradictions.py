@@ -13,7 +13,7 @@ Locate = Callable[..., str]
 def contradictions(case: CaseTable, place: Locate) -> list[Problem]:
     return [
         *_modes(case, place), *_references(case, place), *_plots(case, place), *_buses(case, place),
-        *_units(case, place), *_scenarios(case, place),
+        *_units(case, place),
     ]  # fmt: skip
 
 
@@ -72,14 +72,6 @@ def _units(case: CaseTable, place: Locate) -> Iterator[Problem]:
     for key in ("generator_parameters", "converter_parameters") if case.units else ():
         for name in given_twice(flatten(getattr(case.units, key))):
             yield Problem(place("units", key, name), f"{name}: {TWICE}")
-
-
-def _scenarios(case: CaseTable, place: Locate) -> Iterator[Problem]:
-    for name, table in case.scenarios.items():
-        others = [other for other in case.scenarios if other != name]
-        if table.beside is not None and table.beside not in others:
-            hint = close_names(table.beside, others, f"the others are: {', '.join(others)}")
-            yield Problem(place("scenarios", name, "beside"), f"there is no other scenario {table.beside!r}; {hint}")
 
 
 def _again(names: Iterable[str]) -> Iterator[tuple[str, int]]:

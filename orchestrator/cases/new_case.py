@@ -77,12 +77,8 @@ class WantedCase:
 class NewCase:
     text: str
     assumed: tuple[str, ...]
-    prepared: tuple[PreparedScenario, ...]
+    scenarios: tuple[PreparedScenario, ...]
     black_box: bool = False  # whether its modes need --black-box
-
-    @property
-    def scenarios(self) -> tuple[str, ...]:
-        return tuple(prepared.name for prepared in self.prepared)
 
 
 def read_converter(text: str) -> WantedConverter:

@@ -35,11 +35,6 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
     yield from _hundredths(draft.grid, "shunt", "Mvar", draft.data.capacitors, where)
     loads = {x.name[5:]: value_of(grid, f"{x.name}.P") for x in draft.network.loads if x.name.startswith("load_")}
     yield from _hundredths(draft.grid, "load", "MW", {name: p for name, p in loads.items() if p and p > 0}, where)
-    plans = {
-        port.bus: draft.system.components.get(port.name) for port in draft.network.ports if port.name in draft.origins
-    }
-    fed = {b: (value_of(p, "P_0") or 0.0) * (value_of(p, "S_n") or 0.0) for b, p in plans.items() if p is not None}
-    yield from _hundredths(draft.grid, "machine", "MW", {b: p for b, p in fed.items() if p > 0}, where)
     yield from _step_up(draft, draft.grid, grid, where)
     yield from _saturation(draft)
     yield from _own_converters(draft)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
 from orchestrator.analysis.mode_names import CLEAR
 from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarities
-from orchestrator.analysis.modes import ZERO, damping_ratio
+from orchestrator.analysis.modes import ZERO, OfEigenvalue, damping_ratio
 from orchestrator.analysis.threads import one_thread
 from orchestrator.errors import AnalysisError
 
@@ -22,7 +22,7 @@ LEAST_AMPLITUDE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class ModeVerdict:
+class ModeVerdict(OfEigenvalue):
     eigenvalue: complex
     # eigenvalue of the same mode without the converter; None where the converter introduces the mode.
     before: complex | None
@@ -33,14 +33,6 @@ class ModeVerdict:
     reason: str
     components: str = ""
     doubt: str = ""  # which other mode without the converter it may be as well
-
-    @property
-    def frequency_hz(self) -> float:
-        return self.eigenvalue.imag / (2 * np.pi)
-
-    @property
-    def damping_percent(self) -> float:
-        return 100 * damping_ratio(self.eigenvalue)
 
     @property
     def before_percent(self) -> float | None:

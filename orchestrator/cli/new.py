@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from orchestrator.cases.new_case import NewCase, WantedCase, read_converter, sources_of, write_case
+from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
 from orchestrator.cli.arguments import repeatable
 from orchestrator.cli.terminal import make_console
 from orchestrator.errors import InputError, ResultsError
@@ -40,6 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the case, and say what was assumed."""
+    from orchestrator.cases.service import in_service  # noqa: PLC0415 - these import what a run needs
+    from orchestrator.study.modes import running  # noqa: PLC0415
+
     if not options.files:
         _ask(options)
     wanted = _wanted(options)
@@ -52,23 +55,16 @@ def run(options: argparse.Namespace) -> int:
     except ResultsError as error:
         raise InputError(f"--out {error}") from error
     console = make_console()
-    console.print(escape(f"{wanted.out}: scenarios {', '.join(made.scenarios)}. Assumed:"), highlight=False)
+    console.print(
+        escape(f"{wanted.out}: scenarios {', '.join(p.name for p in made.scenarios)}. Assumed:"), highlight=False
+    )
     for line in made.assumed:
         console.print(escape(f"- {line}"), soft_wrap=True, highlight=False)
-    _start(made)
+    for prepared in made.scenarios:
+        if prepared.name in ("base", "converter"):
+            running(in_service(prepared)).close()  # what cannot start is told at once
     console.print(escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False)
     return 0
-
-
-def _start(made: NewCase) -> None:
-    """Start the base and the converter once, so that what cannot start is told now; the case is written already."""
-    from orchestrator.cases.service import in_service  # noqa: PLC0415 - imports what a run needs
-    from orchestrator.study.modes import running  # noqa: PLC0415
-
-    for prepared in made.prepared:
-        if prepared.name in ("base", "converter"):
-            with running(in_service(prepared)):
-                pass
 
 
 def _wanted(options: argparse.Namespace) -> WantedCase:

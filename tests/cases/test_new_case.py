@@ -79,9 +79,6 @@ def test_what_the_device_brings_is_told_apart_from_the_dispatch(files):
     case.path.write_text(text, encoding="utf-8")
     (alike,) = map(compute_modes, load_case(case.path).prepare(["dispatch"]))
     assert min(mode.damping_percent for mode in alike.modes) == pytest.approx(least[0], abs=0.01)
-    case.path.write_text(new.text.replace('beside = "dispatch"', 'beside = "dispach"', 1), encoding="utf-8")
-    with pytest.raises(InputError, match="there is no other scenario 'dispach'; did you mean dispatch"):
-        load_case(case.path).prepare(["base"])
 
 
 def test_a_case_that_cannot_start_is_said_at_once(gfor, files):
@@ -124,7 +121,7 @@ def test_questions_stand_at_the_lines_that_they_are_about(files):
 
 def test_without_a_converter(files):
     case, new = made(files, None)
-    assert new.scenarios == ("base", "fault")
+    assert [prepared.name for prepared in new.scenarios] == ["base", "fault"]
     (fault,) = case.prepare(["fault"])
     assert [event.time for event in fault.events] == [1.0, 1.1]
 
