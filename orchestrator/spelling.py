@@ -15,6 +15,7 @@ _CALLS = ("run", "modes", "linearize", "steps", "sweep", "sensitivities", "inter
           "source", "identify", "design", "nyquist", "build", "check", "info")  # fmt: skip
 """Commands that Python has as functions of the same name."""
 
+_KEPT = re.compile(r"[^\s'\"]*given[/\\][0-9a-f]{16}[/\\](case|binding|points)\.(?:toml|csv)(?:, line (\d+))?")
 _COMMAND_ONLY = {"json", "with-linear-model"}
 _QUOTED = re.compile(r"`[^`]*`|(?<![\w-])--(engine helics|[a-z][a-z-]*)")
 _commanded = list[None]()  # one for each that asks for options
@@ -35,7 +36,9 @@ def keyword(option: str) -> str:
 
 
 def spelled(text: str) -> str:
-    """A text that names options as ``--out``, for who reads it; commands of other programs stay."""
+    """A text that names options as ``--out``, for who reads it; commands of other programs stay. What was given as
+    tables is named as it was given, and not by the file that keeps it."""
+    text = _KEPT.sub(lambda m: m[1] + (f", row {int(m[2]) - 1}" if (m[2] or "1") != "1" else ""), text)
     return text if _commanded or "--" not in text else _QUOTED.sub(_in_python, text)
 
 

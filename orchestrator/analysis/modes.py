@@ -42,8 +42,9 @@ def damping_percent(eigenvalue: complex) -> float:
 
 
 class OfEigenvalue:
-    """What has an eigenvalue [rad/s]; mixed into records of modes."""
+    """What has an eigenvalue λ [rad/s]."""
 
+    __slots__ = ()
     eigenvalue: complex
 
     @property
@@ -52,9 +53,14 @@ class OfEigenvalue:
         return self.eigenvalue.imag / (2 * np.pi)
 
     @property
+    def damping_ratio(self) -> float:
+        """−Re λ/|λ|; 0 for λ = 0."""
+        return damping_ratio(self.eigenvalue)
+
+    @property
     def damping_percent(self) -> float:
         """Damping ratio [%]."""
-        return damping_percent(self.eigenvalue)
+        return 100 * self.damping_ratio
 
 
 @dataclass(frozen=True, repr=False)
@@ -70,16 +76,6 @@ class Mode(OfEigenvalue):
     def __repr__(self) -> str:
         led = ", ".join(f"{state} {factor:.2f}" for state, factor in self.participation[:2])
         return f"<Mode {self.frequency_hz:.3f} Hz, {self.damping_percent:.2f} %: {led}>"
-
-    @property
-    def damping_ratio(self) -> float:
-        """−Re λ/|λ|; 0 for λ = 0."""
-        return damping_ratio(self.eigenvalue)
-
-    @property
-    def damping_percent(self) -> float:
-        """Damping ratio [%]."""
-        return 100 * self.damping_ratio
 
     @property
     def is_oscillation(self) -> bool:

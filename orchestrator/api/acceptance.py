@@ -7,6 +7,7 @@ from typing import Any
 from orchestrator.acceptance.checks.subject import Use
 from orchestrator.acceptance.junit import write_junit
 from orchestrator.acceptance.runner import AcceptanceReport, check_fmu, question_of
+from orchestrator.api.case import Case
 from orchestrator.asked import Names, names, text_or_none
 from orchestrator.asked import path as path_of
 from orchestrator.cases.given import Time, binding_path, in_megabytes, in_seconds
@@ -90,8 +91,9 @@ class Acceptance:
 
 def check(
     path: str | Path, binding: str | Path | None = None, *, step: Time | None = None, only: Names = (),
-    case: str | Path | None = None, component: str | None = None, scenario: str | None = None, seed: int | None = None,
-    frequency: float | None = None, time_limit: Time | None = None, memory_limit: float | str | None = None,
+    case: str | Path | Case | None = None, component: str | None = None, scenario: str | None = None,
+    seed: int | None = None, frequency: float | None = None, time_limit: Time | None = None,
+    memory_limit: float | str | None = None,
 ) -> Acceptance:  # fmt: skip
     """Run the acceptance tests of an FMU: can it be trusted in a co-simulation?
 
@@ -106,7 +108,7 @@ def check(
     only
         Names of checks; all of them where empty.
     case
-        Name or path of a case that uses the FMU: its step, operating point, values and binding are taken.
+        A case that uses the FMU, or its name or path: its step, operating point, values and binding are taken.
     component
         Name of the component of the case that is this FMU; by default the component with this file.
     scenario
@@ -149,7 +151,8 @@ def check(
     if seed is not None and (isinstance(seed, bool) or not isinstance(seed, int) or seed < 0):
         raise InputError(f"seed = {seed!r} is no whole number of at least 0; give one such as the report states")
     if case is not None:
-        use, of_case = use_in_case(str(path_of(case, "case")), component, file, step_size, scenario)
+        place = case.file.path if isinstance(case, Case) else path_of(case, "case")
+        use, of_case = use_in_case(str(place), component, file, step_size, scenario)
         bound_by = bound_by or of_case
     elif component or scenario:
         kind, name = ("component", component) if component else ("scenario", scenario)

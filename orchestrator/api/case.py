@@ -16,6 +16,7 @@ from orchestrator.cases.case import Case as CaseFile
 from orchestrator.cases.case import built_in_cases as names_of_cases
 from orchestrator.cases.case import load_case
 from orchestrator.cases.given import keep, kept
+from orchestrator.cases.locate import FROM_TEXT
 from orchestrator.errors import InputError
 from orchestrator.late import pd
 from orchestrator.report.notebook import page
@@ -75,7 +76,8 @@ def load(case: str | Path | Mapping[str, Any], *, trust_fmus: bool = False) -> "
     if isinstance(case, Mapping):
         return Case(load_case(kept({"directory": str(Path.cwd()), **case}, "case.toml", "case"), trust_fmus=trusted))
     if isinstance(case, str) and "\n" in case:
-        head = "" if re.search(r"(?m)^directory\s*=", case) else f"directory = {json.dumps(str(Path.cwd()))}\n"
+        has_one = re.search(r"(?m)^directory\s*=", case)
+        head = "" if has_one else f"{FROM_TEXT}directory = {json.dumps(str(Path.cwd()))}\n"
         return Case(load_case(keep(head + case, "case.toml"), trust_fmus=trusted))
     if not isinstance(case, str | Path) or not str(case):
         raise InputError(f"case = {case!r}; give a built-in case's name ({', '.join(names_of_cases())}) or a path")

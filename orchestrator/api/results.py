@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.analysis.identification import IdentifiedMode
-from orchestrator.analysis.modes import Mode, eigenvalues
+from orchestrator.analysis.modes import ZERO, Mode, eigenvalues
 from orchestrator.arrays import Complex
 from orchestrator.cases.given import Time
 from orchestrator.errors import CosimError, InputError
@@ -78,7 +78,8 @@ class Modes:
         return self.named[index] if isinstance(index, str) else self.result.modes[index]
 
     def table(self) -> pd.DataFrame:
-        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states."""
+        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states; row 1
+        is ``modes[0]``."""
         rows = [
             {
                 **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
@@ -96,6 +97,11 @@ class Modes:
         table = pd.DataFrame(columns, index=list(self.result.model.names))
         return table.rename_axis(index="state", columns="mode")
 
+    def shapes(self) -> pd.DataFrame:
+        """Right eigenvectors: every state (row) in every mode (column, as in `table`)."""
+        columns = {number: mode.shape for number, mode in enumerate(self.result.modes, start=1)}
+        return pd.DataFrame(columns, index=list(self.result.model.names)).rename_axis(index="state", columns="mode")
+
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor modes --json`` prints of this scenario, as JSON's types."""
         from orchestrator.study.modes import modes_json  # noqa: PLC0415 - imports the reading of cases
@@ -112,8 +118,10 @@ class Modes:
 
     @property
     def eigenvalues(self) -> Complex:
-        """All eigenvalues [rad/s] of the model that the verdict is on, complex, the largest real part first."""
+        """All eigenvalues but zeros, such as the free angle's [rad/s], complex, the largest real part first: ln(μ)/h of
+        the step map, as those of the modes and of the verdict."""
         found = eigenvalues(self.result.model)
+        found = found[np.abs(found) > ZERO]
         return np.asarray(found[np.argsort(-found.real, kind="stable")])
 
     def save(self, folder: str | Path) -> Path:

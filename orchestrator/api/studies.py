@@ -13,7 +13,7 @@ from orchestrator.asked import names as names_given
 from orchestrator.asked import path as path_of
 from orchestrator.asked import text_or_none
 from orchestrator.cases.case import Case as CaseFile
-from orchestrator.cases.forcing import forced
+from orchestrator.cases.forcing import with_events
 from orchestrator.coordinated_design.command import STUDY as COORDINATED_DESIGN
 from orchestrator.coordinated_design.one_point import design_controller
 from orchestrator.errors import InputError
@@ -35,7 +35,7 @@ def _scenario(case: Any, request: ScenarioRequest) -> Scenario:
     text_or_none(name, "name", f"give the name of one scenario: {known}")
     if name is None and len(case.scenarios) != 1:
         raise InputError(f"{case.name}: the case has {len(case.scenarios)} scenarios; choose one of: {known}")
-    file = forced(case.file, names_given(request.force, "force"))
+    file = with_events(case.file, names_given(request.force, "force"), names_given(request.fault, "fault"))
     (chosen,) = chosen_of(file, [name] if name else [], request)
     question([chosen.prepared], above=1)
     return chosen

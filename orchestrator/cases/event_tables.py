@@ -49,7 +49,7 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
             if own
             else draft.given.place("events", index)
         )
-        where = table.place if isinstance(table, schema.ForcingTable) and table.place else where
+        where = table.place or where
         if not _is_point(draft, clock, table.time, "the event", where):
             continue
         if table.time >= stop:

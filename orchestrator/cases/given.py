@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from orchestrator.asked import Value, number_between, number_in, path, plain_value
+from orchestrator.cases.locate import FROM_TABLES
 from orchestrator.errors import InputError
 from orchestrator.late import pd
 
@@ -85,7 +86,7 @@ def kept(given: Any, name: str, argument: str) -> Path:
             text = tomli_w.dumps(given)
         except (TypeError, ValueError, AttributeError) as error:
             raise InputError(f"{argument}: {error}; give what TOML has: tables, lists, numbers and text") from error
-        return keep(text, name)
+        return keep(FROM_TABLES + text, name)
     if isinstance(given, Mapping) and all(isinstance(row, Mapping) for row in given.values()):
         table = pd.DataFrame([*given.values()], index=[*given])  # a row without values is the case as it is
     else:

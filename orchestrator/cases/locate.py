@@ -9,9 +9,14 @@ _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(r"^\s*((?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*'))*)\s*=")
 _PART = re.compile(r"(\"(?:[^\"\\]|\\.)*\")|'([^']*)'|([A-Za-z0-9_-]+)")
 
+FROM_TABLES = "# From tables of a program: none of these lines is anybody's\n"
+FROM_TEXT = "# The folder, then the text as it was given\n"
+
 
 def line_of(text: str, path: Sequence[str | int]) -> int | None:
     """Line number of the longest part of a key path that has a line of its own; None if none has."""
+    if text.startswith(FROM_TABLES):
+        return None
     wanted, lines = tuple(str(p) for p in path), _lines(text)
     return next((lines[wanted[:n]] for n in range(len(wanted), 0, -1) if wanted[:n] in lines), None)
 
@@ -22,7 +27,7 @@ def _lines(text: str) -> dict[tuple[str, ...], int]:
     lines: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
     counts: dict[tuple[str, ...], int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(text.splitlines(), start=-1 if text.startswith(FROM_TEXT) else 1):
         if header := _HEADER.match(line):
             table = _parts(header.group(2))
             if header.group(1) == "[[":

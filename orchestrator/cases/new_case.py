@@ -34,6 +34,7 @@ _FILES = {".raw": "raw", ".m": "matpower", ".mat": "matpower", ".json": "pandapo
 _TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
 _EMT_STEP = 1e-4
 _MOST_CURVES = 12
+_CONVERTER, _INJECTION = "gfor", "injection"
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class WantedCase:
 class NewCase:
     text: str
     assumed: tuple[str, ...]
-    scenarios: tuple[str, ...]
+    scenarios: tuple[PreparedScenario, ...]
     black_box: bool = False  # whether its modes need --black-box
 
 
@@ -109,6 +110,9 @@ def read_converter(text: str) -> WantedConverter:
     rating, power = to_unit(found["MVA"], "MVA"), to_unit(found["MW"], "MW")
     if not 0 < rating < math.inf or not abs(power) <= rating:
         raise InputError(f"--converter {text!r}: {power:g} MW with a rating of {rating:g} MVA; {how}")
+    if 0 < abs(power) < 0.01 * rating:
+        raise InputError(f"--converter {text!r}: {power:g} MW is {100 * power / rating:.2g} % of its rating; is "
+                         f"{1000 * power:g} MW meant? A converter that only holds the voltage has 0 MW")  # fmt: skip
     return WantedConverter(found["bus"], rating, power, found.get("less"), replaces)
 
 
@@ -131,7 +135,7 @@ def write_case(wanted: WantedCase) -> NewCase:
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
     text = _commented(draft.text, list(questions), sources)
     black_box = device is not None and not device.can_save_state
-    return NewCase(text, tuple(draft.assumed(len(questions))), tuple(p.name for p in scenarios), black_box)
+    return NewCase(text, tuple(draft.assumed(len(questions))), tuple(scenarios), black_box)
 
 
 def _switched(device: FmuDescription | None) -> dict[str, bool]:
@@ -355,31 +359,40 @@ class _Text:
         values = (
             f'S_n = "{place.rating_mva:g} MVA", P_0 = {place.p_mw / place.rating_mva:.6g}, v_0 = {self._place.v_pu:g}'
         )
-        values += "".join(f", pod_{x}.enabled = false" for x, starts in self._pods.items() if starts)
-        return (
-            f'\n[components.gfor]\n{what}\nbus = "{self._place.bus}"\n'
-            f"parameters = {{ {values} }}    # P_0 in parts of S_n: {place.p_mw:g} MW\n"
+        without = values + "".join(f", pod_{x}.enabled = false" for x, starts in self._pods.items() if starts)
+        still = f'model = "static_generation{"" if w.kind == "emt" else "_phasor"}"'
+        parts = ((_CONVERTER, what, without, f"P_0 in parts of S_n: {place.p_mw:g} MW"),
+                 (_INJECTION, still, values, "the same power without dynamics, in [scenarios.dispatch]"))  # fmt: skip
+        return "".join(
+            f'\n[components.{name}]\n{kind}\nbus = "{self._place.bus}"\nparameters = {{ {given} }}    # {why}\n'
+            for name, kind, given, why in parts
         )
 
     def _scenarios(self) -> list[list[str]]:
-        found = [["[scenarios.base]", 'title = "As in the files"', *(['remove = ["gfor"]'] if self._place else [])]]
+        removed = [f"remove = {_listed((_CONVERTER, _INJECTION))}"] if self._place else []
+        found = [["[scenarios.base]", 'title = "As in the files"', *removed]]
         if self._base is None or self._network is None:
             return found
         if self._place is not None:
+            found.append(self._scenario("dispatch", "Dispatch without the device", beside=""))
             found.append(self._scenario("converter", "Converter"))
             found += [self._scenario(f"pod_{x}", f"POD-{x.upper()}", f"gfor.pod_{x}.enabled") for x in self._pods]
         fault = f'type = "bus_fault", time = "1 s", bus = "{self._fault_bus}", duration = "100 ms"'
         lines = sorted(self._network.lines, key=lambda x: (x.has_ratio, self._fault_bus not in (x.from_bus, x.to_bus)))
         opening = f'    # cleared_by = "{lines[0].name}" would open that line with it' if lines else ""
         events = f"events = [{{ {fault} }}]{opening}"
-        return [*found, [*self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}"), events]]
+        return [*found, [*self._scenario("fault", f"Fault of 100 ms at {self._fault_bus}", beside=""), events]]
 
-    def _scenario(self, name: str, title: str, enabled: str = "") -> list[str]:
+    def _scenario(self, name: str, title: str, enabled: str = "", beside: str = "dispatch") -> list[str]:
         p = self._place
         values = [f'"{key}" = {value}' for key, value in p.changed.items()] if p else []
         values += [f'"{enabled}" = true'] if enabled else []
         less = f"    # {p.less}: {p.before_mw - p.wanted.p_mw:.5g} for {p.before_mw:.5g} MW" if p and p.changed else ""
-        settings = [f'remove = ["{p.less}"]'] if p and p.wanted.replaces else []
+        gone = [_CONVERTER if name == "dispatch" else _INJECTION] if p else []
+        gone += [p.less] if p and p.less and p.wanted.replaces else []
+        settings = [f"remove = {_listed(gone)}"] if gone else []
+        told = f"beside = {_quoted(beside)}    # `gfor modes` tells what the device brings"
+        settings += [told] if p and beside else []
         settings += [f"set = {{ {', '.join(values)} }}{less}"] if values else []
         return [f"[scenarios.{name}]", f'title = "{title}"', *settings]
 

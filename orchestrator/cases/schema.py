@@ -255,7 +255,18 @@ ImperfectionTable = Annotated[
 
 
 class EventBase(Table):
+    """``place``: the option that asked for it, if no file did."""
+
     time: Seconds = Field(ge=0)
+    _place: str = PrivateAttr(default="")
+
+    @property
+    def place(self) -> str:
+        return self._place
+
+    def asked_as(self, option: str) -> Self:
+        self._place = option
+        return self
 
 
 class PassingBase(EventBase):
@@ -426,16 +437,6 @@ class ForcingTable(EventBase):
     amplitude: Annotated[float, BeforeValidator(_share), Field(gt=0, allow_inf_nan=False)]
     shape: ForcingShape = "sine"
     end: Seconds | None = None
-    _text: str = PrivateAttr(default="")
-
-    @property
-    def place(self) -> str:
-        """Where it was asked for, if not in the file."""
-        return f"--force {self._text!r}" if self._text else ""
-
-    def asked_as(self, text: str) -> Self:
-        self._text = text
-        return self
 
 
 UnitSwitchingTable = UnitTripTable | UnitReconnectionTable
@@ -469,9 +470,10 @@ EventTable = Annotated[
 
 
 class ScenarioTable(Table):
-    """A scenario: its differences from the case."""
+    """A scenario: its differences from the case; ``beside`` is the one that its damping is compared with."""
 
     title: str = ""
+    beside: str | None = None
     remove: list[str] = []
     parameters: list[str] = []
     set: dict[str, Value] = {}

@@ -35,10 +35,6 @@ class ModeVerdict(OfEigenvalue):
     doubt: str = ""  # which other mode without the converter it may be as well
 
     @property
-    def damping_percent(self) -> float:
-        return 100 * damping_ratio(self.eigenvalue)
-
-    @property
     def before_percent(self) -> float | None:
         """Damping of the same mode without the converter [%]; None if there is no such mode."""
         return None if self.before is None else 100 * damping_ratio(self.before)

@@ -7,7 +7,7 @@ from orchestrator.api.scenario import Scenario, choose
 from orchestrator.asked import read_positive
 from orchestrator.black_box.frequency_response import METHODS, Excitation
 from orchestrator.cases.case import Case, load_case
-from orchestrator.cases.forcing import forced
+from orchestrator.cases.forcing import with_events
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
@@ -50,7 +50,8 @@ def case_of(options: argparse.Namespace) -> Case:
 
 
 def chosen(options: argparse.Namespace) -> list[Scenario]:
-    file, stop = forced(case_of(options), getattr(options, "force", ())), getattr(options, "stop", None)
+    events = [getattr(options, name, ()) for name in ("force", "fault")]
+    file, stop = with_events(case_of(options), *events), getattr(options, "stop", None)
     asked: dict[str, Any] = {name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")}
     asked["sharing"] = SharingRule(asked["sharing"]) if asked["sharing"] else None
     asked |= {"values": values_set(options), "step": options.step, "parameters": parameters(options)}

@@ -26,6 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the case, and say what was assumed."""
+    from orchestrator.cases.service import in_service  # noqa: PLC0415 - these import what a run needs
+    from orchestrator.study.modes import running  # noqa: PLC0415
+
     if not options.files:
         _ask(options)
     wanted = _wanted(options)
@@ -38,9 +41,14 @@ def run(options: argparse.Namespace) -> int:
     except ResultsError as error:
         raise InputError(f"--out {error}") from error
     console = make_console()
-    console.print(escape(f"{wanted.out}: scenarios {', '.join(made.scenarios)}. Assumed:"), highlight=False)
+    console.print(
+        escape(f"{wanted.out}: scenarios {', '.join(p.name for p in made.scenarios)}. Assumed:"), highlight=False
+    )
     for line in made.assumed:
         console.print(escape(f"- {line}"), soft_wrap=True, highlight=False)
+    for prepared in made.scenarios:
+        if prepared.name in ("base", "converter"):
+            running(in_service(prepared)).close()  # what cannot start is told at once
     console.print(escape(f"Next: gfor modes {wanted.out}{' --black-box' * made.black_box}"), highlight=False)
     return 0
 

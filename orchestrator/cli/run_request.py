@@ -18,8 +18,8 @@ from orchestrator.study.checkpoints import EVERY
 _REQUEST = "request.json"
 _OF_THE_RUN: Mapping[str, Any] = {
     "case": None, "scenario": [], "set": [], "parameters": [], "step": None, "schedule": None, "stop": None,
-    "tolerance": None, "sharing": None, "force": [], "linear": False, "csv": True, "require_checkpoint": False,
-    "checkpoint": None,
+    "tolerance": None, "sharing": None, "force": [], "fault": [], "linear": False, "csv": True,
+    "require_checkpoint": False, "checkpoint": None,
 }  # fmt: skip
 """Options as they are where nothing is said; a resumed run keeps those that it had."""
 

@@ -88,7 +88,9 @@ def of_run(result: RunResult) -> ScenarioAnswer:
         return by_modes
     if missing := result.missing_limits:
         names = ", ".join(dict.fromkeys(finding.component for finding in missing))
-        remark = f"the current limit of {names} would act, which the model lacks: repeat with EMT models"
+        table = result.modes.prepared.case.table
+        how = "--set models=emt" if table.models and table.emt.step_size else "EMT models, whose names lack `_phasor`"
+        remark = f"the current limit of {names} would act, which the model lacks: repeat with {how}"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     end = result.modes.prepared.stop_time
     later = ", ".join(f"{time:g} s" for time in result.modes.prepared.not_reached)

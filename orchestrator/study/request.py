@@ -73,6 +73,9 @@ class ScenarioRequest(Preparing):
         NAMES, (), "references that swing, in the place of the case's events: ``\"sg1 0.8 Hz 2 %\"``, as ``gfor run "
         "--force``", option=None,
     )  # fmt: skip
+    fault: Names = asked(
+        NAMES, (), 'short circuits in the place of the case\'s events: ``"bus_9, 150 ms"``', option=None
+    )
 
 
 @dataclass(frozen=True)

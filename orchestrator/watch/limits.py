@@ -142,7 +142,7 @@ def _finding(
         f"{'to the end of the run' if end is None else f'to t = {end:.4g} s'}, for {duration:.3g} s in all{times_over}"
     )
     if not limit.represented:
-        message += "; what follows is not known: repeat with EMT models, whose names lack `_phasor`"
+        message += "; what follows is not known: repeat with EMT models"
     figures = {"duration_s": duration, "stretches": float(stretches)}
     return Finding("active_limit", begin, name, limit.signal, message, end, figures, limit.represented)
 

@@ -13,7 +13,7 @@ import pytest
 import orchestrator as gfor
 from orchestrator.cases.case import BUILT_IN
 from orchestrator.cases.given import kept
-from orchestrator.errors import InputError
+from orchestrator.errors import CaseError, InputError
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_points_are_tables_and_mappings():
     table = of_frame.table()
     assert table.index.is_unique
     assert table["least_damping_percent"].dropna().is_monotonic_increasing
-    with pytest.raises(InputError, match=r"points\.csv, line 1: column 'grid\.X_l'"):
+    with pytest.raises(InputError, match=r"points: column 'grid\.X_l'"):
         case.screen({"short": {"grid.X_l": 0.1}}, scenario="gfor")
 
 
@@ -70,7 +70,7 @@ def test_a_point_without_values_is_the_case_as_it_is():
 def test_a_binding_is_a_mapping(tmp_path):
     fmu = gfor.build("gfor", tmp_path)
     binding = tomllib.loads(gfor.bind(fmu))
-    with pytest.raises(gfor.CosimError, match=r"binding\.toml"):
+    with pytest.raises(gfor.CosimError, match=r"binding: 2 problems"):
         gfor.open_fmu(fmu, binding=binding | {"voltage": {}})
 
 
@@ -112,7 +112,9 @@ def test_a_recording_says_what_it_was_computed_from(tmp_path):
 
 
 def test_all_eigenvalues_and_the_map_in_one_unit(modes):
-    assert len(modes.eigenvalues) == modes.stability.eigenvalues
+    assert len(modes.eigenvalues) == modes.stability.eigenvalues - modes.stability.zeros
+    assert modes.eigenvalues[0].real == pytest.approx(modes.stability.largest_growth_rate, rel=1e-6)
+    assert modes.shapes().loc["gfor.droop.theta", 1] == modes[0].shape["gfor.droop.theta"]
     assert all(np.abs(modes.eigenvalues - mode.eigenvalue).min() < 1e-6 * abs(mode.eigenvalue) for mode in modes)
     axes = modes.plot(radians=True)
     assert axes.get_ylabel() == "Imaginary part [rad/s]"
@@ -137,3 +139,13 @@ def test_linear_models_go_to_scipy_and_control(case, monkeypatch):
     step, names = both.to_control()
     assert (step, names["inputs"]) == (0, ["gfor_droop_delta_P_ref"])
     assert names["outputs"] == ["gfor_p_gfor_omega", "gfor_p"]
+
+
+def test_what_was_given_as_tables_is_named_as_it_was_given(case):
+    with pytest.raises(CaseError) as refused:
+        case.with_(solver={"stop_tim": 3}).scenario("dip")
+    assert str(refused.value) == "case: 1 problem\n  - solver.stop_tim: this key is unknown; did you mean stop_time?"
+    with pytest.raises(CaseError, match="case: 3 problems\n  - line 2, foo: this key"):
+        gfor.load('name = "x"\nfoo = 3\n[components.g]\nmodel = "gfor"\n').scenario()
+    with pytest.raises(InputError, match="points, row 2: load = -1"):
+        gfor.load("wscc9").screen(pd.DataFrame({"load": [1.0, -1.0]}))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.cases.forcing import forcing_of
+from orchestrator.cases.forcing import fault_of, forcing_of
 from orchestrator.coupling.events import Forcing
 from orchestrator.errors import CaseError, InputError
 
@@ -110,3 +110,32 @@ def test_the_run_tells_who_was_forced(run):
     assert one.source == "sg1"
     assert found.table()["kind"][0] == "forced"
     assert "grid.L" in found.places
+
+
+@pytest.mark.parametrize(
+    ("text", "given"),
+    [
+        ("bus_9, 150 ms", ("bus_9", 1.0, 0.15, None)),
+        ("9,0.15 s", ("bus_9", 1.0, 0.15, None)),
+        ("bus 9, 150 ms, opens line_7_9, from 2 s", ("bus_9", 2.0, 0.15, "line_7_9")),
+    ],
+)
+def test_a_fault_in_words(text, given):
+    fault = fault_of(text)
+    assert (fault.bus, fault.time, fault.duration, fault.cleared_by) == given
+
+
+@pytest.mark.parametrize("text", ["bus_9 150 ms", "bus_9, 150", "bus_9", "bus_9, -1 ms", "bus_9, 150 ms, line_7_9"])
+def test_a_fault_without_its_parts_is_refused(text):
+    with pytest.raises(InputError, match=f"^--fault '{text}': "):
+        fault_of(text)
+
+
+def test_a_fault_takes_the_place_of_all_events():
+    case = gfor.load("two_area_rms")
+    events = case.scenario("gfor", fault="bus_2, 150 ms, from 2 s").prepared.events
+    assert [event.time for event in events] == [2.0, 2.15]
+    with pytest.raises(
+        CaseError, match=r"fault 'bus_4, 150 ms': component 'grid' has no bus 'bus_4'; did you mean bus_3 or bus_2"
+    ):
+        case.scenario("gfor", fault="bus_4, 150 ms")

@@ -11,6 +11,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.cases.new_case import WantedCase, _switched, read_converter, write_case
 from orchestrator.errors import InputError
 from orchestrator.fmi.description import read_description
+from orchestrator.study import beside
 from orchestrator.study.modes import compute_modes
 from tests.screening.five_machines import POWERS, RATINGS, five_machines
 from tests.support import vendor
@@ -41,7 +42,7 @@ def test_a_case_is_written_and_said_in_few_lines(gfor, files):
     code, text, err = gfor(*files, "--converter", CONVERTER, "--out", out)
     assert (code, err) == (0, "")
     assert len(text.splitlines()) <= 8
-    assert "base, converter, pod_p, pod_q, fault" in text
+    assert "base, dispatch, converter, pod_p, pod_q, fault" in text
     assert "sg3 feeds 60 MW less (160 before)" in text
     again = gfor(*files, "--converter", CONVERTER, "--out", out)
     assert again[0] == 2
@@ -62,11 +63,39 @@ def test_the_converter_takes_over_what_the_machine_feeds_less(files):
     assert compute_modes(converter).stability.stable
 
 
+def test_what_the_device_brings_is_told_apart_from_the_dispatch(files):
+    case, new = made(files)
+    dispatch, converter = map(compute_modes, case.prepare(["dispatch", "converter"]))
+    least = [min(mode.damping_percent for mode in result.modes) for result in (dispatch, converter)]
+    (sentence,) = beside.told([dispatch, converter])
+    assert f"{least[0]:.2f} %), at the same power flow: Converter {least[1] - least[0]:+.2f} points" in sentence
+    assert list(beside.told([converter])) == ["What the change of power flow alone does: --scenario dispatch beside"]
+    (moved,) = map(compute_modes, case.prepare(["converter"], {"gfor.P_0": 0.5}))
+    assert "Converter: not known, as its power flow is another one" in "".join(beside.told([dispatch, moved]))
+    # The same as a negative load of the network, which is a constant current there, without any device
+    fed = 100 * dispatch.prepared.power_flow.powers["injection"]
+    load = f'[network.loads.fed]\nbus = "bus_13"\np = {-fed.real}\nq = {-fed.imag}\n\n[units]'
+    text = new.text.replace("[units]", load, 1).replace('remove = ["gfor"]', 'remove = ["injection", "gfor"]')
+    case.path.write_text(text, encoding="utf-8")
+    (alike,) = map(compute_modes, load_case(case.path).prepare(["dispatch"]))
+    assert min(mode.damping_percent for mode in alike.modes) == pytest.approx(least[0], abs=0.01)
+
+
+def test_a_case_that_cannot_start_is_said_at_once(gfor, files):
+    five_machines(files[0].parent, highest=0.3)  # the valves' end, below what the machines feed
+    code, out, err = gfor(*files, "--out", files[0].parent / "case.toml")
+    assert code == 2
+    assert "scenario 'base': sg" in err
+    assert "governor.V_MAX: the operating point of the power flow lies at or above this limit" in err
+    assert "Next:" not in out
+    assert (files[0].parent / "case.toml").exists()
+
+
 def test_emt_models_come_from_the_same_file(files):
     case, _ = made(files)
     emt = case._of_kind({"models": "emt"}, ()).table
     models = [c.model for c in emt.components.values()] + [emt.units.generator, emt.units.converter]
-    assert models == ["grid", "gfor", "synchronous_generator", "gfor"]
+    assert models == ["grid", "gfor", "static_generation", "synchronous_generator", "gfor"]
     assert emt.solver.step_size == 1e-4
     largest = 0.25 * 100 / max(RATINGS.values())  # X''_d [pu, 100 MVA]
     assert emt.network.stray_B == pytest.approx((2 * 3.14159 * 60 * 1e-4) ** 2 / largest, rel=0.1)
@@ -92,7 +121,7 @@ def test_questions_stand_at_the_lines_that_they_are_about(files):
 
 def test_without_a_converter(files):
     case, new = made(files, None)
-    assert new.scenarios == ("base", "fault")
+    assert [prepared.name for prepared in new.scenarios] == ["base", "fault"]
     (fault,) = case.prepare(["fault"])
     assert [event.time for event in fault.events] == [1.0, 1.1]
 
@@ -209,7 +238,7 @@ def test_it_asks_at_a_terminal(gfor, files, monkeypatch):
     (files[0].parent / "five.toml").unlink()
     code, text, _ = gfor()
     assert code == 0
-    assert text.startswith("five.toml: scenarios base, converter")
+    assert text.startswith("five.toml: scenarios base, dispatch, converter")
     assert next(answers, None) is None
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from orchestrator.analysis.modes import make_mode
 from orchestrator.analysis.stability import Stability
+from orchestrator.cases.schema import KindTable
 from orchestrator.cli import main
 from orchestrator.study.answers import of_modes, of_run
 from orchestrator.study.run import RunResult
@@ -29,9 +30,11 @@ def test_the_first_screen_of_modes_has_one_line_a_scenario(capsys):
     assert not [line for line in text if "largest real part" in line or "a mode grows" in line]
 
 
-def result(findings=(), stable=True, events=(1.0,), failure=None):
+def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
     mode = make_mode(-0.2 + 5j, np.array([1.0 + 0j]), np.array([1.0 + 0j]), ("sg1.machine.omega",))
-    case = SimpleNamespace(table=SimpleNamespace(analysis=SimpleNamespace(modes={})))
+    case = SimpleNamespace(
+        table=SimpleNamespace(analysis=SimpleNamespace(modes={}), models=kind, emt=KindTable(step_size=1e-4))
+    )
     prepared = SimpleNamespace(title="S", events=[t for t in events if t < 5], stop_time=5.0, case=case,
                                not_reached=[t for t in events if t >= 5])  # fmt: skip
     modes = SimpleNamespace(
@@ -62,6 +65,8 @@ def test_the_verdict_of_a_run_is_its_own(findings, stable, word, remark):
     answer = of_run(result(findings, stable))
     assert (answer.verdict, answer.good) == (word, {"stable": True, "UNSTABLE": False}.get(word))
     assert remark in answer.remark
+    if remark.startswith("repeat"):
+        assert of_run(result(findings, stable, kind="phasor")).remark.endswith("repeat with --set models=emt")
 
 
 @pytest.mark.parametrize(

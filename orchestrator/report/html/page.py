@@ -52,7 +52,8 @@ def page(places: Sequence[Path], against: Path | None = None, title: str | None 
     ]  # fmt: skip
     charts = (re.search(_PICTURE, text, re.DOTALL) for _, text in content)
     picture = next((found[0] for found in charts if found), "")
-    content = [] if short else content
+    first = "<p>Its picture stands on the first page.</p>"
+    content = [] if short else [(h, text.replace(picture, first) if picture else text) for h, text in content]
     if against is not None:
         before = [chapter for chapter, _ in _told([against], Figures())[0]] if against.is_dir() else None
         content.insert(0, ("What changed since", changes(against, before, chapters)))
