@@ -1,6 +1,7 @@
 """Whether a device is stable at a network, by the generalised Nyquist criterion."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -132,17 +133,17 @@ class Asked:
 
     def _settings(self, result: CutResult, given: Sequence[str]) -> list[Tunable]:
         """Parameters of the device that are not 0: all tunable ones, or those that are named."""
-        if self._device is None and isinstance(result.request.network, PreparedScenario) and result.cut is not None:
-            plans = {name: result.request.network.system.components[name] for name in result.cut.devices}
+        case = None if self._device or result.scans or result.cut is None else result.request.network
+        if isinstance(case, PreparedScenario) and result.cut is not None:
+            plans = {name: case.system.components[name] for name in result.cut.devices}
             found = parameters_in({n: p.description for n, p in plans.items()}, lambda n, v: plans[n].number(v), given)
-        elif self._device is not None and self._device.suffix.lower() not in ENDINGS:
+        elif self._device and self._device.suffix.lower() not in ENDINGS:
             fmu, values = bound_fmu(self._device, result.request.binding), result.request.values
             patterns = [f"{_FMU}{name}" for name in given]
             found = parameters_in({_FMU[:-1]: fmu}, lambda _, v: float(values.get(v, start_of(fmu, v))), patterns)
         else:
-            raise InputError(
-                f"--retune: {self._device} is a scan and has no parameters; give the FMU, DLL or case itself"
-            )
+            scan = self._device or result.loop.device.name
+            raise InputError(f"--retune: {scan} is a scan and has no parameters; give the FMU, DLL or case itself")
         return [_range(x) for x in found if x.value]
 
 
@@ -179,4 +180,5 @@ def network_of(
     from orchestrator.study.request import ScenariosRequest  # noqa: PLC0415
 
     asked = ScenariosRequest(values=case_values(values))
-    return choose(load_case(case, trust_fmus=trust_fmus), [scenario] if scenario else [], asked)[0].prepared
+    file = replace(load_case(case, trust_fmus=trust_fmus), scans=True)
+    return choose(file, [scenario] if scenario else [], asked)[0].prepared

@@ -1,6 +1,7 @@
 """The arguments of every command on a case."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,7 @@ def case_of(options: argparse.Namespace) -> Case:
 
 def chosen(options: argparse.Namespace) -> list[Scenario]:
     file, stop = forced(case_of(options), getattr(options, "force", ())), getattr(options, "stop", None)
+    file = replace(file, scans=getattr(options, "scans", False))
     asked: dict[str, Any] = {name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")}
     asked["sharing"] = SharingRule(asked["sharing"]) if asked["sharing"] else None
     asked |= {"values": values_set(options), "step": options.step, "parameters": parameters(options)}

@@ -21,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
            "none)", read=read_positive, default=0.0)  # fmt: skip
     add_json_argument(parser)
     add_kept_argument(parser, "scr")
+    parser.set_defaults(scans=True)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -189,12 +189,12 @@ def _confirmed(x: Retuned) -> dict[str, Any] | None:
     if x.needed is None or x.predicted is None:
         return None
     result, own, cut = x.scans[x.needed], x.figures[int(np.searchsorted(x.values, x.needed))], x.scans[x.needed].cut
-    own_modes = () if cut is None or cut.modes_stable is None or result.request.device else cut.eigenvalues
+    own_modes = () if cut is None or cut.modes_stable is None or result.scans else cut.eigenvalues
     near = min(own_modes, key=lambda p: abs(p - own.mode), default=None) if own.mode else None
     return {"predicted": x.predicted.distance, "verdict": str(result.verdict), "distance": own.distance,
             "damping_percent": _number(own.damping),
             "coupled_damping_percent": None if near is None else float(-100 * near.real / abs(near)),
-            "modes_stable": None if cut is None or result.request.device else cut.modes_stable}  # fmt: skip
+            "modes_stable": None if cut is None or result.scans else cut.modes_stable}  # fmt: skip
 
 
 def retuned_table(found: Sequence[Retuned], goal: float) -> Iterator[RenderableType]:
