@@ -137,7 +137,7 @@ def encirclements(path: LoopPath, *, exact: bool) -> tuple[int, int]:
 def _count(path: LoopPath, turns: Numbers, exact: bool) -> int:
     """Clockwise encirclements of the whole axis, of which the path is the upper half, from all turns on it."""
     first, last = _principal(path, 0), _principal(path, -1)
-    begin = np.pi * round(first / np.pi)
+    begin = np.pi * round((first - path.lead) / np.pi)
     end = np.pi * round(last / np.pi) if exact else 0.0
     return -round(float(first - begin + turns.sum() - (last - end)) / np.pi)
 
@@ -174,7 +174,7 @@ def _resolution(loop: CutLoop, path: LoopPath) -> list[str]:
 def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
     """Whether an encirclement may lie below the lowest or beyond the highest frequency."""
     reasons = []
-    first = _principal(path, 0)
+    first = _principal(path, 0) - path.lead
     if abs(first - np.pi * round(first / np.pi)) > _BEGIN:
         reasons.append(f"at {path.hertz[0]:g} Hz the loop is not yet where it begins: scan lower frequencies")
     if loop.is_exact:

@@ -171,9 +171,9 @@ class CutResult:
 
 def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) -> CutResult:
     """Bring both sides into one unit and one frame, and judge their loop."""
-    cut, scans, known, unit = None, dict[str, Scan](), True, PER_UNIT
+    cut, scans, known, unit, lead = None, dict[str, Scan](), True, PER_UNIT, 0.0
     if isinstance(request.network, PreparedScenario):
-        request, cut, scans, known = _opened(request, request.network)
+        request, cut, scans, known, lead = _opened(request, request.network)
     if request.device is not None:
         if cut is not None and len(cut.devices) > 1:
             raise InputError(f"the cut holds {', '.join(cut.devices)}; name the one that the scan is of by --component")
@@ -202,7 +202,7 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     assert network is not None
     if "network" in scans:
         check_pair(scans["device"], scans["network"])
-    loop = CutLoop(device, network)
+    loop = CutLoop(device, network, lead=lead if scans and request.scr is None else 0.0)
     if ("network" in scans or (scans and request.scr)) and not request.units_checked:
         check_size(loop, *common_range(device, network, (0.0, 0.0)))
     if request.compensation:
@@ -217,8 +217,9 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating, ratios)
 
 
-def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cut, dict[str, Scan], bool]:
-    """The case cut where it is asked for, or at its scans; those, and whether their frames are known."""
+def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cut, dict[str, Scan], bool, float]:
+    """The case cut where it is asked for, or at its scans; those, whether their frames are known, and the lead of what
+    a free angle makes of the loop."""
     held, scans, sure = scans_in(case), dict[str, Scan](), [True]
     cut = cut_of(case, request.bus, request.components or (() if request.bus else tuple(held)))
     check_held(held, cut)
@@ -227,7 +228,8 @@ def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cu
         scan = _read(request, "device", case.case.directory / str(table.scan))
         scans[name], known = placed(scan, cut, name, table.voltage or request.kilovolt, request.angle)
         sure.append(known)
-    return request, replace(cut, device=at_ports(scans, cut)) if held else cut, scans, all(sure)
+    lead = CutLoop(cut.device, cut.network).lead_at_rest
+    return request, replace(cut, device=at_ports(scans, cut)) if held else cut, scans, all(sure), lead
 
 
 def _read(request: CutRequest, side: str, path: Path) -> Scan:
