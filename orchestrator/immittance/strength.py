@@ -89,11 +89,12 @@ class SourceBehind:
         return np.zeros(len(s))
 
 
-def converters_scr(prepared: PreparedScenario | None) -> dict[str, float]:
-    """SCR of the converters by bus, of a case with a power flow."""
+def converters_scr(prepared: PreparedScenario | None) -> tuple[dict[str, float], float | None]:
+    """SCR of the converters by bus, and gSCR of all, of a case with a power flow."""
     if prepared is None or prepared.network is None or prepared.power_flow is None:
-        return {}
-    return {b.bus: b.scr for b in ShortCircuit.of(prepared).strengths() if b.scr is not None}
+        return {}, None
+    found = ShortCircuit.of(prepared)
+    return {b.bus: b.scr for b in found.strengths() if b.scr is not None}, found.gscr()
 
 
 def short_circuit_mva(network: Side, hertz: float, base: float | None, prepared: Any, bus: str) -> float | None:

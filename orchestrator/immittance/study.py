@@ -68,7 +68,9 @@ class CutResult:
     # short_circuit, rating: of the network at the cut and of the device [MVA]; None where they are not known
     short_circuit: float | None = None
     rating: float | None = None
-    ratios: Mapping[str, float] = field(default_factory=dict)  # SCR of the converters at a bus of the case
+    # ratios, gscr: SCR of the converters at a bus of the case, and generalised ratio of all of them
+    ratios: Mapping[str, float] = field(default_factory=dict)
+    gscr: float | None = None
 
     @property
     def scr(self) -> float | None:
@@ -145,7 +147,8 @@ class CutResult:
             "margins": margins_json(self.margins),
             "buses": self._buses_json(),
             "critical": [vars(one) for one in self.critical],
-            "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit},
+            "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit,
+                         "gscr": self.gscr},
             "difference_from_case": self.difference,
             "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
             "small_gain_hz": [list(band) for band in j.small_gain],
@@ -213,8 +216,7 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
         judgement = beside_modes(judgement, cut)
     prepared = request.network if isinstance(request.network, PreparedScenario) and request.scr is None else None
     short = short_circuit_mva(network, request.frequency, base, prepared, cut.bus if cut else "")
-    ratios = converters_scr(prepared) if judgement.buses else {}
-    return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating, ratios)
+    return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating, *converters_scr(prepared))
 
 
 def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cut, dict[str, Scan], bool, float]:

@@ -138,7 +138,8 @@ def _by_bus(result: CutResult) -> Iterator[RenderableType]:
         rows.append((b["bus"], ", ".join(b["devices"]), f"{m['distance']['value']:.3f}",
                      f"{m['distance']['frequency_hz']:.3f}", gain, phase, left, scr))  # fmt: skip
     if rows:
-        yield make_table("At each bus alone (SCR is no margin: devices and settings differ at one ratio)", "Bus",
+        ratios = "SCR is" if result.gscr is None else f"SCR, and gSCR of {result.gscr:.3g}, are"
+        yield make_table(f"At each bus alone ({ratios} no margin: devices and settings differ at one ratio)", "Bus",
                          "Devices", "Distance", "at [Hz]", "Gain", "Phase", "Without it", "SCR", rows=rows)  # fmt: skip
     for one in result.critical if rows else ():
         buses = _most(one.buses, "{} {:.0%}")
@@ -156,7 +157,10 @@ def _strength(result: CutResult) -> str:
     limit, d = result.scr_limit, result.judgement.margins.distance
     lost = f"; stability is lost below {limit:.3g}" if limit else ""
     said = "; no smaller one loses stability" if limit == 0 else lost
-    what = f"Short-circuit ratio {result.scr:.3g}{said}. It is no margin: devices and settings differ at one ratio"
+    of_all = "" if result.gscr is None else f", gSCR of all converters {result.gscr:.3g}"
+    what = (
+        f"Short-circuit ratio {result.scr:.3g}{of_all}{said}. It is no margin: devices and settings differ at one ratio"
+    )
     return f"{what}; the distance of {d.value:.3g} counts"
 
 

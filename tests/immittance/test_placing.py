@@ -110,12 +110,15 @@ def test_what_needs_states_refuses_a_scan_and_names_what_does_not(tmp_path, two_
 def test_the_frame_of_a_measured_scan_is_that_of_its_voltage(monkeypatch):
     """A device that is not the same in all frames, measured at a voltage of 0.4 rad."""
     Y, turn = np.array([[2.0, 0.3], [-0.1, 0.5]]), block_rotation([0.4])
-    monkeypatch.setattr(measured, "_without_hold", lambda model, at: -np.broadcast_to(turn @ Y @ turn.T, (len(at), 2, 2)))
+    monkeypatch.setattr(
+        measured, "_without_hold", lambda model, at: -np.broadcast_to(turn @ Y @ turn.T, (len(at), 2, 2))
+    )
     monkeypatch.setattr(measured, "fit", lambda response: type("M", (), {"poles": np.zeros(0), "error": 0.0}))
     response = FrequencyResponse.__new__(FrequencyResponse)
-    for name, value in {"frequencies": np.geomspace(1, 9, 9), "bounds": np.zeros((9, 2, 2)), "values": np.ones((9, 2, 2)),
-                        "operating_point": (1.0, 0.0)}.items():  # fmt: skip
-        object.__setattr__(response, name, value)
+    vars(response).update(
+        frequencies=np.geomspace(1, 9, 9), bounds=np.zeros((9, 2, 2)), values=np.ones((9, 2, 2)),
+        operating_point=(1.0, 0.0),
+    )  # fmt: skip
     scan = measured.as_scan("x", response, cmath.rect(1.0, 0.4))
     assert scan.values == pytest.approx(np.broadcast_to(Y, scan.values.shape))
     assert scan.points["x"].angle == pytest.approx(0.4)
