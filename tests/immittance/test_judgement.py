@@ -112,6 +112,13 @@ def test_an_encirclement_beyond_the_last_frequency_is_not_ruled_out():
     assert any("scan higher frequencies" in reason for reason in cut_short.reasons)
 
 
+def test_a_scan_that_begins_above_the_begin_of_the_loop_is_seen():
+    plant, line = narrow(0.2, f_0=1.0, size=4.0), Line(0.05, 0.8 / OMEGA)
+    assert judged(plant, line, np.geomspace(0.02, 1000, 400)).verdict == "stable"
+    cut_short = judged(plant, line, np.geomspace(1.0, 1000, 400))
+    assert cut_short.reasons == ("at 1 Hz the loop is not yet where it begins: scan lower frequencies",)
+
+
 def test_a_device_that_is_unstable_by_itself_is_seen():
     rng = np.random.default_rng(3)
     for _ in range(3):
