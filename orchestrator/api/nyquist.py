@@ -121,10 +121,17 @@ class Asked:
         values = self._given | dict(changed)
         of_case = {name: v for name, v in values.items() if self._of_case and (self._device is None or "." in name)}
         network: Path | PreparedScenario | None = None if self._rest.get("scr") is not None else Path(self._case)
-        if self._of_case:
-            network = network_of(self._case, self._scenario, of_case, trust_fmus=self._trust)
+        network = self._prepared(of_case) if self._of_case else network
         of_fmu = {name: v for name, v in values.items() if name not in of_case}
         return CutRequest(self._device, network, values=of_fmu, **self._rest)
+
+    def _prepared(self, values: Mapping[str, Any]) -> PreparedScenario:
+        from orchestrator.api.scenario import choose  # noqa: PLC0415 - scans need no cases
+        from orchestrator.cases.case import load_case  # noqa: PLC0415
+        from orchestrator.study.request import ScenariosRequest  # noqa: PLC0415
+
+        asked, names = ScenariosRequest(values=case_values(values)), [self._scenario] if self._scenario else []
+        return choose(replace(load_case(self._case, trust_fmus=self._trust), scans=True), names, asked)[0].prepared
 
     def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
         """Judge it."""
@@ -157,28 +164,3 @@ def _range(x: Parameter) -> Tunable:
 def is_case(text: str) -> bool:
     """Whether a side is a case, and no scan, FMU or DLL."""
     return Path(text).suffix.lower() not in (*ENDINGS, ".fmu", ".so", ".dll")
-
-
-def network_of(
-    case: str, scenario: str | None, values: Mapping[str, Any], *, trust_fmus: bool = False
-) -> PreparedScenario:
-    """The scenario that is cut.
-
-    Parameters
-    ----------
-    case
-        A built-in case, or a path.
-    scenario
-        Its name; the case's first where None.
-    values
-        ``component.parameter`` of the case.
-    trust_fmus
-        As for `load`.
-    """
-    from orchestrator.api.scenario import choose  # noqa: PLC0415 - scans need no cases
-    from orchestrator.cases.case import load_case  # noqa: PLC0415
-    from orchestrator.study.request import ScenariosRequest  # noqa: PLC0415
-
-    asked = ScenariosRequest(values=case_values(values))
-    file = replace(load_case(case, trust_fmus=trust_fmus), scans=True)
-    return choose(file, [scenario] if scenario else [], asked)[0].prepared

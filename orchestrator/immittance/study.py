@@ -25,7 +25,7 @@ from orchestrator.immittance.placing import at_ports, check_held, in_one_frame, 
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
-from orchestrator.immittance.strength import Critical, SourceBehind, converters_scr, critical, short_circuit_mva
+from orchestrator.immittance.strength import Critical, SourceBehind, critical, strengths_of
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class CutResult:
     unit: str
     questions: tuple[str, ...]
     # short_circuit, rating: of the network at the cut and of the device [MVA]; None where they are not known
-    short_circuit: float | None = None
     rating: float | None = None
+    short_circuit: float | None = None
     # ratios, gscr: SCR of the converters at a bus of the case, and generalised ratio of all of them
     ratios: Mapping[str, float] = field(default_factory=dict)
     gscr: float | None = None
@@ -215,8 +215,8 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     if cut is not None and closed:
         judgement = beside_modes(judgement, cut)
     prepared = request.network if isinstance(request.network, PreparedScenario) and request.scr is None else None
-    short = short_circuit_mva(network, request.frequency, base, prepared, cut.bus if cut else "")
-    return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating, *converters_scr(prepared))
+    strengths = strengths_of(network, request.frequency, base, prepared, cut.bus if cut else "")
+    return CutResult(request, loop, judgement, scans, cut, unit, questions, rating, *strengths)
 
 
 def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cut, dict[str, Scan], bool, float]:

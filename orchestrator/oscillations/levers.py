@@ -1,7 +1,8 @@
 """Which damping controllers move a mode: each in turn is switched the other way in the running system."""
 
 import re
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,18 +19,12 @@ _SWITCH = re.compile(r"(pod_p|pod_q|pss)\.enabled")
 _NEAR, _NAMED = 0.15, 3  # relative distance of a case's mode from what was seen; controllers in a sentence
 
 
-@dataclass(frozen=True)
-class Lever:
-    controller: str
-    on: bool  # now
-    damping_percent: float  # of the mode with it switched the other way
-
-
-def levers_of(prepared: PreparedScenario, hertz: float) -> tuple[complex, list[Lever]]:
-    """The eigenvalue [rad/s] nearest to an oscillation, and the controllers, the one that moves it most first."""
+def levers_of(prepared: PreparedScenario, hertz: float) -> tuple[complex, list[dict[str, Any]]]:
+    """The eigenvalue [rad/s] nearest to an oscillation; controllers, whether they are on, and its damping with each
+    switched the other way, the one that moves it most first."""
     with running(prepared) as master:
         find_operating_point(master)
-        blocks, found = Blocks(master), list[tuple[float, Lever]]()
+        blocks, found = Blocks(master), list[tuple[float, str, dict[str, Any]]]()
         mode = pair_at(model_of(master, blocks), 2j * np.pi * hertz)
         for name, component in master.components.items():
             for variable in filter(_SWITCH.fullmatch, component.description.variables):
@@ -37,9 +32,9 @@ def levers_of(prepared: PreparedScenario, hertz: float) -> tuple[complex, list[L
                 with changed(master, {key: not on}, {key: on}):
                     varied = model_of(master, blocks.with_component(master, name))
                 now = max(pairs_near(varied, mode.eigenvalue), key=mode.similarity).eigenvalue
-                lever = Lever(key.removesuffix(".enabled"), on, damping_percent(now))
-                found.append((-abs(now - mode.eigenvalue), lever))
-    return mode.eigenvalue, [lever for _, lever in sorted(found, key=lambda x: (x[0], x[1].controller))]
+                lever = {"controller": key.removesuffix(".enabled"), "on": on, "damping_percent": damping_percent(now)}
+                found.append((-abs(now - mode.eigenvalue), key, lever))
+    return mode.eigenvalue, [lever for *_, lever in sorted(found, key=lambda x: x[:2])]
 
 
 def with_levers(prepared: PreparedScenario, one: Located) -> Located:
@@ -49,8 +44,9 @@ def with_levers(prepared: PreparedScenario, one: Located) -> Located:
     mode, levers = levers_of(prepared, one.found.frequency)
     if abs(mode.imag / (2 * np.pi) / one.found.frequency - 1) > _NEAR:
         return replace(one, advice=f"{one.advice}; the case has no mode near")
-    said = [f"{x.controller} switched {'off' if x.on else 'on'} makes that {x.damping_percent:.2f} %" for x in levers]
-    there = f"the case's mode there has {damping_percent(mode):.2f} % of damping; {'; '.join(said[:_NAMED])}"
+    said = ["{} switched {} makes that {:.2f} %".format(x["controller"], ("on", "off")[x["on"]], x["damping_percent"])
+            for x in levers[:_NAMED]]  # fmt: skip
+    there = f"the case's mode there has {damping_percent(mode):.2f} % of damping; {'; '.join(said)}"
     none = "no POD or PSS is there; `gfor site CASE` tells where one helps"
     advice = f"damp the mode, which nothing drives: {there if levers else none}"
-    return replace(one, advice=advice, controllers=tuple(asdict(x) for x in levers))
+    return replace(one, advice=advice, controllers=tuple(levers))

@@ -9,7 +9,8 @@ from orchestrator.immittance import loop as looping
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.poles import unstable_poles
-from orchestrator.immittance.sides import Sampled
+from orchestrator.immittance.sides import Exact, Sampled
+from orchestrator.immittance.strength import SourceBehind
 from tests.immittance import plants
 from tests.immittance.plants import OMEGA, Line, Noise, constant_power, eigenvalues, is_stable
 
@@ -139,6 +140,22 @@ def test_without_the_test_of_poles_a_negative_count_is_no_verdict(monkeypatch):
     found = judged(plant, line)
     assert found.verdict == "not known"
     assert any("against the clock" in reason for reason in found.reasons)
+
+
+def test_unstable_poles_of_a_model_count_for_what_encirclements_take_away():
+    """The device at R + jX by its model; with a direct conductance the loop does not end, and nothing is known."""
+    w, R, X = 2 * np.pi * 5, 0.3, 0.6
+    for C, truth in ((0.6, 0), (0.05, 2)):
+        A, B = w * (plants.J + 0.05 * np.eye(2)), w * np.eye(2)
+        fed = (R * np.eye(2) + X * plants.J) * C + X / OMEGA * C * A
+        closed = A - B @ np.linalg.solve(np.eye(2) + X / OMEGA * C * B, fed)
+        assert (np.linalg.eigvals(closed).real > 0).sum() == truth
+        device, line = Exact("model", A, B, C * np.eye(2), np.zeros((2, 2))), SourceBehind("line", R, X, OMEGA)
+        found = judge_loop(CutLoop(device, line))
+        assert (found.verdict, found.growing) == ("unstable" if truth else "stable", truth)
+        assert (found.encirclements, len(found.open_loop)) == (truth - 2, 2)
+    found = judge_loop(CutLoop(replace(device, D=0.5 * np.eye(2)), line))
+    assert "not yet where it ends" in found.reasons[0]
 
 
 def test_a_capacitor_inside_the_scan_whose_rated_frequency_is_left_out():

@@ -22,8 +22,8 @@ def case():
 def test_controllers_switched_on_are_those_of_the_scenarios_that_have_them(case):
     _, (first, second) = levers_of(case.scenario("gfor").prepared, 0.58)
     for lever in (first, second):
-        own = case.scenario(lever.controller.removeprefix("gfor.")).modes().result.electromechanical
-        assert (lever.on, lever.damping_percent) == (False, pytest.approx(own.damping_percent, rel=1e-3))
+        own = case.scenario(lever["controller"].removeprefix("gfor.")).modes().result.electromechanical
+        assert (lever["on"], lever["damping_percent"]) == (False, pytest.approx(own.damping_percent, rel=1e-3))
 
 
 def test_what_is_forced_gets_no_advice_on_damping_and_a_mode_that_is_far_none_either(case):
