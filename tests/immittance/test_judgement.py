@@ -233,3 +233,12 @@ def test_a_gain_at_which_it_grows_without_a_swing_is_a_margin():
     for k, stable in ((0.995, True), (1.005, False)):
         scaled = replace(line, R=k * margin.value * line.R, L=k * margin.value * line.L)
         assert is_stable(plant, scaled) == stable
+
+
+def test_a_mode_of_a_model_that_is_narrower_than_any_grid_is_seen(monkeypatch):
+    """Damped by 1e-6 of its frequency, it grows at the line as slowly."""
+    plant = narrow(1e-6, f_0=20.0, size=200.0)
+    loop = CutLoop(Exact("model", plant.A, plant.B, plant.C, np.zeros((2, 2))), SourceBehind("line", 0.02, 0.8, OMEGA))
+    assert (judge_loop(loop).verdict, judge_loop(loop).growing) == ("unstable", 2)
+    monkeypatch.setattr("orchestrator.immittance.loop._NARROW", 0.0)
+    assert judge_loop(loop).growing != 2
