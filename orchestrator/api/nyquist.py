@@ -1,6 +1,7 @@
 """Whether a device is stable at a network, by the generalised Nyquist criterion."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -120,10 +121,17 @@ class Asked:
         values = self._given | dict(changed)
         of_case = {name: v for name, v in values.items() if self._of_case and (self._device is None or "." in name)}
         network: Path | PreparedScenario | None = None if self._rest.get("scr") is not None else Path(self._case)
-        if self._of_case:
-            network = network_of(self._case, self._scenario, of_case, trust_fmus=self._trust)
+        network = self._prepared(of_case) if self._of_case else network
         of_fmu = {name: v for name, v in values.items() if name not in of_case}
         return CutRequest(self._device, network, values=of_fmu, **self._rest)
+
+    def _prepared(self, values: Mapping[str, Any]) -> PreparedScenario:
+        from orchestrator.api.scenario import choose  # noqa: PLC0415 - scans need no cases
+        from orchestrator.cases.case import load_case  # noqa: PLC0415
+        from orchestrator.study.request import ScenariosRequest  # noqa: PLC0415
+
+        asked, names = ScenariosRequest(values=case_values(values)), [self._scenario] if self._scenario else []
+        return choose(replace(load_case(self._case, trust_fmus=self._trust), scans=True), names, asked)[0].prepared
 
     def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
         """Judge it."""
@@ -132,17 +140,17 @@ class Asked:
 
     def _settings(self, result: CutResult, given: Sequence[str]) -> list[Tunable]:
         """Parameters of the device that are not 0: all tunable ones, or those that are named."""
-        if self._device is None and isinstance(result.request.network, PreparedScenario) and result.cut is not None:
-            plans = {name: result.request.network.system.components[name] for name in result.cut.devices}
+        case = None if self._device or result.scans or result.cut is None else result.request.network
+        if isinstance(case, PreparedScenario) and result.cut is not None:
+            plans = {name: case.system.components[name] for name in result.cut.devices}
             found = parameters_in({n: p.description for n, p in plans.items()}, lambda n, v: plans[n].number(v), given)
-        elif self._device is not None and self._device.suffix.lower() not in ENDINGS:
+        elif self._device and self._device.suffix.lower() not in ENDINGS:
             fmu, values = bound_fmu(self._device, result.request.binding), result.request.values
             patterns = [f"{_FMU}{name}" for name in given]
             found = parameters_in({_FMU[:-1]: fmu}, lambda _, v: float(values.get(v, start_of(fmu, v))), patterns)
         else:
-            raise InputError(
-                f"--retune: {self._device} is a scan and has no parameters; give the FMU, DLL or case itself"
-            )
+            scan = self._device or result.loop.device.name
+            raise InputError(f"--retune: {scan} is a scan and has no parameters; give the FMU, DLL or case itself")
         return [_range(x) for x in found if x.value]
 
 
@@ -156,27 +164,3 @@ def _range(x: Parameter) -> Tunable:
 def is_case(text: str) -> bool:
     """Whether a side is a case, and no scan, FMU or DLL."""
     return Path(text).suffix.lower() not in (*ENDINGS, ".fmu", ".so", ".dll")
-
-
-def network_of(
-    case: str, scenario: str | None, values: Mapping[str, Any], *, trust_fmus: bool = False
-) -> PreparedScenario:
-    """The scenario that is cut.
-
-    Parameters
-    ----------
-    case
-        A built-in case, or a path.
-    scenario
-        Its name; the case's first where None.
-    values
-        ``component.parameter`` of the case.
-    trust_fmus
-        As for `load`.
-    """
-    from orchestrator.api.scenario import choose  # noqa: PLC0415 - scans need no cases
-    from orchestrator.cases.case import load_case  # noqa: PLC0415
-    from orchestrator.study.request import ScenariosRequest  # noqa: PLC0415
-
-    asked = ScenariosRequest(values=case_values(values))
-    return choose(load_case(case, trust_fmus=trust_fmus), [scenario] if scenario else [], asked)[0].prepared

@@ -17,6 +17,9 @@ _NATIVE = "native"
 PARTS = ("machine", "exciter", "governor", "stabilizer")
 """Keys of a component's table, of ``[units]`` and columns of its file that choose the parts of a generator."""
 
+STAND_IN = "static_generation"
+"""The neutral device: the current of the operating point, which turns with the voltage, and no other dynamics."""
+
 Place = Callable[[str], str]  # key → where it is written
 
 

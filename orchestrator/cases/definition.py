@@ -40,6 +40,7 @@ class CaseDefinition:
     # how units share what given values take out of service, such as ``sg5.connected = false``; as the file says where
     # None.
     sharing: SharingRule | None = None
+    scans: bool = False  # whether a component may be a scan: only for what needs neither its states nor a run
     injections: bool = False  # whether the grid takes a current besides at every bus; see `Network.injections`
 
     @property

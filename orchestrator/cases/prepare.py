@@ -7,9 +7,10 @@ from fmus.grid.network import Network
 from fmus.toolchain.catalogue import model_names, network_of, parts_of
 from fmus.toolchain.extras import installed_version
 from orchestrator.binding.binding import bound_fmu
+from orchestrator.cases import component_forms
 from orchestrator.cases.areas import in_two_areas
 from orchestrator.cases.assignment import assign_values
-from orchestrator.cases.build_choices import MODELS, PARTS
+from orchestrator.cases.build_choices import MODELS, PARTS, STAND_IN
 from orchestrator.cases.case_network import check_network_is_used, find_network, read_network, takes_network
 from orchestrator.cases.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
 from orchestrator.cases.contradictions import doubts
@@ -190,16 +191,12 @@ class Preparer:
         where = self.draft.given.place("components", name)
         if takes_network(table) and self.draft.found.network_failed:
             return
-        if sum(given is not None for given in (table.model, table.fmu, table.dll)) != 1:
-            self.draft.note(
-                where,
-                "give either 'model' (a model of the catalogue), 'fmu' (the path of an .fmu) or 'dll' (of a vendor's "
-                "DLL, or of the file that lays a circuit around one)",
-            )
+        if wrong := component_forms.wrong(table):
+            self.draft.note(where, wrong)
             return
-        if table.binding is not None and table.file is None:
-            self.draft.note(where, "'binding' is for an FMU of others; give its path as 'fmu', or remove 'binding'")
-            return
+        if table.scan is not None and not self._case.scans:
+            text = component_forms.NO_STATES.format(name, self.draft.given.source)
+            self.draft.note(self.draft.given.place("components", name, "scan"), text)
         try:
             description = self._description(name, table, self._is_native(name, table), self._parts(name, table))
             self._check_trust(name, table)
@@ -282,7 +279,8 @@ class Preparer:
             raise InputError(
                 f"the model {table.model!r} needs a [network] table and a [power_flow] table that names this component"
             )
-        planned = plan_fmu(table.model or "", self.draft.network if own else None, native, parts)
+        model = STAND_IN if table.scan is not None else table.model or ""  # a scan's current keeps the operating point
+        planned = plan_fmu(model, self.draft.network if own else None, native, parts)
         self._planned[name] = planned
         return planned.description
 

@@ -41,6 +41,7 @@ Seconds = Annotated[float, BeforeValidator(_in("s")), Field(allow_inf_nan=False)
 PerUnit = Annotated[float, BeforeValidator(_in("pu"))]
 Megawatt = Annotated[float, BeforeValidator(_in("MW"))]
 Megavar = Annotated[float, BeforeValidator(_in("Mvar"))]
+Kilovolt = Annotated[float, BeforeValidator(_in("kV"))]
 Hertz = Annotated[float, BeforeValidator(_in("Hz")), Field(allow_inf_nan=False)]
 Bus = Annotated[str, BeforeValidator(lambda name: str(name) if type(name) is int else name)]
 """A number is no bus' name here, but the error that there is none such names the near ones."""
@@ -63,12 +64,14 @@ class SolverTable(Table):
 
 
 class ComponentTable(Table):
-    """An FMU file or a vendor's DLL, behind a binding or not, or a model of the catalogue, with its values; ``vendor``
-    is whose make it is."""
+    """An FMU file or a vendor's DLL, behind a binding or not, a model of the catalogue, or a scan and the rated voltage
+    at its bus, with values; ``vendor`` is whose make it is."""
 
     model: str | None = None
     fmu: str | None = None
     dll: str | None = None
+    scan: str | None = None
+    voltage: Kilovolt | None = Field(default=None, gt=0, allow_inf_nan=False)
     binding: str | None = None
     isolated: bool | None = None
     vendor: str | None = Field(default=None, min_length=1)

@@ -103,6 +103,15 @@ class ShortCircuit:
             found.append(BusStrength(bus, float(power), x_r, tuple(here), rating_mva or own))
         return found
 
+    def gscr(self) -> float | None:
+        """Generalised short-circuit ratio of all converters together; that of the only one is its SCR. None without."""
+        if not self.converters:
+            return None
+        k = [self.buses.index(place) for place, _ in self.converters.values()]
+        shares = np.array([S_n for _, S_n in self.converters.values()]) / SYSTEM_BASE_MVA
+        Z = np.linalg.inv(self._admittances())[np.ix_(k, k)]
+        return float(1 / np.abs(np.linalg.eigvals(Z * shares)).max())
+
     def power_at(self, bus: str, factor: float = 1.0) -> float:
         """Short-circuit power of a bus [MVA] with the impedances of all branches that end there times a factor."""
         lines = [replace(x, R=x.R * factor, X=x.X * factor) if bus in (x.from_bus, x.to_bus) else x for x in self.lines]

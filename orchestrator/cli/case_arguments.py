@@ -1,6 +1,7 @@
 """The arguments of every command on a case."""
 
 import argparse
+from dataclasses import replace
 from typing import Any
 
 from orchestrator.api.scenario import Scenario, choose
@@ -52,6 +53,7 @@ def case_of(options: argparse.Namespace) -> Case:
 def chosen(options: argparse.Namespace) -> list[Scenario]:
     events = [getattr(options, name, ()) for name in ("force", "fault")]
     file, stop = with_events(case_of(options), *events), getattr(options, "stop", None)
+    file = replace(file, scans=getattr(options, "scans", False))
     asked: dict[str, Any] = {name: getattr(options, name, None) for name in ("schedule", "tolerance", "sharing")}
     asked["sharing"] = SharingRule(asked["sharing"]) if asked["sharing"] else None
     asked |= {"values": values_set(options), "step": options.step, "parameters": parameters(options)}

@@ -17,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "scr")
     add_json_argument(parser)
     add_kept_argument(parser, "scr")
+    parser.set_defaults(scans=True)
 
 
 def run(options: argparse.Namespace) -> int:

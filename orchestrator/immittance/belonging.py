@@ -62,9 +62,10 @@ def _check_point(what: str, a: PortPoint, other: str, b: PortPoint) -> None:
             )
 
 
-def check_place(scan: Scan, cut: Cut, kilovolt: float | None) -> None:
-    """Refuse a scan at another operating point than the case's."""
-    (name,) = cut.devices
+def check_place(scan: Scan, cut: Cut, name: str, kilovolt: float | None) -> None:
+    """Refuse a scan of several ports, or at another operating point than a component's in the case."""
+    if len(scan.ports) > 1:
+        raise InputError(f"{scan.source}: it has the ports {', '.join(scan.ports)}, and {name} stands at one bus")
     power = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_BASE_MVA
     here = PortPoint(abs(cut.voltages[name]) * kilovolt if kilovolt else None, power.real, power.imag)
     for point in scan.points.values():

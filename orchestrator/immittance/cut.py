@@ -17,7 +17,7 @@ from orchestrator.cases.facts import rated_frequency
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.coupling.master import Master
 from orchestrator.errors import InputError
-from orchestrator.immittance.sides import Behind, Exact, Rows, Together, Unit
+from orchestrator.immittance.sides import Behind, Exact, Rows, Sampled, Together, Unit
 from orchestrator.study.modes import running
 
 _PORT = ("v_re", "v_im"), ("i_re", "i_im")
@@ -30,7 +30,7 @@ class Cut:
 
     devices: tuple[str, ...]
     # device, network: admittance of the devices, with currents into them, and impedance of the rest at their buses.
-    device: Exact | Together
+    device: Exact | Together | Sampled
     network: Exact | Behind
     modes_stable: bool | None
     # voltages, currents: at the operating point, by device; currents out of it.

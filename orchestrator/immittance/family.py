@@ -88,6 +88,7 @@ class Family:
     poles: tuple[int, ...]  # unstable poles of the open loop, at each node
     exact: bool
     rated: float  # [rad/s]
+    lead: float = 0.0  # as of `CutLoop`
 
     def at(self, value: float) -> LoopPath:
         here = np.flatnonzero(self.nodes == value)
@@ -121,10 +122,10 @@ class Family:
     def without(self, value: float) -> "Family":
         kept = self.nodes != value
         return Family(self.nodes[kept], self.s, self.loops[kept], tuple(np.array(self.poles)[kept].tolist()),
-                       self.exact, self.rated)  # fmt: skip
+                       self.exact, self.rated, self.lead)  # fmt: skip
 
     def _path(self, L: Complex) -> LoopPath:
-        return LoopPath(self.s, L, followed(np.linalg.eigvals(L)))
+        return LoopPath(self.s, L, followed(np.linalg.eigvals(L)), self.lead)
 
     def _mixed(self, value: float, support: list[int], weights: Complex) -> Complex:
         shares = weights / (value - self.nodes[support])

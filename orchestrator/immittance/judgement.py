@@ -21,6 +21,7 @@ _END, _SMALL = 1.5, 0.95
 _BEGIN = np.deg2rad(60.0)
 """Furthest phase of det(1 + L) at the lowest frequency from the real axis, on which it begins at 0 Hz."""
 
+_SETTLED = 1.5  # growth of det(1 + L) over the last half of the range of models from which on it does not end there
 _INVARIANT = 1e-3
 _FRAMES = 16
 
@@ -137,7 +138,7 @@ def encirclements(path: LoopPath, *, exact: bool) -> tuple[int, int]:
 def _count(path: LoopPath, turns: Numbers, exact: bool) -> int:
     """Clockwise encirclements of the whole axis, of which the path is the upper half, from all turns on it."""
     first, last = _principal(path, 0), _principal(path, -1)
-    begin = np.pi * round(first / np.pi)
+    begin = np.pi * round((first - path.lead) / np.pi)
     end = np.pi * round(last / np.pi) if exact else 0.0
     return -round(float(first - begin + turns.sum() - (last - end)) / np.pi)
 
@@ -174,12 +175,12 @@ def _resolution(loop: CutLoop, path: LoopPath) -> list[str]:
 def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
     """Whether an encirclement may lie below the lowest or beyond the highest frequency."""
     reasons = []
-    first = _principal(path, 0)
+    first = _principal(path, 0) - path.lead
     if abs(first - np.pi * round(first / np.pi)) > _BEGIN:
         reasons.append(f"at {path.hertz[0]:g} Hz the loop is not yet where it begins: scan lower frequencies")
     if loop.is_exact:
-        last = _principal(path, -1)
-        if abs(last - np.pi * round(last / np.pi)) > _BEGIN:
+        last, half = _principal(path, -1), int(np.argmax(path.hertz >= path.hertz[-1] / 2))
+        if abs(last - np.pi * round(last / np.pi)) > _BEGIN or abs(path.det[-1] / path.det[half]) > _SETTLED:
             reasons.append(f"at {path.hertz[-1]:g} Hz the loop is not yet where it ends")
         return reasons
     top = path.hertz >= path.hertz[-1] / _END

@@ -17,6 +17,7 @@ _ROUNDS, _MOST, _AT_ONCE = 14, 60_000, 500
 _ROUND = 1e-6  # radius of the way round an undamped pole of a model, relative to it
 _NARROW = 0.5  # poles damped by less than this part have points of their own
 _WITHIN, _ENOUGH = 6, 1000  # points between two frequencies at first, unless there are enough of them
+_FALLS = 0.3  # part to which det(1 + L) of a free angle falls at least from 1e-3 to 1e-4 rad/s
 _ARC = 1e-4  # radius of the way round a pole on the axis, relative to the pole
 
 
@@ -50,6 +51,7 @@ class LoopPath:
     # L, loci: shapes (f, n, n) and (f, n); each column of ``loci`` is one eigenvalue followed along the way.
     L: Complex
     loci: Complex
+    lead: float = 0.0  # as of `CutLoop`
 
     @property
     def hertz(self) -> Numbers:
@@ -110,6 +112,9 @@ class CutLoop:
     device: Side
     network: Side
     capacitors: SeriesCapacitors | None = None
+    # of det(1 + L) before the real axis at the lowest frequency of a scan [rad]: a quarter turn where an angle is free,
+    # so that it begins as c·s
+    lead: float = 0.0
 
     @property
     def is_exact(self) -> bool:
@@ -128,6 +133,12 @@ class CutLoop:
     def values(self, s: Vector) -> Complex:
         """L at points on the axis, or close beside it."""
         return np.asarray(self.impedance(s) @ self.device.at(s))
+
+    @property
+    def lead_at_rest(self) -> float:
+        """The lead of a loop of two models: a quarter turn where det(1 + L) falls as s does."""
+        slow, slower = np.abs(_det(self.values(np.array([1e-3j, 1e-4j]))))
+        return np.pi / 2 if slower < _FALLS * slow else 0.0
 
     def impedance(self, s: Vector) -> Complex:
         Z = self.network.at(s)
@@ -154,7 +165,7 @@ class CutLoop:
         path: LoopPath | None = None
         for _ in range(_ROUNDS):
             wide = (np.abs(np.angle(marks[1:] / marks[:-1])) > most).any(axis=1)
-            path = None if wide.any() else LoopPath(s, L, followed(np.linalg.eigvals(L)))
+            path = None if wide.any() else LoopPath(s, L, followed(np.linalg.eigvals(L)), self.lead)
             places = np.flatnonzero(wide if path is None else np.abs(path.loci_turns - path.turns) > _ALIKE)
             if not len(places) or len(s) > _MOST:
                 break
@@ -162,7 +173,7 @@ class CutLoop:
             more = self.values(middle)
             s = np.insert(s, places + 1, middle)
             L, marks = (np.insert(a, places + 1, b, axis=0) for a, b in ((L, more), (marks, self._marks(more))))
-        return path if path and len(path.s) == len(s) else LoopPath(s, L, followed(np.linalg.eigvals(L)))
+        return path if path and len(path.s) == len(s) else LoopPath(s, L, followed(np.linalg.eigvals(L)), self.lead)
 
     def _on_axis(self, low: float, high: float) -> Numbers:
         """Undamped poles of the exact sides [rad/s], those of one place once."""

@@ -32,7 +32,7 @@ def scan_fmu(
 
 
 def as_scan(name: str, response: FrequencyResponse, voltage: complex, kilovolt: float = 1.0) -> Scan:
-    """The admittance of a measured response in the network's frame, dense where the model fitted to it turns quickly.
+    """The admittance of a measured response, d along the voltage, dense where the model fitted to it turns quickly.
 
     Its bounds hold what two amplitudes differ by and what the model misses of the measured values."""
     model, measured = fit(response), response.frequencies
@@ -46,9 +46,10 @@ def as_scan(name: str, response: FrequencyResponse, voltage: complex, kilovolt: 
     size = np.linalg.norm(values, ord=2, axis=(1, 2))
     bounds = np.linalg.norm(response.bounds, axis=(1, 2)) / np.linalg.norm(response.values, ord=2, axis=(1, 2))
     power = voltage * complex(*response.operating_point).conjugate() * SYSTEM_BASE_MVA
-    point = PortPoint(abs(voltage) * kilovolt, power.real, power.imag, angle=0.0)  # in the network's frame already
+    point = PortPoint(abs(voltage) * kilovolt, power.real, power.imag, cmath.phase(voltage))
     share = np.interp(frequencies, measured, bounds) + model.error
-    return Scan(name, frequencies, values, (name,), PER_UNIT, share * size, {name: point})
+    in_network = Scan(name, frequencies, values, (name,), PER_UNIT, share * size, {name: point})
+    return in_network.rotated([-cmath.phase(voltage)])
 
 
 def _without_hold(model: IdentifiedModel, s: Vector) -> Complex:

@@ -125,8 +125,8 @@ def _family(out: Retuned, values: list[float] | None = None) -> Family:
     s = s[(s.imag >= low) & (s.imag <= high)]
     loops = np.array([result.loop.values(s) for result in results])
     poles = tuple(len(result.judgement.open_loop) for result in results)
-    rated = 2 * np.pi * results[0].request.frequency
-    return Family(np.array(nodes), s, loops, poles, results[0].loop.is_exact, rated)
+    rated, loop = 2 * np.pi * results[0].request.frequency, results[0].loop
+    return Family(np.array(nodes), s, loops, poles, loop.is_exact, rated, loop.lead)
 
 
 def _end(study: Study, out: Retuned, end: float, report: Callable[[str], None]) -> float:

@@ -91,6 +91,17 @@ class Sampled:
         return np.pad(np.minimum(factor * small, large + 10 * small) + rounding, 2, mode="edge")
 
 
+@dataclass(frozen=True)
+class Several(Sampled):
+    """Some scans at their rows of one matrix. Unstable poles are sought in each, where no other covers them."""
+
+    parts: tuple[Sampled, ...] = ()
+
+    @cached_property
+    def unstable(self) -> tuple[complex, ...]:
+        return tuple(pole for part in self.parts for pole in part.unstable)
+
+
 def _lagrange(f: Numbers, values: Vector, at: Numbers, places: Vector) -> Complex:
     """Polynomials through values at some places (n, m), evaluated at n frequencies."""
     nodes = f[places]

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -89,22 +88,19 @@ class SourceBehind:
         return np.zeros(len(s))
 
 
-def converters_scr(prepared: PreparedScenario | None) -> dict[str, float]:
-    """SCR of the converters by bus, of a case with a power flow."""
-    if prepared is None or prepared.network is None or prepared.power_flow is None:
-        return {}
-    return {b.bus: b.scr for b in ShortCircuit.of(prepared).strengths() if b.scr is not None}
-
-
-def short_circuit_mva(network: Side, hertz: float, base: float | None, prepared: Any, bus: str) -> float | None:
-    """Short-circuit power at a cut; of a case with a power flow as `gfor scr` has it, else of the impedance that the
-    network has up to the rated frequency. None where it has no one impedance, or its base is not known."""
+def strengths_of(
+    network: Side, hertz: float, base: float | None, prepared: PreparedScenario | None, bus: str
+) -> tuple[float | None, dict[str, float], float | None]:
+    """Short-circuit power at a cut [MVA], SCR of the converters by bus, and gSCR of all of them; of a case without a
+    power flow the first alone, of the network's impedance up to the rated frequency, where it is one."""
     if prepared is not None and prepared.network is not None and prepared.power_flow is not None:
-        found = {b.bus: b.s_sc_mva for b in ShortCircuit.of(prepared).strengths()}
-        return found.get(bus.rpartition(".")[2])
+        found = (whole := ShortCircuit.of(prepared)).strengths()
+        here = next((b.s_sc_mva for b in found if b.bus == bus.rpartition(".")[2]), None)
+        return here, {b.bus: b.scr for b in found if b.scr is not None}, whole.gscr()
     low = network.frequencies[:1] if not network.is_exact else np.array([1e-3])
     Z = network.at(2j * np.pi * np.append(low, max(0.9 * hertz, low[0])))
     if base is None or Z.shape[1] != 2:
-        return None
+        return None, {}, None
     X, R = (Z[:, 1, 0] - Z[:, 0, 1]).real / 2, (Z[0, 0, 0] + Z[0, 1, 1]).real / 2
-    return base / math.hypot(R, X[0]) if X[0] > 0 and abs(X[1] - X[0]) < _ALIKE * X[0] else None
+    one = X[0] > 0 and abs(X[1] - X[0]) < _ALIKE * X[0]
+    return (base / math.hypot(R, X[0]) if one else None), {}, None

@@ -15,16 +15,17 @@ from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.black_box.port import start_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
-from orchestrator.immittance.belonging import beside_modes, check_pair, check_place, check_size
+from orchestrator.immittance.belonging import beside_modes, check_pair, check_size
 from orchestrator.immittance.cut import Cut, cut_of
 from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judge_loop
 from orchestrator.immittance.loop import NO_MODES, CutLoop, SeriesCapacitors, common_range
 from orchestrator.immittance.margins import NyquistMargins, margins_json
 from orchestrator.immittance.measured import scan_fmu
+from orchestrator.immittance.placing import at_ports, check_held, in_one_frame, in_unit, placed, sampled, scans_in
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
-from orchestrator.immittance.strength import Critical, SourceBehind, converters_scr, critical, short_circuit_mva
+from orchestrator.immittance.strength import Critical, SourceBehind, critical, strengths_of
 
 
 @dataclass(frozen=True)
@@ -65,9 +66,11 @@ class CutResult:
     unit: str
     questions: tuple[str, ...]
     # short_circuit, rating: of the network at the cut and of the device [MVA]; None where they are not known
-    short_circuit: float | None = None
     rating: float | None = None
-    ratios: Mapping[str, float] = field(default_factory=dict)  # SCR of the converters at a bus of the case
+    short_circuit: float | None = None
+    # ratios, gscr: SCR of the converters at a bus of the case, and generalised ratio of all of them
+    ratios: Mapping[str, float] = field(default_factory=dict)
+    gscr: float | None = None
 
     @property
     def scr(self) -> float | None:
@@ -93,7 +96,7 @@ class CutResult:
     @cached_property
     def critical(self) -> list[Critical]:
         """Where the loop of a case comes near −1, and who takes part."""
-        if self.cut is None or self.request.device is not None or self.judgement.reasons:
+        if self.cut is None or self.scans or self.judgement.reasons:
             return []
         return critical(self.loop, self.judgement, self.cut)
 
@@ -111,13 +114,17 @@ class CutResult:
 
     @property
     def difference(self) -> dict[str, float] | None:
-        """Largest difference of a scan from the case's own device in its place, relative, where there is one."""
+        """Largest difference of a device from the case's own, or its scan, in its place, relative."""
         device = self.loop.device
-        if self.cut is None or not isinstance(device, Sampled) or device.values.shape[1] != 2 * len(self.cut.ports):
+        if self.cut is None or self.request.device is None or not isinstance(device, Sampled):
             return None
-        own = self.cut.device.at(2j * np.pi * device.frequencies)
-        apart = np.linalg.norm(device.values - own, ord=2, axis=(1, 2)) / np.linalg.norm(own, ord=2, axis=(1, 2))
-        return {"largest_relative": float(apart.max()), "frequency_hz": float(device.frequencies[np.argmax(apart)])}
+        low, high = common_range(device, self.cut.device, (0.0, 0.0))
+        inside = (device.frequencies >= low) & (device.frequencies <= high)
+        f, own = device.frequencies[inside], self.cut.device.at(2j * np.pi * device.frequencies[inside])
+        if not len(f):
+            return None
+        apart = np.linalg.norm(device.values[inside] - own, ord=2, axis=(1, 2)) / np.linalg.norm(own, 2, axis=(1, 2))
+        return {"largest_relative": float(apart.max()), "frequency_hz": float(f[np.argmax(apart)])}
 
     def as_json(self) -> dict[str, Any]:
         """Verdict and figures as JSON's types."""
@@ -135,12 +142,13 @@ class CutResult:
             "growing_modes": j.growing,
             "encirclements": {"determinant": j.encirclements, "eigenloci": j.by_loci},
             "open_loop_unstable_poles": [{"real": p.real, "imag": p.imag} for p in j.open_loop],
-            "modes_stable": None if self.cut is None or self.request.device else self.cut.modes_stable,
+            "modes_stable": None if self.cut is None or self.scans else self.cut.modes_stable,
             "crossings": [{"real": c.real, "frequency_hz": c.frequency_hz} for c in j.crossings],
             "margins": margins_json(self.margins),
             "buses": self._buses_json(),
             "critical": [vars(one) for one in self.critical],
-            "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit},
+            "strength": {"short_circuit_mva": self.short_circuit, "scr": self.scr, "scr_limit": self.scr_limit,
+                         "gscr": self.gscr},
             "difference_from_case": self.difference,
             "active_hz": {side: [list(band) for band in bands] for side, bands in j.active.items()},
             "small_gain_hz": [list(band) for band in j.small_gain],
@@ -166,62 +174,79 @@ class CutResult:
 
 def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) -> CutResult:
     """Bring both sides into one unit and one frame, and judge their loop."""
-    cut = None
+    cut, scans, known, unit, lead = None, dict[str, Scan](), True, PER_UNIT, 0.0
     if isinstance(request.network, PreparedScenario):
-        cut = cut_of(request.network, request.bus, request.components)
-        request = replace(request, frequency=cut.rated_hz or request.frequency)
-    scans: dict[str, Scan] = {}
+        request, cut, scans, known, lead = _opened(request, request.network)
     if request.device is not None:
         if cut is not None and len(cut.devices) > 1:
             raise InputError(f"the cut holds {', '.join(cut.devices)}; name the one that the scan is of by --component")
-        scans["device"] = _side(request, "device", request.device, cut, report)
+        scans = {"device": _side(request, request.device, cut, report)}
     if isinstance(request.network, Path):
-        scans["network"] = _side(request, "network", request.network, None, report)
-    units = {scan.unit for scan in scans.values()} if cut is None else {PER_UNIT}
-    unit = units.pop() if len(units) == 1 else SIEMENS
-    scans = {side: _in_unit(scan, unit, request.kilovolt) for side, scan in scans.items()}
-    known = _in_one_frame(request, scans, cut)
+        scans["network"] = _read(request, "network", request.network)
+    if cut is None:
+        units = {scan.unit for scan in scans.values()}
+        unit = units.pop() if len(units) == 1 else SIEMENS
+        scans = {side: in_unit(scan, unit, request.kilovolt) for side, scan in scans.items()}
+        known = in_one_frame(scans, request.angle)
+    elif request.device is not None:
+        scans["device"], known = placed(scans["device"], cut, cut.devices[0], request.kilovolt, request.angle)
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
-    device: Side | None = _sampled(scans["device"]) if "device" in scans else cut.device if cut else None
+    device: Side | None = sampled(scans["device"]) if "device" in scans else cut.device if cut else None
     rating, kilovolt = _rating(request, cut), request.kilovolt
     for scan in scans.values():
         kilovolt = kilovolt or next((point.kilovolt for point in scan.points.values() if point.kilovolt), None)
     base = SYSTEM_BASE_MVA if unit == PER_UNIT else kilovolt**2 if kilovolt else None
     network: Side | None = (
-        _sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
+        sampled(scans["network"], inverse=True) if "network" in scans else cut.network if cut else None
     )
     if request.scr is not None:
         network = _source(request, rating, base)
     assert device is not None
     assert network is not None
-    if cut is not None and "device" in scans:
-        check_place(scans["device"], cut, request.kilovolt)
-    if len(scans) == 2:
+    if "network" in scans:
         check_pair(scans["device"], scans["network"])
-    loop = CutLoop(device, network)
-    if (len(scans) == 2 or (scans and request.scr)) and not request.units_checked:
+    loop = CutLoop(device, network, lead=lead if scans and request.scr is None else 0.0)
+    if ("network" in scans or (scans and request.scr)) and not request.units_checked:
         check_size(loop, *common_range(device, network, (0.0, 0.0)))
     if request.compensation:
         loop = replace(loop, capacitors=_capacitors(loop, request))
-    closed = cut if request.device is None and not request.compensation and request.scr is None else None
+    closed = cut if not scans and not request.compensation and request.scr is None else None
     judgement = judge_loop(loop, frames_known=known, modes=closed.eigenvalues if closed else NO_MODES)
     if cut is not None and closed:
         judgement = beside_modes(judgement, cut)
     prepared = request.network if isinstance(request.network, PreparedScenario) and request.scr is None else None
-    short = short_circuit_mva(network, request.frequency, base, prepared, cut.bus if cut else "")
-    ratios = converters_scr(prepared) if judgement.buses else {}
-    return CutResult(request, loop, judgement, scans, cut, unit, questions, short, rating, ratios)
+    strengths = strengths_of(network, request.frequency, base, prepared, cut.bus if cut else "")
+    return CutResult(request, loop, judgement, scans, cut, unit, questions, rating, *strengths)
 
 
-def _side(request: CutRequest, side: str, path: Path, cut: Cut | None, report: Callable[[str], None] | None) -> Scan:
-    if path.suffix.lower() in ENDINGS:
-        scan = read_scan(path, request.frequency, network=side == "network")
-        scan = scan.scaled(1.0, PER_UNIT) if side in request.per_unit else scan
-        scan = scan.turned_sign() if side in request.generator else scan
-        check_sign(scan, f"--generator {side}")
-        return scan
-    if side == "network":
+def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cut, dict[str, Scan], bool, float]:
+    """The case cut where it is asked for, or at its scans; those, whether their frames are known, and the lead of what
+    a free angle makes of the loop."""
+    held, scans, sure = scans_in(case), dict[str, Scan](), [True]
+    cut = cut_of(case, request.bus, request.components or (() if request.bus else tuple(held)))
+    check_held(held, cut)
+    request = replace(request, frequency=cut.rated_hz or request.frequency)
+    for name, table in held.items():
+        scan = _read(request, "device", case.case.directory / str(table.scan))
+        scans[name], known = placed(scan, cut, name, table.voltage or request.kilovolt, request.angle)
+        sure.append(known)
+    lead = CutLoop(cut.device, cut.network).lead_at_rest
+    return request, replace(cut, device=at_ports(scans, cut)) if held else cut, scans, all(sure), lead
+
+
+def _read(request: CutRequest, side: str, path: Path) -> Scan:
+    if side == "network" and path.suffix.lower() not in ENDINGS:
         raise InputError(f"{path}: the network is a scan's file or a case; an FMU can be the device")
+    scan = read_scan(path, request.frequency, network=side == "network")
+    scan = scan.scaled(1.0, PER_UNIT) if side in request.per_unit else scan
+    scan = scan.turned_sign() if side in request.generator else scan
+    check_sign(scan, f"--generator {side}")
+    return scan
+
+
+def _side(request: CutRequest, path: Path, cut: Cut | None, report: Callable[[str], None] | None) -> Scan:
+    if path.suffix.lower() in ENDINGS:
+        return _read(request, "device", path)
     values = dict(request.values)
     if cut is not None:  # at the case's own operating point
         (name,) = cut.devices
@@ -248,39 +273,6 @@ def _source(request: CutRequest, rating: float | None, base: float | None) -> So
         raise InputError(f"--scr: a scan states no rating; give {missing}, to which the short-circuit ratio relates")
     X = base / (request.scr * rating) / math.hypot(1.0, 1 / request.x_r)
     return SourceBehind(f"a source of SCR {request.scr:g}", X / request.x_r, X, 2 * np.pi * request.frequency)
-
-
-def _in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:
-    if scan.unit == unit:
-        return scan
-    if kilovolt is None:
-        raise InputError(
-            f"{scan.source} is in {scan.unit} and the other side in {unit}: give the rated voltage at the cut, as in "
-            "--voltage '230 kV' (the base is 100 MVA)"
-        )
-    return scan.in_siemens(kilovolt) if unit == SIEMENS else scan.scaled(kilovolt**2 / SYSTEM_BASE_MVA, unit)
-
-
-def _in_one_frame(request: CutRequest, scans: dict[str, Scan], cut: Cut | None) -> bool:
-    """Turn the scans into the network's frame; whether it is known how."""
-    if "device" not in scans:
-        return True
-    if request.angle is not None:
-        scans["device"] = scans["device"].rotated([request.angle] * len(scans["device"].ports))
-        return True
-    angles = {s: [scan.points[p].angle if p in scan.points else None for p in scan.ports] for s, scan in scans.items()}
-    if any(angle is None for found in angles.values() for angle in found):
-        return False
-    for side, found in angles.items():
-        scans[side] = scans[side].rotated([angle or 0.0 for angle in found])
-    return True
-
-
-def _sampled(scan: Scan, *, inverse: bool = False) -> Sampled:
-    if not inverse:
-        return Sampled(scan.source, scan.frequencies, scan.values, scan.bounds)
-    Z = scan.impedance
-    return Sampled(scan.source, scan.frequencies, Z, scan.bounds * np.linalg.norm(Z, ord=2, axis=(1, 2)) ** 2)
 
 
 def _capacitors(loop: CutLoop, request: CutRequest) -> SeriesCapacitors:

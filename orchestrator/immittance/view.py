@@ -138,7 +138,8 @@ def _by_bus(result: CutResult) -> Iterator[RenderableType]:
         rows.append((b["bus"], ", ".join(b["devices"]), f"{m['distance']['value']:.3f}",
                      f"{m['distance']['frequency_hz']:.3f}", gain, phase, left, scr))  # fmt: skip
     if rows:
-        yield make_table("At each bus alone (SCR is no margin: devices and settings differ at one ratio)", "Bus",
+        ratios = "SCR is" if result.gscr is None else f"SCR, and gSCR of {result.gscr:.3g}, are"
+        yield make_table(f"At each bus alone ({ratios} no margin: devices and settings differ at one ratio)", "Bus",
                          "Devices", "Distance", "at [Hz]", "Gain", "Phase", "Without it", "SCR", rows=rows)  # fmt: skip
     for one in result.critical if rows else ():
         buses = _most(one.buses, "{} {:.0%}")
@@ -156,7 +157,10 @@ def _strength(result: CutResult) -> str:
     limit, d = result.scr_limit, result.judgement.margins.distance
     lost = f"; stability is lost below {limit:.3g}" if limit else ""
     said = "; no smaller one loses stability" if limit == 0 else lost
-    what = f"Short-circuit ratio {result.scr:.3g}{said}. It is no margin: devices and settings differ at one ratio"
+    of_all = "" if result.gscr is None else f", gSCR of all converters {result.gscr:.3g}"
+    what = (
+        f"Short-circuit ratio {result.scr:.3g}{of_all}{said}. It is no margin: devices and settings differ at one ratio"
+    )
     return f"{what}; the distance of {d.value:.3g} counts"
 
 
@@ -189,12 +193,12 @@ def _confirmed(x: Retuned) -> dict[str, Any] | None:
     if x.needed is None or x.predicted is None:
         return None
     result, own, cut = x.scans[x.needed], x.figures[int(np.searchsorted(x.values, x.needed))], x.scans[x.needed].cut
-    own_modes = () if cut is None or cut.modes_stable is None or result.request.device else cut.eigenvalues
+    own_modes = () if cut is None or cut.modes_stable is None or result.scans else cut.eigenvalues
     near = min(own_modes, key=lambda p: abs(p - own.mode), default=None) if own.mode else None
     return {"predicted": x.predicted.distance, "verdict": str(result.verdict), "distance": own.distance,
             "damping_percent": _number(own.damping),
             "coupled_damping_percent": None if near is None else float(-100 * near.real / abs(near)),
-            "modes_stable": None if cut is None or result.request.device else cut.modes_stable}  # fmt: skip
+            "modes_stable": None if cut is None or result.scans else cut.modes_stable}  # fmt: skip
 
 
 def retuned_table(found: Sequence[Retuned], goal: float) -> Iterator[RenderableType]:

@@ -16,9 +16,6 @@ from orchestrator.interactions.places import Place
 
 SAME_FLOW = 1e-6  # largest difference of a bus voltage [pu] between two systems at the same operating point
 
-STAND_IN = "static_generation"
-"""The neutral device: the current of the operating point, which turns with the voltage, and no other dynamics."""
-
 _OF_PLACE = ("S_n", "P_0", "Q_0", "v_0", "theta_0", "f_n", "connected")
 """Values that belong to the place and not to the device: rating, start values, frequency, breaker."""
 

@@ -5,12 +5,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from orchestrator.asked import names
+from orchestrator.cases.build_choices import STAND_IN
 from orchestrator.cases.case import Case
 from orchestrator.cases.parameter_files import ParameterFile
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable
 from orchestrator.errors import CaseError, InputError, Problem
-from orchestrator.interactions.exchange import STAND_IN, exchanged_case, require_same_flow, voltages_of
+from orchestrator.interactions.exchange import exchanged_case, require_same_flow, voltages_of
 from orchestrator.interactions.places import Place, groups_of, places_of, vendors_of
 from orchestrator.interactions.point import SystemRecord, SystemTask, compute_system
 from orchestrator.interactions.request import InteractionsRequest

@@ -163,11 +163,13 @@ class Located:
     source: str | None  # the same, where it is known that nothing else drives
     reason: str  # why it is named, or why not
     advice: str  # what would confirm the answer, or what helps
+    controllers: tuple[dict[str, Any], ...] = ()  # of a case's mode: POD and PSS, the one that moves it most first
 
     def as_json(self) -> dict[str, Any]:
         return {
             "frequency_hz": self.found.frequency, "kind": self.evidence.kind, "source": self.source,
             "drives": self.drives, "reason": self.reason, "advice": self.advice, "begin": self.found.begin,
+            "controllers": list(self.controllers),
             "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
             "evidence": asdict(self.evidence),
             "methods": [asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions],

@@ -84,7 +84,12 @@ def sources_of(
         except CosimError as error:
             remark = f"the record is compared with no models of the units: {error}"
             measured = replace(measured, remarks=(*measured.remarks, remark))
-    return Sources(measured, locate(measured, models))
+    located = locate(measured, models)
+    if models and prepared:
+        from orchestrator.oscillations.levers import with_levers  # noqa: PLC0415 - only where there is a case
+
+        located = [with_levers(prepared, x) for x in located]
+    return Sources(measured, located)
 
 
 def sources_table(found: Sequence[Sources]) -> PlainTable:

@@ -1,6 +1,7 @@
 """Short-circuit power by hand, and beside pandapower's IEC 60909 where both assume the same."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -42,6 +43,18 @@ def test_by_hand(two):
     assert z.s_sc_mva == pytest.approx(100 / (0.2 + 0.25 / 1.05**2))
     assert (x.scr, y.scr) == (None, pytest.approx(8))
     assert two.strengths(rating_mva=100.0)[0].scr == pytest.approx(10)
+
+
+def test_the_ratio_of_all_converters_together(two):
+    """Alone and at one bus it is the SCR; at two buses the least eigenvalue of S⁻¹·B, by the roots of its square."""
+    assert two.gscr() == pytest.approx(8)
+    assert replace(two, converters={"c": ("y", 50.0), "d": ("y", 150.0)}).gscr() == pytest.approx(2)
+    apart = replace(two, converters={"c": ("x", 50.0), "d": ("y", 150.0)})
+    a, b, d = 0.05, 0.15, 0.375  # 0.1·0.5; 0.1 between, times 1.5; 0.25·1.5
+    largest = (a + d + math.sqrt((a - d) ** 2 + 4 * b * 0.05)) / 2
+    assert apart.gscr() == pytest.approx(1 / largest)
+    assert apart.gscr() < min(x.scr for x in apart.strengths() if x.scr)
+    assert replace(two, converters={}).gscr() is None
 
 
 def test_a_declared_current_counts_by_its_distance(two):

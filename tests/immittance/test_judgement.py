@@ -12,7 +12,8 @@ from orchestrator.immittance import loop as looping
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
 from orchestrator.immittance.poles import unstable_poles
-from orchestrator.immittance.sides import Sampled
+from orchestrator.immittance.sides import Exact, Sampled
+from orchestrator.immittance.strength import SourceBehind
 from tests.immittance import plants
 from tests.immittance.plants import OMEGA, Line, Noise, constant_power, eigenvalues, is_stable
 
@@ -115,6 +116,13 @@ def test_an_encirclement_beyond_the_last_frequency_is_not_ruled_out():
     assert any("scan higher frequencies" in reason for reason in cut_short.reasons)
 
 
+def test_a_scan_that_begins_above_the_begin_of_the_loop_is_seen():
+    plant, line = narrow(0.2, f_0=1.0, size=4.0), Line(0.05, 0.8 / OMEGA)
+    assert judged(plant, line, np.geomspace(0.02, 1000, 400)).verdict == "stable"
+    cut_short = judged(plant, line, np.geomspace(1.0, 1000, 400))
+    assert cut_short.reasons == ("at 1 Hz the loop is not yet where it begins: scan lower frequencies",)
+
+
 def test_a_device_that_is_unstable_by_itself_is_seen():
     rng = np.random.default_rng(3)
     for _ in range(3):
@@ -135,6 +143,22 @@ def test_without_the_test_of_poles_a_negative_count_is_no_verdict(monkeypatch):
     found = judged(plant, line)
     assert found.verdict == "not known"
     assert any("against the clock" in reason for reason in found.reasons)
+
+
+def test_unstable_poles_of_a_model_count_for_what_encirclements_take_away():
+    """The device at R + jX by its model; with a direct conductance the loop does not end, and nothing is known."""
+    w, R, X = 2 * np.pi * 5, 0.3, 0.6
+    for C, truth in ((0.6, 0), (0.05, 2)):
+        A, B = w * (plants.J + 0.05 * np.eye(2)), w * np.eye(2)
+        fed = (R * np.eye(2) + X * plants.J) * C + X / OMEGA * C * A
+        closed = A - B @ np.linalg.solve(np.eye(2) + X / OMEGA * C * B, fed)
+        assert (np.linalg.eigvals(closed).real > 0).sum() == truth
+        device, line = Exact("model", A, B, C * np.eye(2), np.zeros((2, 2))), SourceBehind("line", R, X, OMEGA)
+        found = judge_loop(CutLoop(device, line))
+        assert (found.verdict, found.growing) == ("unstable" if truth else "stable", truth)
+        assert (found.encirclements, len(found.open_loop)) == (truth - 2, 2)
+    found = judge_loop(CutLoop(replace(device, D=0.5 * np.eye(2)), line))
+    assert "not yet where it ends" in found.reasons[0]
 
 
 def test_a_capacitor_inside_the_scan_whose_rated_frequency_is_left_out():
@@ -229,3 +253,12 @@ def test_capacitors_compensate_the_reactance_at_one_port():
 
 def test_a_device_that_is_a_model_has_its_frame():
     assert judgement._frames(SimpleNamespace(device=object()), None, 0) == []
+
+
+def test_a_mode_of_a_model_that_is_narrower_than_any_grid_is_seen(monkeypatch):
+    """Damped by 1e-6 of its frequency, it grows at the line as slowly."""
+    plant = narrow(1e-6, f_0=20.0, size=200.0)
+    loop = CutLoop(Exact("model", plant.A, plant.B, plant.C, np.zeros((2, 2))), SourceBehind("line", 0.02, 0.8, OMEGA))
+    assert (judge_loop(loop).verdict, judge_loop(loop).growing) == ("unstable", 2)
+    monkeypatch.setattr("orchestrator.immittance.loop._NARROW", 0.0)
+    assert judge_loop(loop).growing != 2

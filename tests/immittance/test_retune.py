@@ -13,7 +13,7 @@ from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop
 from orchestrator.immittance.retune import Retuned, Tunable, retune
 from orchestrator.immittance.sides import Sampled
-from orchestrator.immittance.strength import SourceBehind, short_circuit_mva
+from orchestrator.immittance.strength import SourceBehind, strengths_of
 from tests.immittance.plants import OMEGA, Line, constant_power, eigenvalues, is_stable
 
 F = np.geomspace(0.1, 1000, 300)
@@ -104,6 +104,6 @@ def test_a_source_of_a_short_circuit_ratio_is_the_line_of_its_impedance():
     source = SourceBehind("a source", 0.05, 1.2, OMEGA)
     s = 2j * np.pi * F
     assert np.allclose(source.at(s), WEAK.impedance(F))
-    assert short_circuit_mva(source, 50.0, 100.0, None, "") == pytest.approx(100 / abs(0.05 + 1.2j))
+    assert strengths_of(source, 50.0, 100.0, None, "")[0] == pytest.approx(100 / abs(0.05 + 1.2j))
     machine = SimpleNamespace(is_exact=True, at=lambda s: source.at(s) * (1 + 9 / (1 + s))[:, None, None])
-    assert short_circuit_mva(machine, 50.0, 100.0, None, "") is None
+    assert strengths_of(machine, 50.0, 100.0, None, "")[0] is None
