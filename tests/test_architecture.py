@@ -190,7 +190,7 @@ def test_plain_data_are_read_without_symbols(name):
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-FOR_TYPES = {"api.case", "api.certification", "api.results", "cases.case", "cases.definition", "cases.given",
+FOR_TYPES = {"api.case", "api.results", "cases.case", "cases.definition", "cases.given",
              "cases.values", "coupling.system", "cli.terminal", "coupling.observers", "oscillations.view",
              "report.plot_style", "report.tables", "results.recording", "results.storage"}  # fmt: skip
 """Imported by `signal compare`, `gfor verify` and `load`, which start without what computes; `imports` counts these

@@ -180,13 +180,7 @@ class NoSuchModeError(InputError, KeyError):
 
 
 class NamedModes(dict[str, Mode]):
-    """The modes of a scenario by the names that its case gives.
-
-    Parameters
-    ----------
-    result
-        The scenario's modes.
-    """
+    """The modes of a scenario by the names that its case gives."""
 
     def __init__(self, result: ModesResult) -> None:
         super().__init__(result.named)

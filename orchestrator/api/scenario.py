@@ -342,17 +342,7 @@ def _checkpoints(prepared: PreparedScenario, folder: Path, every: float) -> Chec
 
 
 def choose(file: CaseFile, names: Names, asked: Preparing, stop: float | None = None) -> list[Scenario]:
-    """The scenarios of a case, all where none is named.
-
-    Parameters
-    ----------
-    file, names
-        The case, and names of its scenarios.
-    asked
-        How they are prepared.
-    stop
-        Time at which runs end [s]; the case's by default.
-    """
+    """As `Case.choose`, of a case file, with scenarios prepared as ``asked`` says; runs end at ``stop`` [s]."""
     file = replace(file, sharing=cast("SharingRule | None", asked.sharing))
     prepared = file.prepare(names_given(names, "names"), asked.overrides, asked.step_size, stop, asked.files)
     return [Scenario(asked.scheduled(one), file, asked) for one in prepared]

@@ -59,12 +59,6 @@ def source(
 
 
 def contest_sources(folder: Path) -> list[Sources]:
-    """`source` of each case of a folder in the form of the 2021 IEEE-NASPI contest.
-
-    Parameters
-    ----------
-    folder
-        A case's folder, or one with the folders of several.
-    """
+    """`source` of each case of a folder, or of folders in it, in the form of the 2021 IEEE-NASPI contest."""
     measured = [read_contest(path) for path in contest_cases(folder)]
     return [Sources(one, locate(one)) for one in measured]
