@@ -11,14 +11,15 @@ import struct
 import zlib
 from array import array
 from collections import Counter, defaultdict, deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from itertools import count
 from pathlib import Path
 
 from fmus.toolchain.elimination_plan import plan_elimination
 from fmus.toolchain.model import Model
 from fmus.toolchain.nodes import LARGEST_REST
 from fmus.toolchain.plan import Plan
-from fmus.toolchain.symbols import Function, Op
+from fmus.toolchain.symbols import Expr, Function, Op
 from fmus.toolchain.symbols.operations import UNARY
 
 CODES = {
@@ -29,29 +30,6 @@ CODES = {
     **{Op.LOG: 25, Op.FABS: 26, Op.FLOOR: 27, Op.NOT: 28},
 }
 ADD, SUB, MUL = (CODES[operation] for operation in (Op.ADD, Op.SUB, Op.MUL))
-INPUT, CONSTANT, OUTPUT = -1, -2, -3
-"""Codes of what is no operation: an element of an argument, a number, an element of a result."""
-
-
-def instructions(function: Function, name: str) -> Iterator[tuple[int, tuple[int, ...], tuple[int, ...], float]]:
-    """Code, sources, targets and value of each operation in order.
-
-    Sources and targets are numbers of registers, which are used again and again; of `INPUT` the source, and of
-    `OUTPUT` the target, is an argument's or result's number and the element in it. The value is that of `CONSTANT`."""
-    for operation, place, a, b, value in function.instructions:
-        match operation:
-            case Op.INPUT:
-                yield INPUT, (a, b), (place,), 0.0
-            case Op.CONST:
-                yield CONSTANT, (), (place,), value
-            case Op.OUTPUT:
-                yield OUTPUT, (b,), (place, a), 0.0
-            case _ if operation in CODES:
-                yield CODES[operation], (a,) if operation in UNARY else (a, b), (place,), 0.0
-            case _:
-                raise ValueError(f"{name}: operation {operation} has no code of a tape yet; add it to `CODES`")
-
-
 Operation = tuple[int, ...]  # code, and the values that it takes
 
 MUL_ADD, MUL_SUB, SUB_MUL, MUL_ADD_MUL, MUL_SUB_MUL = range(29, 34)
@@ -177,20 +155,18 @@ class _Values:
 
     def read(self, function: Function, name: str, groups: str) -> list[int]:
         """The values of a function's results, one after the other."""
-        edges = [0]
-        for vector in function.outputs:
-            edges.append(edges[-1] + len(vector))
-        results, register = [-1] * edges[-1], dict[int, int]()
-        for code, source, target, value in instructions(function, name):
-            if code >= 0:
-                register[target[0]] = self._operation((code, *(register[k] for k in source)))
-            elif code == INPUT:
-                register[target[0]] = self.first[groups[source[0]]] + source[1]
-            elif code == CONSTANT:
-                register[target[0]] = self._number(struct.pack("<d", value))
-            elif code == OUTPUT:
-                results[edges[target[0]] + target[1]] = register[source[0]]
-        return results
+        value: dict[Expr, int] = {}
+        for group, symbols in zip(groups, function.inputs, strict=True):
+            value |= zip(symbols, count(self.first[group]), strict=False)
+        for node in function.nodes:
+            if node.op == Op.CONST:
+                value[node] = self._number(struct.pack("<d", node.value))
+            elif node.op in CODES:
+                taken = (value[node.a],) if node.op in UNARY else (value[node.a], value[node.b])
+                value[node] = self._operation((CODES[node.op], *taken))
+            elif node.op != Op.SYMBOL:
+                raise ValueError(f"{name}: operation {node.op} has no code of a tape yet; add it to `CODES`")
+        return [value[result] for vector in function.outputs for result in vector]
 
     def _number(self, bits: bytes) -> int:
         if (found := self.numbers.get(bits)) is None:

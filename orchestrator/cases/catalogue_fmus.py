@@ -1,7 +1,8 @@
 """FMUs of the catalogue's models: described first, so that a whole case can be checked, and built when nothing is
 wrong."""
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
@@ -9,12 +10,13 @@ from fmus.grid.network import Network
 from fmus.toolchain.catalogue import build_model, entry_of
 from fmus.toolchain.extras import require
 from fmus.toolchain.notes import known, noted
-from orchestrator.fmi.description import FmuDescription, parse_description, read_description
+from orchestrator.fmi.description import FmuDescription, parse_description, platforms_of, read_description
 
 _TO_COME = "not-built"  # identity of an FMU that is not there
-_FEW = 8
-_described: dict[str, Any] = {}
-"""The newest models whose description was asked for, by what was asked; most of them are built next."""
+_IDENTITY, _START = re.compile(r'(guid|generationTool)="([^"]*)"'), "<InitialUnknowns"
+"""All that the description of a large network, which takes seconds to read, differs by once it is built."""
+_described: dict[str, tuple[Any, str]] = {}
+"""The newest models whose description was asked for, and that text, by what was asked; most of them are built next."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +55,11 @@ def _sketch(model: str, network: Network | None, native: bool, parts: tuple[tupl
     from fmus.toolchain.description import model_description  # noqa: PLC0415 - imports what writes equations
 
     sketch = build_model(model, **_arguments(network, parts))
-    while len(_described) >= _FEW:
+    while len(_described) >= 8:  # of cases that failed
         _described.pop(next(iter(_described)))
-    _described[_asked(model, network, native, parts)] = sketch
-    return sketch.name, model_description(sketch, _TO_COME, sketch.name, "", native=native, listed=False).decode()
+    text = model_description(sketch, _TO_COME, sketch.name, "", native=native, listed=False).decode()
+    _described[_asked(model, network, native, parts)] = sketch, text
+    return sketch.name, text
 
 
 def _asked(model: str, network: Network | None, native: bool, parts: tuple[tuple[str, str], ...]) -> str:
@@ -72,8 +75,8 @@ def _recipe(planned: PlannedFmu) -> Any:
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.python_fmu import PythonFmu  # noqa: PLC0415 - as above
 
-    made = _described.pop(_asked(planned.model, planned.network, planned.native, planned.parts), None)
-    made = made or build_model(planned.model, **_arguments(planned.network, planned.parts))
+    kept = _described.get(_asked(planned.model, planned.network, planned.native, planned.parts))
+    made = kept[0] if kept else build_model(planned.model, **_arguments(planned.network, planned.parts))
     return (NativeFmu if planned.native else PythonFmu)(made)
 
 
@@ -99,7 +102,12 @@ def build_fmu(planned: PlannedFmu) -> FmuDescription:
 
     asked = _asked(planned.model, planned.network, planned.native, planned.parts)
     noted(entry_of(planned.model), asked, find)
-    return read_description(cached(recipes[0] if recipes else _recipe(planned)))
+    recipe = recipes[0] if recipes else _recipe(planned)
+    path, told, (_, text) = cached(recipe), recipe.description().decode(), _described.pop(asked, (None, ""))
+    if _IDENTITY.sub("", told, 2).partition(_START)[0] != _IDENTITY.sub("", text, 2).partition(_START)[0]:
+        return read_description(path)
+    (_, guid), (_, tool) = _IDENTITY.findall(told, 0, 4096)
+    return replace(planned.description, path=path, guid=guid, generation_tool=tool, platforms=platforms_of(path))
 
 
 def catalogue_fmu(model: str, network: Network | None = None, native: bool = False) -> FmuDescription:

@@ -188,6 +188,10 @@ def read_declared(path: Path | str) -> FmuDescription:
     return parse_description(path, read_model_description_text(path), names_in(path))
 
 
+def platforms_of(path: Path) -> tuple[str, ...]:
+    return tuple(fmpy.supported_platforms(path))
+
+
 def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
     root = _root(path, text)
     version = _fmi_version(root)
@@ -198,7 +202,10 @@ def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> Fmu
             "this master runs co-simulation of FMI 2.0 and 3.0, ask for one of these",
         )
     try:
-        description = fmpy.read_model_description(_only(_with_initial(text, root)), validate=False)
+        content = _only(_with_initial(text, root))
+        for part in root.findall("ModelVariables") if version == "2.0" else ():
+            part.clear()  # which FMPy reads on its own: twice they would take most of a large network's memory
+        description = fmpy.read_model_description(content, validate=False)
         exchange_only = description.coSimulation is None
         platforms = tuple(fmpy.supported_platforms(_only(text, names)))
         described = None if exchange_only else _describe(path, description, root, platforms, version)

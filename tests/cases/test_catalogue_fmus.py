@@ -6,11 +6,12 @@ import pytest
 
 from fmus.grid.network import Line, Load, Network, Port, Shunt, Zip
 from fmus.grid.two_area import TWO_AREA
-from fmus.toolchain import notes
+from fmus.toolchain import dependencies, notes
 from orchestrator.cases import catalogue_fmus
 from orchestrator.cases.case import load_case
 from orchestrator.cases.catalogue_fmus import build_fmu, catalogue_fmu, plan_fmu
 from orchestrator.errors import CaseError
+from orchestrator.fmi.description import read_description
 
 NETWORK = Network(
     "net",
@@ -111,6 +112,17 @@ def test_a_plan_says_of_the_variables_what_the_fmu_says(model, network, tmp_path
     assert planned.description.rates == built.rates
     assert planned.description.model_name == built.model_name
     assert planned.description.guid != built.guid
+
+
+def test_a_long_description_is_not_read_again(tmp_path, monkeypatch):
+    """Where dependencies are not listed it differs by its identity alone."""
+    monkeypatch.setenv("GFOR_COSIM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(dependencies, "MOST", 0)
+    with monkeypatch.context() as patch:
+        patch.setattr(catalogue_fmus, "read_description", lambda path: pytest.fail(f"{path} is read"))
+        built = build_fmu(plan_fmu("phasor_grid", NETWORK))
+    assert built == read_description(built.path)
+    assert built.guid != "not-built"
 
 
 def test_a_power_flow_that_fails_builds_no_fmu(tmp_path, monkeypatch):

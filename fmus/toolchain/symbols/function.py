@@ -1,6 +1,7 @@
 """Functions of symbols as a list of instructions on a work array, which is evaluated, rewritten or written as code."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -25,13 +26,22 @@ class Function:
 
     def __init__(self, name: str, inputs: Sequence[Vector], outputs: Sequence[Vector]) -> None:
         self.name, self.inputs, self.outputs = name, [list(v) for v in inputs], [list(v) for v in outputs]
-        self.nodes, ends = sorted_nodes([value for vector in self.outputs for value in vector])
-        self.instructions: list[Instruction] = []
-        self.room = 0
-        self._write(ends)
+        self.nodes, self._ends = sorted_nodes([value for vector in self.outputs for value in vector])
+        for node in {node for node in self.nodes if node.op == Op.SYMBOL}.difference(*self.inputs):
+            raise ValueError(f"{self.name}: {node.label!r} is none of its arguments")
 
-    def _write(self, ends: list[int]) -> None:
-        """Write the instructions; a place is free again once nobody needs what is there."""
+    @property
+    def instructions(self) -> list[Instruction]:
+        return self._written[0]
+
+    @property
+    def room(self) -> int:
+        return self._written[1]
+
+    @cached_property
+    def _written(self) -> tuple[list[Instruction], int]:
+        """The instructions and their room; a place is free again once nobody needs what is there."""
+        instructions, room = list[Instruction](), 0
         given = {symbol: (i, k) for i, vector in enumerate(self.inputs) for k, symbol in enumerate(vector)}
         roots = [(value, i, k) for i, vector in enumerate(self.outputs) for k, value in enumerate(vector)]
         uses = dict.fromkeys(self.nodes, 0)
@@ -50,8 +60,8 @@ class Function:
                 free.append(place[operand])
             return place[operand]
 
-        first, write = 0, self.instructions.append
-        for (root, i, k), end in zip(roots, ends, strict=True):
+        first, write = 0, instructions.append
+        for (root, i, k), end in zip(roots, self._ends, strict=True):
             for node in self.nodes[first:end]:
                 op, a, b, value = node.op, 0, 0, 0.0
                 if op in UNARY:
@@ -61,18 +71,17 @@ class Function:
                     a = used(node.a)
                 elif op == Op.CONST:
                     value = node.value
-                elif node in given:
-                    op, (a, b) = Op.INPUT, given[node]
                 else:
-                    raise ValueError(f"{self.name}: {node.label!r} is none of its arguments")
+                    op, (a, b) = Op.INPUT, given[node]
                 if free:
                     result = free.pop()
                 else:
-                    result, self.room = self.room, self.room + 1
+                    result, room = room, room + 1
                 place[node] = result
                 write((op, result, a, b, value))
             write((Op.OUTPUT, i, k, used(root), 0.0))
             first = end
+        return instructions, room
 
     def __call__(self, *arguments: Sequence[float] | np.ndarray) -> tuple[np.ndarray, ...]:
         """Values of all outputs at a point."""
