@@ -62,6 +62,12 @@ def kept_tables(name: str, content: bytes, make: Callable[[], SourceTables]) -> 
     return tables
 
 
+def tables_beside(path: Path) -> SourceTables | None:
+    """The tables that lie beside a case for the network of its name: built-in cases need no pandapower."""
+    file = path.with_name(f"{path.name}.tables.json")
+    return _from_json(json.loads(file.read_bytes())) if file.is_file() else None
+
+
 def _versions() -> dict[str, str]:
     return {library: installed_version(library) for library in LIBRARIES}
 

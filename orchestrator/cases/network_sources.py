@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fmus.toolchain.extras import require
 from orchestrator.cases.csv_rows import seen_from_here
-from orchestrator.cases.kept_tables import SourceTables, kept_tables
+from orchestrator.cases.kept_tables import SourceTables, kept_tables, tables_beside
 from orchestrator.cases.names import close_names
 from orchestrator.errors import InputError
 
@@ -63,7 +63,7 @@ def read_pandapower(name: str, directory: Path) -> SourceTables:
 def _solved_pandapower(name: str, path: Path, changed: int) -> SourceTables:
     """The tables of a network; ``changed`` keeps a file's newer contents apart. Every scenario of a case asks."""
     content = path.read_bytes() if changed else b""
-    return kept_tables(name, content, lambda: _made_by_pandapower(name, path))
+    return tables_beside(path) or kept_tables(name, content, lambda: _made_by_pandapower(name, path))
 
 
 def _made_by_pandapower(name: str, path: Path) -> SourceTables:

@@ -1,8 +1,11 @@
 """Tables of pandapower's networks are kept to the last bit, and made anew where anything changed."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from orchestrator.cases import ieee39, network_sources
 from orchestrator.cases import kept_tables as module
 from orchestrator.cases.kept_tables import LIBRARIES, SourceTables, kept_tables
 from orchestrator.errors import InputError
@@ -72,3 +75,16 @@ def test_an_error_is_not_kept(own_cache):
         with pytest.raises(InputError, match="no solution"):
             kept_tables("net", b"", fails)
     assert not list(own_cache.rglob("*.json"))
+
+
+@pytest.mark.slow
+def test_a_built_in_case_has_the_tables_of_its_network_beside_it(monkeypatch):
+    folder = Path(ieee39.__file__).parent
+    made = network_sources._made_by_pandapower("case39", folder / "case39")
+    monkeypatch.setattr(network_sources, "kept_tables", lambda *_: never())
+    found = network_sources.read_pandapower("case39", folder)
+    for name in ("bus", "branch", "gen", "branch_to_earth"):
+        assert np.allclose(getattr(found, name), getattr(made, name), rtol=1e-9, atol=1e-9, equal_nan=True)
+    assert (found.name, found.base_mva, found.labels) == (made.name, made.base_mva, made.labels)
+    with pytest.raises(AssertionError):
+        network_sources.read_pandapower("case9", folder)
