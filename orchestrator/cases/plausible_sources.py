@@ -91,9 +91,13 @@ def _step_up(draft: Draft, name: str, grid: ComponentPlan, where: str) -> Iterat
         variable = branches[0].variable("X")
         X = value_of(grid, variable)
         own = 0.0 if X is None else X * rating / 100  # on the machines' rating [pu]
-        if X is not None and own > high and (low <= X <= high or own > _FAR * low):
+        if X is not None and ((low_side := own < low <= own * rating / 100 <= high) or (
+            own > high and (low <= X <= high or own > _FAR * low)
+        )):  # fmt: skip
             meant = f"if {X:g} pu is on the machine's base, it is {100 * X / rating:.4g} pu on 100 MVA"
-            if not low <= X <= high and own < 100 * low:
+            if low_side:
+                meant = f"if {own:.3g} pu is on 100 MVA, CZ = 1 says so"
+            elif not low <= X <= high and own < 100 * low:
                 meant = f"is the machine's rating {rating / 10:g} MVA?"
             elif own >= 100 * low:
                 meant = f"is it in percent? {own / 100:.3g} pu would be usual, {X / 100:.4g} pu on 100 MVA"

@@ -1,7 +1,10 @@
 """Errors about names say which one was probably meant."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from orchestrator.cases import assignment
 from orchestrator.cases.case import load_case
 from orchestrator.cases.names import close_names
 from orchestrator.errors import CaseError, InputError
@@ -86,3 +89,11 @@ def test_a_pattern_names_variables_as_it_names_components():
     assert own == {"load_5.scale": 0.9, "load_6.scale": 0.9, "load_8.scale": 0.9}
     with pytest.raises(CaseError, match=r"no variable 'laod_\*.scale'"):
         case.prepare(["base"], {"grid.laod_*.scale": 0.9})
+
+
+def test_a_component_that_is_not_there_has_no_variable(monkeypatch):
+    monkeypatch.setattr(assignment, "_meant", lambda draft, name, variable: ["pod.K"] if variable == "K" else [])
+    plan = SimpleNamespace(description=SimpleNamespace(variables={"H": None}))
+    draft = SimpleNamespace(system=SimpleNamespace(components={"sg1": plan}))
+    asked = (("sg1", "H"), ("sg1", "K"), ("sg1", "X"), ("sg2", "H"), ("sg2", "K"))
+    assert [assignment._has(draft, *one) for one in asked] == [True, True, False, False, False]

@@ -9,7 +9,7 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from orchestrator.errors import FmuFileError, InputError
 from orchestrator.fmi import wine
-from orchestrator.fmi.description import read_description
+from orchestrator.fmi.description import VariableInfo, read_description
 
 XML = "modelDescription.xml"
 
@@ -235,3 +235,8 @@ def test_state_saving_is_read_from_its_capability_flag(rewritten):
 
 def test_a_path_may_be_given_as_text(fmu_path):
     assert read_description(str(fmu_path("gfor"))) == read_description(fmu_path("gfor"))
+
+
+@pytest.mark.parametrize(("start", "number"), [(None, 0.0), ("a.json", 0.0), (True, 1.0), (False, 0.0), (2, 2.0)])
+def test_a_start_value_as_a_number(start, number):
+    assert VariableInfo("x", 0, "Real", "parameter", "fixed", "", start, None, None, "").start_number == number

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from fmus.synchronous_generator.parts import EXCITERS, GOVERNORS, STABILIZERS
+from fmus.toolchain.catalogue import build_model
 from tests.models.parts import exciter, governor, stabilizer
 
 TABLE = Path(__file__).with_name("part_defaults.json")
@@ -41,3 +42,10 @@ def test_the_table_has_no_other_parts():
 if __name__ == "__main__":
     rows = {part: defaults(part) for part in PARTS}
     TABLE.write_text(json.dumps(rows, indent=0, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def test_the_norms_exciter_has_the_values_of_its_table():
+    """NTS 631, generator of area 1."""
+    start = {v.name: v.start for v in build_model("synchronous_generator_st4b_pss2a").parameters}
+    norm = {"K_PR": 3.15, "K_IR": 3.15, "T_A": 0.02, "K_P": 6.5, "K_C": -0.08}
+    assert {name: start[f"exciter.{name}"] for name in norm} == norm

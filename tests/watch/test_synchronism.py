@@ -1,11 +1,14 @@
 """Who loses synchronism with whom, by how many turns, and who does not."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.binding.misfits import Misfit
 from orchestrator.coupling.events import ParameterChange
+from orchestrator.watch import synchronism
 from orchestrator.watch.seen import rescaled
 from orchestrator.watch.settings import Settings
 from orchestrator.watch.synchronism import lost_synchronism
@@ -128,3 +131,10 @@ def test_a_meter_that_settles_is_no_slip_and_what_follows_is_seen(begins):
     assert found[seen.times > 1.51] == pytest.approx(1.3)
     turning = seen_of({**resting, "plant.i_re": lambda t: np.cos(60 * t)}, 2.0)
     assert rescaled(turning, {}).values["plant.omega"] == pytest.approx(turning.values["plant.omega"])
+
+
+@pytest.mark.parametrize(("known", "value"), [({"S_n": None}, 500.0), ({}, 100.0)])
+def test_a_unit_counts_with_its_rating_at_the_start(known, value):
+    plan = SimpleNamespace(description=SimpleNamespace(variables=known))
+    settings = SimpleNamespace(values=lambda name, parameter: [500.0, 700.0])
+    assert synchronism._start(SimpleNamespace(components={"a": plan}), settings, "a", "S_n", 100.0) == value

@@ -36,9 +36,9 @@ _LEAST = 32.0
 _BLOCKS = 5  # parts of a disturbance, between which the memory is read
 _SOON = (0, 2, 4)  # numbers of those soon after which it is asked as well
 _PART = 0.75  # time to spend, in parts of the time for which an FMU is made to run
-_EVENTS = (("deep", 0.45), ("jump", 0.15), ("series", 0), ("middle", 0.2), ("swell", 0.2), ("low", 0.15),
+_EVENTS = (("deep", 0.45), ("jump", 0.15), ("series", 0), ("swell", 0.6), ("middle", 0.2), ("low", 0.15),
            ("small jump", 0.2))  # fmt: skip
-"""Kinds of disturbances, and how long they last [s]."""
+"""Kinds of disturbances, the first four of which are always made, and how long they last [s]."""
 _LATER = ((0.15, 0.4), (0.8, 1.6), (2.5, 3.5))
 """Times [s] after a disturbance, of which one each is drawn, at which it is asked before it has come back as well."""
 _NEAR, _BENT = 0.3, 0.5
@@ -85,7 +85,7 @@ def after_dips(subject: Subject) -> CheckResult:
     found: list[_After] = []
     spent, budget = spent_since(), _PART * subject.memory.get("run_for", RUN_FOR)
     for number, segments in enumerate(_drawn(subject)):
-        if number >= 3 and spent() > budget:
+        if number >= 4 and spent() > budget:
             break
         found.append(look.after(segments, number in _SOON))
         if found[-1].end is not _End.BACK and found[-1].end is not _End.ELSEWHERE:

@@ -2,7 +2,7 @@
 
 from cmath import rect
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from time import perf_counter
 
@@ -25,7 +25,7 @@ _RIDDEN, _OVERLOAD = 2.0, 10.0
 
 _STAY = (
     ((0.8, 0.9), 1.0, _RIDDEN, None), ((0.17, 0.21), 1.0, 0.5, None), ((0.2, 0.35), 0.1, _OVERLOAD, None),
-    ((0.42, 0.55), 0.1, _OVERLOAD, None), ((0.2, 0.35), 0.1, _OVERLOAD, IMPORTING[0]),
+    ((0.42, 0.55), 0.1, _OVERLOAD, None), ((0.2, 0.35), 0.1, _OVERLOAD, replace(IMPORTING[0], Q=-0.3)),
 )  # fmt: skip
 """Dips that stay: to what voltage [pu], when [s], how long [s], from which point."""
 

@@ -132,6 +132,10 @@ RAWS = {
         changed(RAW, ("'T3', 1\n0.0, 0.15, 900.0", "'T3', 1\n0.0, 15, 900.0")),
         "is 15 pu on the 900 MVA behind it, and step-up transformers have 0.03 to 0.35 pu there; is it in percent?",
     ),
+    "transformer on 100 MVA": (
+        changed(RAW, ("'T3', 1\n0.0, 0.15, 900.0", "'T3', 1\n0.0, 0.0167, 900.0")),
+        "step-up transformers have 0.03 to 0.35 pu there; if 0.0167 pu is on 100 MVA, CZ = 1 says so",
+    ),
     "load at another bus": (
         changed(RAW, (" 7, '1 ', 1, 1, 1,  967", " 6, '1 ', 1, 1, 1,  967")),
         "beyond what the network takes away, +967 MW +99.99 Mvar at bus_7, -967 MW -99.99 Mvar at bus_6",
