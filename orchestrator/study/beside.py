@@ -19,8 +19,8 @@ def told(results: Sequence[ModesResult]) -> Iterator[str]:
             yield f"What the change of power flow alone does: --scenario {name} beside"
         elif before := min(other.modes, key=lambda mode: mode.damping_percent, default=None):
             found = "; ".join(_compared(r, other, before) for r in results if wanted[r.prepared.name] == name)
-            mode = f"{before.frequency_hz:.3f} Hz, {before.damping_percent:.2f} %"
-            yield f"Beside {other.prepared.title!r} ({mode}), at the same power flow: {found}"
+            mode = f"({before.frequency_hz:.3f} Hz, {before.damping_percent:.2f} %), at the same power flow"
+            yield f"Beside {other.prepared.title!r} {mode}: {found}"
 
 
 def _compared(result: ModesResult, other: ModesResult, before: Mode) -> str:
