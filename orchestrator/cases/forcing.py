@@ -44,7 +44,8 @@ def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:
     try:
         time = to_unit(given.pop("time", _BEGIN), "s")
         given |= {"bus": bus_name(given["bus"])} if "bus" in given else {}
-        return kind(type=name, time=time, **given).asked_as(f"--{option} {text!r}")  # type: ignore[arg-type]  # texts
+        table: ForcingTable | BusFaultTable = kind(type=name, time=time, **given)
+        return table.asked_as(f"--{option} {text!r}")
     except ValueError as error:  # pydantic's and ours
         reasons = [str(e["msg"]) for e in error.errors()] if hasattr(error, "errors") else [str(error)]
         raise InputError(f"--{option} {text!r}: {'; '.join(reasons).removeprefix('Value error, ')}") from error

@@ -28,7 +28,7 @@ def _compared(result: ModesResult, other: ModesResult, before: Mode) -> str:
     if not all(abs(v - voltages[1].get(bus, 0.0)) < _SAME_VOLTAGE for bus, v in voltages[0].items()):
         return f"{result.prepared.title}: not known, as its power flow is another one"
     sets = [ModeSet.of(r.modes, tuple(r.model.names)) for r in (other, result)]
-    now = next((result.modes[x.target] for x in match(*sets) if other.modes[x.source] is before), None)
+    now = next((result.modes[x.target] for x in match(sets[0], sets[1]) if other.modes[x.source] is before), None)
     if now is None:
         return f"{result.prepared.title}: not known, as no mode is clearly the same"
     points = now.damping_percent - before.damping_percent
