@@ -78,8 +78,8 @@ class Modes:
         return self.named[index] if isinstance(index, str) else self.result.modes[index]
 
     def table(self) -> pd.DataFrame:
-        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states; row 1
-        is ``modes[0]``."""
+        """All modes in the range, least damped first: eigenvalue [1/s, rad/s], frequency, damping, name, states. Row 1
+        is ``modes[0]``, whose ``shape`` holds its right eigenvector by state."""
         rows = [
             {
                 **eigenvalue_json(mode.eigenvalue, mode.damping_percent),
@@ -96,11 +96,6 @@ class Modes:
         columns = {number: dict(mode.participation) for number, mode in enumerate(self.result.modes, start=1)}
         table = pd.DataFrame(columns, index=list(self.result.model.names))
         return table.rename_axis(index="state", columns="mode")
-
-    def shapes(self) -> pd.DataFrame:
-        """Right eigenvectors: every state (row) in every mode (column, as in `table`)."""
-        columns = {number: mode.shape for number, mode in enumerate(self.result.modes, start=1)}
-        return pd.DataFrame(columns, index=list(self.result.model.names)).rename_axis(index="state", columns="mode")
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor modes --json`` prints of this scenario, as JSON's types."""

@@ -19,8 +19,8 @@ def told(results: Sequence[ModesResult]) -> Iterator[str]:
             yield f"What the change of power flow alone does: --scenario {name} beside"
         elif before := min(other.modes, key=lambda mode: mode.damping_percent, default=None):
             found = "; ".join(_compared(r, other, before) for r in results if wanted[r.prepared.name] == name)
-            mode = f"{before.frequency_hz:.3f} Hz, {before.damping_percent:.2f} %"
-            yield f"Beside {other.prepared.title!r} ({mode}), at the same power flow: {found}"
+            mode = f"({before.frequency_hz:.3f} Hz, {before.damping_percent:.2f} %), at the same power flow"
+            yield f"Beside {other.prepared.title!r} {mode}: {found}"
 
 
 def _compared(result: ModesResult, other: ModesResult, before: Mode) -> str:
@@ -28,7 +28,7 @@ def _compared(result: ModesResult, other: ModesResult, before: Mode) -> str:
     if not all(abs(v - voltages[1].get(bus, 0.0)) < _SAME_VOLTAGE for bus, v in voltages[0].items()):
         return f"{result.prepared.title}: not known, as its power flow is another one"
     sets = [ModeSet.of(r.modes, tuple(r.model.names)) for r in (other, result)]
-    now = next((result.modes[x.target] for x in match(*sets) if other.modes[x.source] is before), None)
+    now = next((result.modes[x.target] for x in match(sets[0], sets[1]) if other.modes[x.source] is before), None)
     if now is None:
         return f"{result.prepared.title}: not known, as no mode is clearly the same"
     points = now.damping_percent - before.damping_percent

@@ -114,7 +114,6 @@ def test_a_recording_says_what_it_was_computed_from(tmp_path):
 def test_all_eigenvalues_and_the_map_in_one_unit(modes):
     assert len(modes.eigenvalues) == modes.stability.eigenvalues - modes.stability.zeros
     assert modes.eigenvalues[0].real == pytest.approx(modes.stability.largest_growth_rate, rel=1e-6)
-    assert modes.shapes().loc["gfor.droop.theta", 1] == modes[0].shape["gfor.droop.theta"]
     assert all(np.abs(modes.eigenvalues - mode.eigenvalue).min() < 1e-6 * abs(mode.eigenvalue) for mode in modes)
     axes = modes.plot(radians=True)
     assert axes.get_ylabel() == "Imaginary part [rad/s]"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import orchestrator as gfor
-from orchestrator.cases.forcing import fault_of, forcing_of
+from orchestrator.cases.forcing import event_of
 from orchestrator.coupling.events import Forcing
 from orchestrator.errors import CaseError, InputError
 
@@ -44,16 +44,16 @@ def test_a_frequency_near_the_step_asks_for_each_point_once():
 
 
 def test_the_words_of_the_command():
-    table = forcing_of("sg35.exciter.V_ref  800 mHz 2% square from 500 ms")
+    table = event_of("force", "sg35.exciter.V_ref  800 mHz 2% square from 500 ms")
     assert (table.component, table.reference, table.shape) == ("sg35", "exciter.V_ref", "square")
     assert (table.frequency, table.amplitude, table.time) == pytest.approx((0.8, 0.02, 0.5))
-    assert forcing_of("gfor 0.8 Hz 0.05 pu").amplitude == 0.05
+    assert event_of("force", "gfor 0.8 Hz 0.05 pu").amplitude == 0.05
 
 
 @pytest.mark.parametrize("text", ["sg35 0.8 2 %", "sg35 0.8 Hz", "0.8 Hz 2 %", "sg35 0.8 Hz 2 % triangle", ""])
 def test_other_words_are_refused_with_the_form(text):
     with pytest.raises(InputError, match="UNIT FREQUENCY AMPLITUDE"):
-        forcing_of(text)
+        event_of("force", text)
 
 
 @pytest.mark.parametrize(
@@ -121,14 +121,14 @@ def test_the_run_tells_who_was_forced(run):
     ],
 )
 def test_a_fault_in_words(text, given):
-    fault = fault_of(text)
+    fault = event_of("fault", text)
     assert (fault.bus, fault.time, fault.duration, fault.cleared_by) == given
 
 
 @pytest.mark.parametrize("text", ["bus_9 150 ms", "bus_9, 150", "bus_9", "bus_9, -1 ms", "bus_9, 150 ms, line_7_9"])
 def test_a_fault_without_its_parts_is_refused(text):
     with pytest.raises(InputError, match=f"^--fault '{text}': "):
-        fault_of(text)
+        event_of("fault", text)
 
 
 def test_a_fault_takes_the_place_of_all_events():

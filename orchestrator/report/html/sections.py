@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from orchestrator.cases.schema import PanelTable, PlotTable
 from orchestrator.report.html.charts import ChartCurve, Mark, bar_chart, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
@@ -275,17 +274,11 @@ def _participation(results: Results, figures: Figures) -> str:
     return "".join(parts)
 
 
-def _speeds(results: Results) -> list[PlotTable]:
-    """What is drawn where the case has no plots."""
-    recorded = [str(name) for table in results.trajectories.values() for name in table.data_vars]
-    found = dict.fromkeys(name for name in recorded if name.endswith("omega"))
-    panels = [PanelTable(signal=name, also=rest, label="Speed [pu]") for name, *rest in [[*found][:12]] if found]
-    return [PlotTable(name="speeds", title="Speeds, as the case has no plots", panels=panels)]
-
-
 def responses(results: Results, figures: Figures) -> str:
     parts = [scenario_legend(results)]
-    for plot in results.case.table.plots or _speeds(results):
+    if not results.case.table.plots:
+        parts = ["<p>The case has no [[plots]], so no curve is drawn; `gfor new` writes such tables.</p>"]
+    for plot in results.case.table.plots:
         charts, columns = [], []
         for panel in plot.panels:
             curves, deviations = _curves(results, panel.signal, panel.scale, 0 if panel.also else None)
