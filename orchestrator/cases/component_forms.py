@@ -8,8 +8,7 @@ NO_STATES = (
 )
 
 
-def wrong(table: ComponentTable) -> str:
-    """What contradicts itself in a component's table; empty if nothing does."""
+def contradiction(table: ComponentTable) -> str:
     if sum(given is not None for given in (table.model, table.fmu, table.dll, table.scan)) != 1:
         return (
             "give either 'model' (a model of the catalogue), 'fmu' (the path of an .fmu), 'dll' (of a vendor's DLL, or "
