@@ -13,6 +13,7 @@ from orchestrator.cli import main
 from orchestrator.errors import CaseError, InputError
 from orchestrator.immittance import measured
 from orchestrator.immittance.cut import cut_of
+from orchestrator.immittance.placing import in_one_frame
 from orchestrator.immittance.scan import PER_UNIT, PortPoint, Scan, block_rotation
 from orchestrator.immittance.scan_files import write_ztool
 
@@ -122,3 +123,18 @@ def test_the_frame_of_a_measured_scan_is_that_of_its_voltage(monkeypatch):
     scan = measured.as_scan("x", response, cmath.rect(1.0, 0.4))
     assert scan.values == pytest.approx(np.broadcast_to(Y, scan.values.shape))
     assert scan.points["x"].angle == pytest.approx(0.4)
+
+
+def test_two_files_are_turned_by_the_angles_that_they_state_or_by_the_one_given():
+    f, Y = np.geomspace(1, 9, 9), np.broadcast_to([[2.0, 0.3], [-0.1, 0.5]], (9, 2, 2))
+
+    def sides(**angles):
+        return {side: Scan(side, f, Y, ("P",), points={"P": PortPoint(angle=angle)}).rotated([-(angle or 0.0)])
+                for side, angle in angles.items()}  # fmt: skip
+
+    stated, open_ = sides(device=0.4, network=-0.9), sides(device=0.4, network=None)
+    assert in_one_frame(stated, None)
+    assert all(scan.values == pytest.approx(Y) for scan in stated.values())
+    assert not in_one_frame(open_, None)
+    assert in_one_frame(open_, 0.4)
+    assert open_["device"].values == pytest.approx(Y)
