@@ -34,6 +34,9 @@ def test_a_disagreement_with_the_modes_is_no_verdict(monkeypatch):
     found = gfor.nyquist("two_area", scenario="gfor", components=["gfor"])
     assert found.verdict == "not known"
     assert "eigenvalues of the closed system say stable" in found.reasons[0]
+    monkeypatch.setattr("orchestrator.immittance.judgement._count", lambda path, turns, exact: 4)
+    found = gfor.nyquist("two_area", scenario="base", components=["sg1"])
+    assert "say unstable (2 grow), the encirclements unstable (4)" in found.reasons[0]
 
 
 def growth(cut, x):
