@@ -143,7 +143,7 @@ class Asked:
         if isinstance(case, PreparedScenario) and result.cut is not None:
             plans = {name: case.system.components[name] for name in result.cut.devices}
             known, patterns = {name: plan.description for name, plan in plans.items()}, list(given)
-            value_of = lambda name, variable: plans[name].number(variable)  # noqa: E731
+            value_of: Callable[[str, str], float] = lambda name, variable: plans[name].number(variable)  # noqa: E731
         elif self._device and self._device.suffix.lower() not in ENDINGS:
             fmu, values = bound_fmu(self._device, result.request.binding), result.request.values
             known, patterns = {_FMU[:-1]: fmu}, [f"{_FMU}{name}" for name in given]

@@ -2,6 +2,8 @@
 
 import cmath
 import shutil
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,9 +15,10 @@ from orchestrator.cli import main
 from orchestrator.errors import CaseError, InputError
 from orchestrator.immittance import measured
 from orchestrator.immittance.cut import cut_of
-from orchestrator.immittance.placing import in_one_frame
+from orchestrator.immittance.placing import at_ports, in_one_frame
 from orchestrator.immittance.scan import PER_UNIT, PortPoint, Scan, block_rotation
 from orchestrator.immittance.scan_files import write_ztool
+from tests.immittance import plants
 
 AROUND = np.sinh(np.linspace(-4.5, 4.5, 121))
 MODEL = {"gfor": 'model = "gfor"', "sg2": 'model = "synchronous_generator_st1" '}
@@ -69,6 +72,16 @@ def test_an_fmu_in_the_place_of_a_scan_is_compared_with_it(tmp_path, two_area):
         shutil.copy(tmp_path / f"gfor_{name}.txt", tmp_path / f"other_{name}.txt")
     turned = gfor.nyquist(tmp_path / "other.txt", case, scenario="gfor", voltage=230).as_json()
     assert turned["difference_from_case"]["largest_relative"] > 0.1
+
+
+def test_an_unstable_device_is_seen_beside_a_far_larger_one():
+    """Both at one bus: their sum shows no pole of the smaller one."""
+    rng, f = np.random.default_rng(3), np.geomspace(0.1, 1000, 300)
+    small, large = plants.random_plant(rng, unstable=True), plants.random_plant(rng)
+    scans = {"x": Scan("x", f, 1e-4 * small.admittance(f), ("x",)), "y": Scan("y", f, large.admittance(f), ("y",))}
+    both = at_ports(scans, SimpleNamespace(ports=(("bus", ("x", "y")),)))
+    assert both.unstable
+    assert not replace(both, parts=()).unstable
 
 
 def test_what_does_not_belong_there_is_refused(tmp_path, two_area):
