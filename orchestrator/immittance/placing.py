@@ -52,14 +52,14 @@ def placed(scan: Scan, cut: Cut, name: str, kilovolt: float | None, angle: float
 
     The d axis of a scan that states an angle lies along the voltage of its bus, whatever that voltage's angle was."""
     check_place(scan, cut, name, kilovolt)
-    scan, stated = in_unit(scan, PER_UNIT, kilovolt), angle is not None
+    scan = in_unit(scan, PER_UNIT, kilovolt)
     if not any(point.megawatt is not None for point in scan.points.values()):
         S = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_BASE_MVA
-        asked = f"was it scanned where {name} is here, at {S.real:.4g} MW and {S.imag:.4g} Mvar?"
-        scan = replace(scan, questions=(*scan.questions, f"{scan.source} states no operating point; {asked}"))
+        asked = f"{scan.source} states no operating point; was it scanned where {name} is here, at"
+        scan = replace(scan, questions=(*scan.questions, f"{asked} {S.real:.4g} MW and {S.imag:.4g} Mvar?"))
     if angle is None and all(port in scan.points and scan.points[port].angle is not None for port in scan.ports):
         angle = float(np.angle(cut.voltages[name]))
-    return (scan, stated) if angle is None else (scan.rotated([angle]), True)
+    return (scan, False) if angle is None else (scan.rotated([angle]), True)
 
 
 def at_ports(scans: Mapping[str, Scan], cut: Cut) -> Sampled:

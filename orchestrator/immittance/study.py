@@ -241,7 +241,9 @@ def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cu
 def _read(request: CutRequest, side: str, path: Path) -> Scan:
     if side == "network" and path.suffix.lower() not in ENDINGS:
         raise InputError(f"{path}: the network is a scan's file or a case; an FMU can be the device")
-    scan = read_scan(path, request.frequency, network=side == "network")
+    scan, kv = read_scan(path, request.frequency, network=side == "network"), request.kilovolt
+    if off := [p.kilovolt for p in scan.points.values() if p.kilovolt and kv and not 0.8 < p.kilovolt / kv < 1.25]:
+        raise InputError(f"{path.name} was scanned at {off[0]:g} kV, and --voltage is {kv:g} kV; leave the option out")
     scan = scan.scaled(1.0, PER_UNIT) if side in request.per_unit else scan
     scan = scan.turned_sign() if side in request.generator else scan
     check_sign(scan, f"--generator {side}")
