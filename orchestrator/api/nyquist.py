@@ -106,8 +106,8 @@ class Asked:
         self, device: str, network: str | None, scenario: str | None, given: Mapping[str, Any], *,
         trust_fmus: bool = False, **rest: Any,
     ) -> None:  # fmt: skip
-        self._of_case = is_case(device) if network is None else is_case(network)
-        if network is None and not is_case(device) and rest.get("scr") is None:
+        self._of_case = _is_case(device) if network is None else _is_case(network)
+        if network is None and not _is_case(device) and rest.get("scr") is None:
             raise InputError(
                 f"{device}: give its network as well: a scan, a short-circuit ratio by --scr, or a case with --bus or "
                 "--component"
@@ -116,8 +116,7 @@ class Asked:
         self._case, self._scenario, self._given, self._trust = network or device, scenario, dict(given), trust_fmus
         self._rest = rest
 
-    def request(self, changed: Mapping[str, Any] = MappingProxyType({})) -> CutRequest:
-        """The request, with some values changed."""
+    def _request(self, changed: Mapping[str, Any] = MappingProxyType({})) -> CutRequest:
         values = self._given | dict(changed)
         of_case = {name: v for name, v in values.items() if self._of_case and (self._device is None or "." in name)}
         network: Path | PreparedScenario | None = None if self._rest.get("scr") is not None else Path(self._case)
@@ -135,23 +134,29 @@ class Asked:
 
     def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
         """Judge it."""
-        result = study_cut(self.request(), report)
-        return Nyquist(result, lambda values: study_cut(self.request(values)), lambda x: self._settings(result, x))
+        result = study_cut(self._request(), report)
+        return Nyquist(result, lambda values: study_cut(self._request(values)), lambda x: self._settings(result, x))
 
     def _settings(self, result: CutResult, given: Sequence[str]) -> list[Tunable]:
-        """Parameters of the device that are not 0: all tunable ones, or those that are named."""
+        """Parameters of the device that are not 0: all tunable ones that are not switched off, or those named."""
         case = None if self._device or result.scans or result.cut is None else result.request.network
         if isinstance(case, PreparedScenario) and result.cut is not None:
             plans = {name: case.system.components[name] for name in result.cut.devices}
-            found = parameters_in({n: p.description for n, p in plans.items()}, lambda n, v: plans[n].number(v), given)
+            known, patterns = {name: plan.description for name, plan in plans.items()}, list(given)
+            value_of: Callable[[str, str], float] = lambda name, variable: plans[name].number(variable)  # noqa: E731
         elif self._device and self._device.suffix.lower() not in ENDINGS:
             fmu, values = bound_fmu(self._device, result.request.binding), result.request.values
-            patterns = [f"{_FMU}{name}" for name in given]
-            found = parameters_in({_FMU[:-1]: fmu}, lambda _, v: float(values.get(v, start_of(fmu, v))), patterns)
+            known, patterns = {_FMU[:-1]: fmu}, [f"{_FMU}{name}" for name in given]
+            value_of = lambda _, variable: float(values.get(variable, start_of(fmu, variable)))  # noqa: E731
         else:
-            scan = self._device or result.loop.device.name
-            raise InputError(f"--retune: {scan} is a scan and has no parameters; give the FMU, DLL or case itself")
-        return [_range(x) for x in found if x.value]
+            what = f"--retune: {self._device or result.loop.device.name} is a scan and has no parameters"
+            raise InputError(f"{what}; give the FMU, DLL or case itself")
+
+        def acts(x: Parameter) -> bool:
+            switch = f"{x.variable.rpartition('.')[0]}.enabled"
+            return switch not in known[x.component].variables or bool(value_of(x.component, switch))
+
+        return [_range(x) for x in parameters_in(known, value_of, patterns) if x.value and (given or acts(x))]
 
 
 def _range(x: Parameter) -> Tunable:
@@ -161,6 +166,5 @@ def _range(x: Parameter) -> Tunable:
     return Tunable(x.name.removeprefix(_FMU), x.unit, x.value, low, high)
 
 
-def is_case(text: str) -> bool:
-    """Whether a side is a case, and no scan, FMU or DLL."""
+def _is_case(text: str) -> bool:
     return Path(text).suffix.lower() not in (*ENDINGS, ".fmu", ".so", ".dll")

@@ -2,14 +2,11 @@
 
 from orchestrator.cases.schema import ComponentTable
 
-NO_STATES = (
-    "{0} is known by its scan alone, which has no states: it cannot be run and has no modes; `gfor fmu nyquist {1}` "
-    "judges it, and for all else give the vendor's 'fmu' or 'dll'"
-)
+NO_STATES = ("{0} is known by its scan alone, which has no states: it cannot be run and has no modes; `gfor fmu "
+             "nyquist {1}` judges it, and for all else give the vendor's 'fmu' or 'dll'")  # fmt: skip
 
 
-def wrong(table: ComponentTable) -> str:
-    """What contradicts itself in a component's table; empty if nothing does."""
+def contradiction(table: ComponentTable) -> str:
     if sum(given is not None for given in (table.model, table.fmu, table.dll, table.scan)) != 1:
         return (
             "give either 'model' (a model of the catalogue), 'fmu' (the path of an .fmu), 'dll' (of a vendor's DLL, or "

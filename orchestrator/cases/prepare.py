@@ -191,7 +191,7 @@ class Preparer:
         where = self.draft.given.place("components", name)
         if takes_network(table) and self.draft.found.network_failed:
             return
-        if wrong := component_forms.wrong(table):
+        if wrong := component_forms.contradiction(table):
             self.draft.note(where, wrong)
             return
         if table.scan is not None and not self._case.scans:

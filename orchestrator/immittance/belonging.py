@@ -10,7 +10,7 @@ from orchestrator.immittance.cut import Cut
 from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict
 from orchestrator.immittance.loop import CutLoop
 from orchestrator.immittance.scan import PortPoint, Scan
-from orchestrator.immittance.sides import NEAR_ZERO
+from orchestrator.immittance.sides import NEAR_ZERO, Known
 
 _UNLIKE = (0.003, 30.0)
 """Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
@@ -93,7 +93,7 @@ def _is_of(judgement: CutJudgement, cut: Cut) -> bool:
     k = np.flatnonzero((path.s.real == 0) & (path.hertz > _COMPARED[0]) & (path.hertz < _COMPARED[1]))[
         :: len(path.s) // 20
     ]
-    s, poles = path.s[k][:, None], np.concatenate([cut.device.poles, cut.network.poles])
+    s, poles = path.s[k][:, None], np.concatenate([x.poles for x in (cut.device, cut.network) if isinstance(x, Known)])
     clocks = len(cut.eigenvalues) - len(poles)
     said = np.log(s - cut.eigenvalues).sum(axis=1) - np.log(s - poles).sum(axis=1) - clocks * np.log(s[:, 0])
     apart = np.exp(said - np.log(path.det[k]) - (said - np.log(path.det[k]))[0])

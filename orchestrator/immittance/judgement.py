@@ -21,6 +21,7 @@ _END, _SMALL = 1.5, 0.95
 _BEGIN = np.deg2rad(60.0)
 """Furthest phase of det(1 + L) at the lowest frequency from the real axis, on which it begins at 0 Hz."""
 
+_RANGE = (2.0, 400.0)  # what a scan has to hold at least [Hz]: swings, and what filters and delays do
 _SETTLED = 1.5  # growth of det(1 + L) over the last half of the range of models from which on it does not end there
 _INVARIANT = 1e-3
 _FRAMES = 16
@@ -176,8 +177,10 @@ def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
     """Whether an encirclement may lie below the lowest or beyond the highest frequency."""
     reasons = []
     first = _principal(path, 0) - path.lead
-    if abs(first - np.pi * round(first / np.pi)) > _BEGIN:
-        reasons.append(f"at {path.hertz[0]:g} Hz the loop is not yet where it begins: scan lower frequencies")
+    if abs(first - np.pi * round(first / np.pi)) > _BEGIN or path.hertz[0] > _RANGE[0]:
+        reasons.append(
+            f"at {path.hertz[0]:g} Hz the loop is not yet where it begins: scan lower ones, from {_RANGE[0]:g} Hz"
+        )
     if loop.is_exact:
         last, half = _principal(path, -1), int(np.argmax(path.hertz >= path.hertz[-1] / 2))
         if abs(last - np.pi * round(last / np.pi)) > _BEGIN or abs(path.det[-1] / path.det[half]) > _SETTLED:
@@ -188,11 +191,10 @@ def _ends(loop: CutLoop, path: LoopPath) -> list[str]:
     small = size.max() < _SMALL and size[-1] <= size[0] * 1.01
     passive = not any((_active(side)[1] & (_active(side)[0] >= path.hertz[-1] / _END)).any()
                       for side in (loop.device, loop.network))  # fmt: skip
-    if not (small or passive):
-        reasons.append(
-            f"beyond {path.hertz[-1]:g} Hz an encirclement may follow: up to there neither are both sides passive nor "
-            f"the loci small ({size[-1]:.2g}); scan higher frequencies"
-        )
+    if (early := path.hertz[-1] < _RANGE[1]) or not (small or passive):
+        why = "loci may grow again" if early else "neither are both sides passive nor the loci small"
+        reasons.append(f"beyond {path.hertz[-1]:g} Hz an encirclement may follow: {why} ({size[-1]:.2g}); scan higher "
+                       f"frequencies, {_RANGE[1]:g} Hz at least")  # fmt: skip
     return reasons
 
 

@@ -12,22 +12,13 @@ from orchestrator.errors import InputError
 from orchestrator.immittance.belonging import check_place
 from orchestrator.immittance.cut import Cut
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan
-from orchestrator.immittance.sides import Sampled, Several
+from orchestrator.immittance.sides import Sampled
 
 
 def scans_in(prepared: PreparedScenario) -> dict[str, ComponentTable]:
     """The tables of a scenario's components that are known by scans."""
     tables, there = prepared.case.table.components, prepared.system.components
     return {name: table for name, table in tables.items() if table.scan is not None and name in there}
-
-
-def check_held(held: Mapping[str, ComponentTable], cut: Cut) -> None:
-    """Refuse a cut that leaves a scan in the network."""
-    if held and set(cut.devices) != set(held):
-        raise InputError(
-            f"{', '.join(held)}: of a case with scans the two sides are all scans and all else, and the cut is at "
-            f"{', '.join(cut.devices)}; leave --bus and --component out"
-        )
 
 
 def in_unit(scan: Scan, unit: str, kilovolt: float | None) -> Scan:
@@ -61,14 +52,14 @@ def placed(scan: Scan, cut: Cut, name: str, kilovolt: float | None, angle: float
 
     The d axis of a scan that states an angle lies along the voltage of its bus, whatever that voltage's angle was."""
     check_place(scan, cut, name, kilovolt)
-    scan, stated = in_unit(scan, PER_UNIT, kilovolt), angle is not None
+    scan = in_unit(scan, PER_UNIT, kilovolt)
     if not any(point.megawatt is not None for point in scan.points.values()):
         S = cut.voltages[name] * cut.currents[name].conjugate() * SYSTEM_BASE_MVA
-        asked = f"was it scanned where {name} is here, at {S.real:.4g} MW and {S.imag:.4g} Mvar?"
-        scan = replace(scan, questions=(*scan.questions, f"{scan.source} states no operating point; {asked}"))
+        asked = f"{scan.source} states no operating point; was it scanned where {name} is here, at"
+        scan = replace(scan, questions=(*scan.questions, f"{asked} {S.real:.4g} MW and {S.imag:.4g} Mvar?"))
     if angle is None and all(port in scan.points and scan.points[port].angle is not None for port in scan.ports):
         angle = float(np.angle(cut.voltages[name]))
-    return (scan, stated) if angle is None else (scan.rotated([angle]), True)
+    return (scan, False) if angle is None else (scan.rotated([angle]), True)
 
 
 def at_ports(scans: Mapping[str, Scan], cut: Cut) -> Sampled:
@@ -86,7 +77,7 @@ def at_ports(scans: Mapping[str, Scan], cut: Cut) -> Sampled:
         rows = 2 * next(k for k, (_, here) in enumerate(cut.ports) if name in here) + np.arange(2)
         values[:, rows[:, None], rows] += part.at(2j * np.pi * f)
         bounds += part.error(2j * np.pi * f)
-    return Several(", ".join(scans), f, values, bounds, parts=tuple(parts.values()))
+    return Sampled(", ".join(scans), f, values, bounds, parts=tuple(parts.values()))
 
 
 def sampled(scan: Scan, *, inverse: bool = False) -> Sampled:

@@ -175,8 +175,9 @@ def _tell(out: Retuned) -> None:
     family = _family(out)
     out.values = np.unique(np.r_[out.setting.grid, family.nodes])
     out.figures = [family.figures(value) for value in out.values.tolist()]
-    if open_ := [f"{value:.4g}" for value, result in sorted(out.scans.items()) if result.judgement.reasons]:
-        out.remark = f"scans at {', '.join(open_)} give no verdict by themselves"
+    if open_ := {f"{value:.4g}": r.judgement.reasons for value, r in sorted(out.scans.items()) if r.judgement.reasons}:
+        why = next(iter(open_.values()))[0]
+        out.remark = f"scans at {', '.join(open_)} give no verdict by themselves, and none of these is taken: {why}"
 
 
 def _meet(study: Study, out: Retuned, goal: float, report: Callable[[str], None]) -> None:

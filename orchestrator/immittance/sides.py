@@ -61,10 +61,12 @@ class Sampled:
     values: Vector
     bounds: Numbers
     is_exact: bool = False
+    parts: tuple["Sampled", ...] = ()  # scans that it is made of, whose unstable poles no other one covers
 
     @cached_property
     def unstable(self) -> tuple[complex, ...]:
-        return unstable_poles(self.frequencies, self.values)
+        parts = [unstable_poles(one.frequencies, one.values) for one in self.parts or (self,)]
+        return tuple(pole for poles in parts for pole in poles)
 
     def at(self, s: Vector) -> Complex:
         f = s.imag / (2 * np.pi)
@@ -89,17 +91,6 @@ class Sampled:
         factor = np.where(small <= _RESOLVED * large, _SHARE, np.where(small < _NOISE * size, 1.0, _UNRESOLVED))
         rounding = 1e-9 * size
         return np.pad(np.minimum(factor * small, large + 10 * small) + rounding, 2, mode="edge")
-
-
-@dataclass(frozen=True)
-class Several(Sampled):
-    """Some scans at their rows of one matrix. Unstable poles are sought in each, where no other covers them."""
-
-    parts: tuple[Sampled, ...] = ()
-
-    @cached_property
-    def unstable(self) -> tuple[complex, ...]:
-        return tuple(pole for part in self.parts for pole in part.unstable)
 
 
 def _lagrange(f: Numbers, values: Vector, at: Numbers, places: Vector) -> Complex:

@@ -1,18 +1,18 @@
 """Beside the margin: the short-circuit ratio at a cut, a network that is no more than one, and who takes part where."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from orchestrator.arrays import Complex, Numbers, Vector
+from orchestrator.arrays import Complex, Vector
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.short_circuit import ShortCircuit
 from orchestrator.immittance.cut import Cut
 from orchestrator.immittance.judgement import CutJudgement
-from orchestrator.immittance.loop import CutLoop
+from orchestrator.immittance.loop import NO_MODES, CutLoop
 from orchestrator.immittance.margins import told
-from orchestrator.immittance.sides import Side
+from orchestrator.immittance.sides import Known, Side
 
 _MOST, _APART, _NEAR = 3, 1.15, 0.9
 """Critical frequencies that are told, the least ratio of two of them, and the largest distance."""
@@ -65,27 +65,19 @@ _ALIKE = 0.2  # relative change of the reactance up to the rated frequency from 
 
 
 @dataclass(frozen=True)
-class SourceBehind:
+class SourceBehind(Known):
     """An ideal source behind R + jX, as the impedance that a device sees, in a frame whose q axis leads."""
 
     name: str
     resistance: float
     reactance: float  # at the rated frequency
     omega: float  # rated frequency [rad/s]
-    is_exact: bool = True
-    unstable: tuple[complex, ...] = ()
-
-    @property
-    def frequencies(self) -> Numbers:
-        return np.zeros(0)
+    poles: Complex = field(default_factory=lambda: NO_MODES)
 
     def at(self, s: Vector) -> Complex:
         along = self.resistance + s * (self.reactance / self.omega)
         cross = np.full(len(s), self.reactance, dtype=complex)
         return np.stack([np.stack([along, -cross], -1), np.stack([cross, along], -1)], -2)
-
-    def error(self, s: Vector) -> Numbers:
-        return np.zeros(len(s))
 
 
 def strengths_of(

@@ -21,7 +21,7 @@ from orchestrator.immittance.judgement import CutJudgement, NyquistVerdict, judg
 from orchestrator.immittance.loop import NO_MODES, CutLoop, SeriesCapacitors, common_range
 from orchestrator.immittance.margins import NyquistMargins, margins_json
 from orchestrator.immittance.measured import scan_fmu
-from orchestrator.immittance.placing import at_ports, check_held, in_one_frame, in_unit, placed, sampled, scans_in
+from orchestrator.immittance.placing import at_ports, in_one_frame, in_unit, placed, sampled, scans_in
 from orchestrator.immittance.scan import PER_UNIT, SIEMENS, Scan, check_sign
 from orchestrator.immittance.scan_files import ENDINGS, read_scan
 from orchestrator.immittance.sides import Sampled, Side
@@ -224,7 +224,11 @@ def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cu
     a free angle makes of the loop."""
     held, scans, sure = scans_in(case), dict[str, Scan](), [True]
     cut = cut_of(case, request.bus, request.components or (() if request.bus else tuple(held)))
-    check_held(held, cut)
+    if held and set(cut.devices) != set(held):
+        raise InputError(
+            f"{', '.join(held)}: of a case with scans the two sides are all scans and all else, and the cut is at "
+            f"{', '.join(cut.devices)}; leave --bus and --component out"
+        )
     request = replace(request, frequency=cut.rated_hz or request.frequency)
     for name, table in held.items():
         scan = _read(request, "device", case.case.directory / str(table.scan))
@@ -237,7 +241,9 @@ def _opened(request: CutRequest, case: PreparedScenario) -> tuple[CutRequest, Cu
 def _read(request: CutRequest, side: str, path: Path) -> Scan:
     if side == "network" and path.suffix.lower() not in ENDINGS:
         raise InputError(f"{path}: the network is a scan's file or a case; an FMU can be the device")
-    scan = read_scan(path, request.frequency, network=side == "network")
+    scan, kv = read_scan(path, request.frequency, network=side == "network"), request.kilovolt
+    if off := [p.kilovolt for p in scan.points.values() if p.kilovolt and kv and not 0.8 < p.kilovolt / kv < 1.25]:
+        raise InputError(f"{path.name} was scanned at {off[0]:g} kV, and --voltage is {kv:g} kV; leave the option out")
     scan = scan.scaled(1.0, PER_UNIT) if side in request.per_unit else scan
     scan = scan.turned_sign() if side in request.generator else scan
     check_sign(scan, f"--generator {side}")

@@ -19,8 +19,8 @@ from orchestrator.results.storage import save_json
 GOAL = 0.3  # distance from −1 that a retuning is to reach: all of L may be off by so much of 1
 
 _MARGINS = (
-    ("gain up", "gain_up", "× {:.3f}"), ("gain down", "gain_down", "× {:.3f}"), ("phase", "phase_deg", "{:.1f}°"),
-    ("delay", "delay_s", "{:.2e} s"), ("distance from −1", "distance", "{:.3f}"), ("disk", "disk", "{:.3f}"),
+    ("gain up", "gain_up", "× {:.3f}"), ("gain down", "gain_down", "× {:.3f}"), ("phase, ±", "phase_deg", "{:.1f}°"),
+    ("delay, lag", "delay_s", "{:.2e} s"), ("distance from −1", "distance", "{:.3f}"), ("disk", "disk", "{:.3f}"),
 )  # fmt: skip
 
 
@@ -30,15 +30,7 @@ Report = Callable[[str], None]
 
 
 class Nyquist:
-    """What was found at a cut. `nyquist` makes it.
-
-    Attributes
-    ----------
-    result
-        Loop, judgement and scans.
-    retuned
-        What `retune` found, by parameter.
-    """
+    """What `nyquist` found at a cut: ``result`` has loop, judgement and scans, ``retuned`` what `retune` found."""
 
     def __init__(self, result: CutResult, study: Study, settings: Callable[[Sequence[str]], list[Tunable]]) -> None:
         self.result, self._study, self._settings = result, study, settings
@@ -58,22 +50,10 @@ class Nyquist:
     def retune(
         self, parameters: Sequence[str] = (), *, distance: float = GOAL, report: Report = lambda text: None
     ) -> list[Retuned]:
-        """Follow the distance from −1 over parameters of the device, and find the least change of each that is enough.
+        """Follow the distance from −1 over parameters of the device (names or patterns; all tunable ones by default),
+        and find the least change of each that is enough; those that are come first, by the size of the change.
 
-        Parameters
-        ----------
-        parameters
-            Names or patterns; all tunable ones by default.
-        distance
-            From −1, that is wanted.
-        report
-            Called with a sentence before each scan.
-
-        Returns
-        -------
-        list
-            What each does, those that are enough first, by the size of the change.
-        """
+        ``report``: Called with a sentence before each scan."""
         self.goal = distance
         found = [retune(self._study, setting, self.result, distance, report) for setting in self._settings(parameters)]
         self.retuned = sorted(found, key=lambda one: one.effort)
@@ -158,10 +138,8 @@ def _strength(result: CutResult) -> str:
     lost = f"; stability is lost below {limit:.3g}" if limit else ""
     said = "; no smaller one loses stability" if limit == 0 else lost
     of_all = "" if result.gscr is None else f", gSCR of all converters {result.gscr:.3g}"
-    what = (
-        f"Short-circuit ratio {result.scr:.3g}{of_all}{said}. It is no margin: devices and settings differ at one ratio"
-    )
-    return f"{what}; the distance of {d.value:.3g} counts"
+    told = f"what tells how far it is from instability is the distance, {d.value:.3g}"
+    return f"Short-circuit ratio {result.scr:.3g}{of_all}{said}. At one ratio devices and settings differ: {told}"
 
 
 def _cells(margin: Margin | None, text: str) -> tuple[str, str]:
@@ -217,7 +195,8 @@ def _row(x: Retuned, goal: float) -> tuple[str, ...]:
     unit = "" if x.setting.unit == "1" else f" {x.setting.unit}"
     head, said = (x.setting.name, f"{x.setting.now:.4g}{unit}"), _confirmed(x)
     if said is None:
-        k = int(np.nanargmax(x.distances))
+        judged = ~np.isin(x.values, [v for v, result in x.scans.items() if result.judgement.reasons])
+        k = int(np.nanargmax(np.where(judged, x.distances, -1.0)))
         best = "not alone; best" if not x.met(goal) else "none; best"
         return (*head, f"{best} {x.distances[k]:.3f} at {x.values[k]:.4g}", "", "", "", "")
     coupled = {True: "stable", False: "UNSTABLE", None: "not asked"}[said["modes_stable"]]

@@ -44,9 +44,8 @@ def with_levers(prepared: PreparedScenario, one: Located) -> Located:
     mode, levers = levers_of(prepared, one.found.frequency)
     if abs(mode.imag / (2 * np.pi) / one.found.frequency - 1) > _NEAR:
         return replace(one, advice=f"{one.advice}; the case has no mode near")
-    said = ["{} switched {} makes that {:.2f} %".format(x["controller"], ("on", "off")[x["on"]], x["damping_percent"])
-            for x in levers[:_NAMED]]  # fmt: skip
+    text = "{} switched {} makes that {:.2f} %"
+    said = [text.format(x["controller"], ("on", "off")[x["on"]], x["damping_percent"]) for x in levers[:_NAMED]]
     there = f"the case's mode there has {damping_percent(mode):.2f} % of damping; {'; '.join(said)}"
-    none = "no POD or PSS is there; `gfor site CASE` tells where one helps"
-    advice = f"damp the mode, which nothing drives: {there if levers else none}"
-    return replace(one, advice=advice, controllers=tuple(levers))
+    there = there if levers else "no POD or PSS is there; `gfor site CASE` tells where one helps"
+    return replace(one, advice=f"damp the mode, which nothing drives: {there}", controllers=tuple(levers))

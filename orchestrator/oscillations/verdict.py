@@ -169,9 +169,8 @@ class Located:
         return {
             "frequency_hz": self.found.frequency, "kind": self.evidence.kind, "source": self.source,
             "drives": self.drives, "reason": self.reason, "advice": self.advice, "begin": self.found.begin,
-            "controllers": list(self.controllers),
             "harmonics": {str(order): part for order, part in self.found.harmonics.items()},
-            "evidence": asdict(self.evidence),
+            "evidence": asdict(self.evidence), "controllers": list(self.controllers),
             "methods": [asdict(o) | {"ranking": [list(one) for one in o.ranking]} for o in self.opinions],
             "amplitudes": dict(list(self.found.amplitudes.items())[:_SHOWN]),
         }  # fmt: skip

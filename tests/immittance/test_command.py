@@ -110,6 +110,13 @@ def test_generator_sign(tmp_path):
         gfor.nyquist(*given)
 
 
+def test_a_rated_voltage_that_is_not_that_of_the_scan(tmp_path):
+    given = files(tmp_path, plant=PortPoint(100.0, 50.0, 5.0, 0.1))
+    with pytest.raises(InputError, match=r"plant.txt was scanned at 100 kV, and --voltage is 132 kV"):
+        gfor.nyquist(given[0], scr=1.5, rating="100 MVA", voltage="132 kV")
+    assert gfor.nyquist(given[0], scr=1.5, rating="100 MVA").verdict == "stable"
+
+
 def test_scans_at_two_operating_points(tmp_path):
     given = files(tmp_path, plant=PortPoint(100.0, 50.0, 5.0, 0.1), network=PortPoint(100.0, 80.0, 5.0, 0.1))
     with pytest.raises(InputError, match=r"another operating point than network.txt: active power \[MW\] 50 and 80"):

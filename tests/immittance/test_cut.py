@@ -10,6 +10,7 @@ import orchestrator as gfor
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.errors import InputError
 from orchestrator.immittance import cut as cut_module
+from orchestrator.immittance import judgement
 from orchestrator.immittance.cut import cut_of
 from orchestrator.immittance.judgement import judge_loop
 from orchestrator.immittance.loop import CutLoop, SeriesCapacitors
@@ -34,6 +35,9 @@ def test_a_disagreement_with_the_modes_is_no_verdict(monkeypatch):
     found = gfor.nyquist("two_area", scenario="gfor", components=["gfor"])
     assert found.verdict == "not known"
     assert "eigenvalues of the closed system say stable" in found.reasons[0]
+    monkeypatch.setattr("orchestrator.immittance.judgement._count", lambda path, turns, exact: 4)
+    found = gfor.nyquist("two_area", scenario="base", components=["sg1"])
+    assert "say unstable (2 grow), the encirclements unstable (4)" in found.reasons[0]
 
 
 def growth(cut, x):
@@ -96,6 +100,15 @@ def test_each_bus_of_a_whole_case_is_what_a_cut_there_finds():
         assert len(cut.network.unstable) == one.without
         assert alone.margins.distance.value == pytest.approx(one.margins.distance.value, rel=5e-3)
         assert alone.margins.phase_deg.value == pytest.approx(one.margins.phase_deg.value, rel=5e-3)
+
+
+def test_a_bus_whose_counts_differ_leaves_the_whole_open(monkeypatch):
+    count = judgement.encirclements
+    odd = lambda path, exact: (0, 1) if path.L.shape[-1] == 2 else count(path, exact=exact)  # noqa: E731
+    monkeypatch.setattr(judgement, "encirclements", odd)
+    cut = cut_of(gfor.load("two_area").scenario("gfor").prepared, None, ())
+    found = judge_loop(CutLoop(cut.device, cut.network))
+    assert (found.verdict, found.reasons[0][:47]) == ("not known", "at port 1 the determinant goes round 0 times an")
 
 
 def test_what_a_device_does_to_the_distance_is_what_more_of_it_does():

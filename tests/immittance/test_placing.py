@@ -2,6 +2,8 @@
 
 import cmath
 import shutil
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +15,10 @@ from orchestrator.cli import main
 from orchestrator.errors import CaseError, InputError
 from orchestrator.immittance import measured
 from orchestrator.immittance.cut import cut_of
+from orchestrator.immittance.placing import at_ports, in_one_frame
 from orchestrator.immittance.scan import PER_UNIT, PortPoint, Scan, block_rotation
 from orchestrator.immittance.scan_files import write_ztool
+from tests.immittance import plants
 
 AROUND = np.sinh(np.linspace(-4.5, 4.5, 121))
 MODEL = {"gfor": 'model = "gfor"', "sg2": 'model = "synchronous_generator_st1" '}
@@ -70,6 +74,16 @@ def test_an_fmu_in_the_place_of_a_scan_is_compared_with_it(tmp_path, two_area):
     assert turned["difference_from_case"]["largest_relative"] > 0.1
 
 
+def test_an_unstable_device_is_seen_beside_a_far_larger_one():
+    """Both at one bus: their sum shows no pole of the smaller one."""
+    rng, f = np.random.default_rng(3), np.geomspace(0.1, 1000, 300)
+    small, large = plants.random_plant(rng, unstable=True), plants.random_plant(rng)
+    scans = {"x": Scan("x", f, 1e-4 * small.admittance(f), ("x",)), "y": Scan("y", f, large.admittance(f), ("y",))}
+    both = at_ports(scans, SimpleNamespace(ports=(("bus", ("x", "y")),)))
+    assert both.unstable
+    assert not replace(both, parts=()).unstable
+
+
 def test_what_does_not_belong_there_is_refused(tmp_path, two_area):
     case = placed(tmp_path, two_area, "gfor", power=1.02)
     with pytest.raises(InputError, match="at another operating point than gfor in the case: active power"):
@@ -122,3 +136,18 @@ def test_the_frame_of_a_measured_scan_is_that_of_its_voltage(monkeypatch):
     scan = measured.as_scan("x", response, cmath.rect(1.0, 0.4))
     assert scan.values == pytest.approx(np.broadcast_to(Y, scan.values.shape))
     assert scan.points["x"].angle == pytest.approx(0.4)
+
+
+def test_two_files_are_turned_by_the_angles_that_they_state_or_by_the_one_given():
+    f, Y = np.geomspace(1, 9, 9), np.broadcast_to([[2.0, 0.3], [-0.1, 0.5]], (9, 2, 2))
+
+    def sides(**angles):
+        return {side: Scan(side, f, Y, ("P",), points={"P": PortPoint(angle=angle)}).rotated([-(angle or 0.0)])
+                for side, angle in angles.items()}  # fmt: skip
+
+    stated, open_ = sides(device=0.4, network=-0.9), sides(device=0.4, network=None)
+    assert in_one_frame(stated, None)
+    assert all(scan.values == pytest.approx(Y) for scan in stated.values())
+    assert not in_one_frame(open_, None)
+    assert in_one_frame(open_, 0.4)
+    assert open_["device"].values == pytest.approx(Y)
