@@ -22,6 +22,7 @@ from orchestrator.certification.codes.row import CodeRow, GridCode
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import RESPONSES
 from orchestrator.certification.form import NORM
+from orchestrator.certification.pod_effect import off_values
 from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult, compute_point
 from orchestrator.certification.request import CertificationRequest, same_reactance
 from orchestrator.certification.verification import Verification, read_certificate, verify_files
@@ -100,8 +101,11 @@ def _point_tasks(folder: Path, content: Content, reactances: Sequence[float], _:
     """Each point with and without the converter."""
     case = load_case(folder / CASE)
     study = {name: StudyCase.of(case.prepare([name], {"grid.X_L": reactances[0]})[0]) for name in (WITHOUT, WITH)}
-    return [CertificatePointTask(study[scenario], X_L, bool(content["black_box"]) and scenario == WITH)
-            for X_L in reactances for scenario in (WITHOUT, WITH)]  # fmt: skip
+    off = off_values(content["pod"]) if all(p.get("pod", {}).get("modes_off") for p in content["points"]) else ()
+    return [task for X_L in reactances for task in (
+        CertificatePointTask(study[WITHOUT], X_L),
+        CertificatePointTask(study[WITH], X_L, bool(content["black_box"]), off),
+    )]  # fmt: skip
 
 
 def _compare_point(content: Content, task: CertificatePointTask, again: PointResult, data: xr.Dataset) -> Compared:
@@ -119,9 +123,11 @@ def _compare_point(content: Content, task: CertificatePointTask, again: PointRes
     tolerance = TOLERANCE_IDENTIFIED if identified else TOLERANCE
     yield from ((f"{where}: {text}", "") for text in _differ_figures(point, scenario, again, tolerance))
     values = [complex(m["real"], m["imag"]) for m in stated]
+    stated_off = [complex(*x) for x in point.get("pod", {}).get("modes_off", ()) if task.off]
     kept = data[signal].sel(scenario=scenario, X_L=task.X_L).values
     for what, (fault, said) in (
         ("modes", _differ_modes(values, again.modes.eigenvalues.tolist(), tolerance)),
+        ("modes with POD off", _differ_modes(stated_off, [] if again.off is None else again.off.tolist(), tolerance)),
         (signal, _differ_signal(kept, again.signals.get(signal, np.empty(0)))),
     ):
         yield (f"{where}: {what}: {fault}", "") if fault else ("", f"{where}: {what}: {said}")

@@ -20,6 +20,7 @@ from orchestrator.certification.criteria import (
     stability_fault,
 )
 from orchestrator.certification.margins import CriterionMargin
+from orchestrator.certification.pod_effect import PodEffect
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
 from orchestrator.certification.swings import LARGEST_RATIO, SLOWEST_PERIOD, SwingTest, slow_part, swing_test
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
@@ -69,6 +70,7 @@ class PointVerdict:
     unknown: str = ""  # why the point could not be judged at all; empty where it was
     # the least damped judged mode without the converter [rad/s]; None where there is none.
     base_critical: complex | None = None
+    pod: PodEffect | None = None  # what the active damping controllers change; None where none is
 
     @property
     def judged(self) -> bool:

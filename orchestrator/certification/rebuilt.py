@@ -25,6 +25,7 @@ from orchestrator.certification.criteria import ModeVerdict, judge_mode
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
 from orchestrator.certification.form import NORM
 from orchestrator.certification.judgement import PointVerdict, judge
+from orchestrator.certification.pod_effect import kept_off, with_pod
 from orchestrator.certification.point import CONVERTER, PointResult
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.certification.study import Certification
@@ -82,6 +83,9 @@ def _damping_test(folder: Path, content: dict[str, Any], responses: xr.Dataset) 
         having, lacking = (_point(point, scenario, content, responses) for scenario in (WITH, WITHOUT))
         points |= {(result.scenario, result.X_L): result for result in (having, lacking)}
         verdicts.append(_verdict(point, having, lacking, controllers.pod, event))
+    if any("pod" in point for point in content["points"]):  # until 0.3 they were not switched off
+        verdicts = with_pod(verdicts, {X: result for (name, X), result in points.items() if name == WITH},
+                            controllers, event)  # fmt: skip
     return Certification(request, description, verdicts, controllers, event, folder / CASE, {}, points)
 
 
@@ -113,6 +117,7 @@ def _point(point: dict[str, Any], scenario: str, content: dict[str, Any], respon
     shapes = np.empty((len(modes), 0), complex)
     residual = point.get("residual", {}).get(scenario)
     values = np.array([_value(mode) for mode in modes], dtype=complex)
+    off = kept_off(point["pod"]) if having and "pod" in point else {}
     return PointResult(
         point["X_L"], scenario, ModeSet(values, shapes, shapes, ()),
         growth=np.nan if growth is None else growth, stability=point["stability"][scenario],
@@ -121,7 +126,7 @@ def _point(point: dict[str, Any], scenario: str, content: dict[str, Any], respon
         power=point["power"] if having else None, times=responses["time"].values, signals=signals,
         warnings=tuple(point.get("warnings", {}).get(scenario, ())),
         findings=point.get("findings", {}).get(scenario, []),
-        units={str(name): str(values.attrs.get("units", "")) for name, values in kept.items()},
+        units={str(name): str(values.attrs.get("units", "")) for name, values in kept.items()}, **off,
     )  # fmt: skip
 
 

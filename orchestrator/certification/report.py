@@ -12,6 +12,7 @@ from orchestrator.certification.case_file import BINDING, FMU, WITH, WITHOUT
 from orchestrator.certification.environment import environment
 from orchestrator.certification.figures import commands, parameter_rows
 from orchestrator.certification.judgement import LOWERED, PointVerdict, TimeVerdict
+from orchestrator.certification.pod_effect import pod_section
 from orchestrator.certification.point import CONVERTER, FREQUENCY, PointResult
 from orchestrator.certification.report_criteria import before, eigenvalues, responses, verdict
 from orchestrator.certification.request import REACTANCES, missing_reactances
@@ -170,6 +171,7 @@ def page(certification: Certification, hashes: Mapping[str, str | None], made: d
         ("Stability at all frequencies", _stability(certification)),
         ("Eigenvalue criterion", eigenvalues(certification, figures)),
         ("Time-domain criterion", responses(certification, figures)),
+        ("What the damping controllers change", pod_section(certification.verdicts)),
         ("Acceptance tests of the FMU", acceptance(certification)),
         ("Parameters of the FMU", parameters(certification)),
         ("Binding", binding(certification, hashes)),
