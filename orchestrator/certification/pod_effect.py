@@ -88,7 +88,7 @@ def with_pod(
                      f"{pod.better_off:.3g} times better"]  # fmt: skip
         if v is worst and (by := pod.apart("on", "off") or 0.0) < RAISED:
             said += [
-                f"{name} does not damp the electromechanical mode: {least:.2f} % without it, {by:+.2f} points with it"
+                f"{name} does not damp the electromechanical mode: {least:.2f} % without, {by:+.2f} points with it"
             ]
         faults = tuple(dict.fromkeys((*v.faults, *said)))
         unknown = v.unknown or (f"what {name} changes is not known: {pod.unknown}" if pod.unknown else "")
@@ -99,15 +99,11 @@ def with_pod(
 def _effect(point: PointResult, event: float, why: str) -> PodEffect:
     modes: dict[str, complex | None] = {"off": None, "on": None, "response": None}
     if point.off is None or point.modes is None:
-        return PodEffect(
-            np.empty(0, complex), modes, None, point.off_failure or why or str(point.failure or "no modes")
-        )
-    off, on = point.swings.tolist()
-    if not np.isnan(point.swings).any() and abs(on.imag - off.imag) <= _RELATED * off.imag:
-        modes |= {
-            "off": min(point.off.tolist(), key=lambda x: abs(x - off)),
-            "on": min(point.modes.eigenvalues.tolist(), key=lambda x: abs(x - on)),
-        }
+        why = point.off_failure or why or str(point.failure or "it has no modes")
+        return PodEffect(np.empty(0, complex), modes, None, why)
+    if np.ptp(point.swings.imag) <= _RELATED * point.swings[0].imag and not np.isnan(point.swings).any():
+        listed = zip(("off", "on"), (point.off, point.modes.eigenvalues), point.swings, strict=True)
+        modes |= {name: complex(own[np.abs(own - x).argmin()]) for name, own, x in listed}
     window = (point.times >= event + _WINDOW[0]) & (point.times <= event + _WINDOW[1])
     signal = point.signals.get(POWER)
     if point.failure or signal is None or not np.isfinite(signal).all() or window.sum() < 99:
@@ -134,21 +130,10 @@ def _misfit(t: Numbers, y: Numbers, eigenvalues: Complex) -> float:
 def pod_section(verdicts: Sequence["PointVerdict"]) -> str:
     rows = []
     for X_L, pod in ((f"{v.X_L:g}", v.pod) for v in verdicts if v.pod):
-        modes = (
-            f"{x.imag / (2 * np.pi):.3f} Hz, {number(damping_percent(x), 2)} %" if x else "–"
-            for x in pod.modes.values()
-        )
+        named = [x and f"{x.imag / (2 * np.pi):.3f} Hz, {number(damping_percent(x), 2)} %" for x in pod.modes.values()]
         change, better = ("–" if x is None else number(x, 2) for x in (pod.apart("on", "off"), pod.better_off))
-        rows.append([X_L, *modes, "<b>yes</b>" if pod.disagrees else "no", change, better])
-    columns = [
-        "X_L [pu]",
-        "Off",
-        "On",
-        "In SG1's power",
-        "Disagrees with on",
-        "Raised by [points]",
-        "Fits better off, times",
-    ]
+        rows.append([X_L, *(text or "–" for text in named), "<b>yes</b>" if pod.disagrees else "no", change, better])
+    columns = ["X_L [pu]", "Off", "On", "In SG1's power", "It disagrees", "Raised by [points]", "Off fits better"]
     note = (f"<p>Where it is damped least with them off they have to raise it by {RAISED:g} points; nowhere may the "
             f"modes with them off fit SG1's power more than {TWICE:g} times better. More than {AGREED:g} points "
             "between the dampings of eigenvalue and power are a finding. A dash: no mode is it.</p>")  # fmt: skip
