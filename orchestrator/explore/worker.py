@@ -104,7 +104,8 @@ class Desk:
         self._case: Case | None = None
         self._stamp: list[float] = []
         self._prepared: tuple[str, ItemPreparation, dict[str, int]] | None = None  # with its points' numbers
-        self._bench = PointBench()  # the next question's FMUs are those of the last one, where they can be
+        # the next question's FMUs are those of the last one, where they can be and their files have not changed
+        self._bench, self._files = PointBench(), dict[Path, list[float]]()
 
     def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
         """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, recorded, run, save."""
@@ -172,6 +173,10 @@ class Desk:
 
     def _computed(self, scenario: Scenario, frequencies: tuple[float, float]) -> Modes:
         prepared = scenario.prepared
+        files = {path: _stamp(path) for plan in prepared.system.components.values() if (path := plan.description.path)}
+        if files != self._files:
+            self._bench.close()
+            self._files = files
         try:
             return Modes(modes_of(prepared, self._bench.master(in_service(prepared)), frequencies))
         except BaseException:
