@@ -12,6 +12,7 @@ from orchestrator.certification.criteria import (
     LEAST_DAMPING,
     ModalTest,
     ModeVerdict,
+    PodEffect,
     critical_mode,
     judged_modes,
     matched_modes,
@@ -20,7 +21,6 @@ from orchestrator.certification.criteria import (
     stability_fault,
 )
 from orchestrator.certification.margins import CriterionMargin
-from orchestrator.certification.pod_effect import PodEffect
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
 from orchestrator.certification.swings import LARGEST_RATIO, SLOWEST_PERIOD, SwingTest, slow_part, swing_test
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE

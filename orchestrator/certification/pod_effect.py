@@ -1,58 +1,28 @@
 """What the active damping controllers change at a point: its modes with them off, and whether the response shows it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from orchestrator.analysis.identification import identify_modes, nearest
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.arrays import Complex, Numbers
+from orchestrator.certification.criteria import AGREED, PodEffect
 from orchestrator.certification.damping_controllers import DampingControllers, variable
+from orchestrator.certification.judgement import PointVerdict
 from orchestrator.certification.point import CONVERTER, POWER, PointResult
 from orchestrator.certification.swings import slow_part
 from orchestrator.errors import AnalysisError
 from orchestrator.report.html.elements import number, table
-from orchestrator.results.mode_json import eigenvalue_json
-
-if TYPE_CHECKING:
-    from orchestrator.certification.judgement import PointVerdict
 
 RAISED = 0.1  # by so many points they have to raise the electromechanical mode's damping, where it is least without
-AGREED = 5.0  # more points between the dampings of eigenvalue and recorded response are a finding
 TWICE = 2.0  # a response that the modes without them fit so many times better is not that of the modes with them
 _RELATED = 0.3  # change of the frequency up to which it is known to be the same mode, in parts of it
 _WINDOW = (0.5, 10.5)  # of the response, after the event [s]
 _EVERY = 10  # so many samples apart are those that are fitted
 _SLOW = (0.0, 0.1, 1.0)  # decay of what does not swing [1/s]
-
-
-@dataclass(frozen=True)
-class PodEffect:
-    """``modes``: the electromechanical mode ``off``, ``on``, and nearest to it in the ``response``; None where unknown.
-
-    ``better_off``: how many times better the modes without the controllers fit the response."""
-
-    modes_off: Complex
-    modes: Mapping[str, complex | None]
-    better_off: float | None = None
-    unknown: str = ""  # why there is nothing of all that
-
-    def apart(self, one: str, other: str) -> float | None:
-        """Damping of a mode less that of another [points]."""
-        a, b = self.modes.get(one), self.modes.get(other)
-        return None if a is None or b is None else damping_percent(a) - damping_percent(b)
-
-    @property
-    def disagrees(self) -> bool:
-        return abs(self.apart("response", "on") or 0.0) > AGREED
-
-    def as_json(self) -> dict[str, Any]:
-        modes = {k: None if x is None else eigenvalue_json(x, damping_percent(x)) for k, x in self.modes.items()}
-        found = {"better_off": self.better_off, "raised": self.apart("on", "off"), "disagrees": self.disagrees}
-        return {"modes_off": [[x.real, x.imag] for x in self.modes_off], "modal": {**modes, **found},
-                "unknown": self.unknown}  # fmt: skip
 
 
 def off_values(pod: str) -> tuple[tuple[str, bool], ...]:
@@ -68,9 +38,9 @@ def kept_off(stated: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def with_pod(
-    verdicts: Sequence["PointVerdict"], points: Mapping[float, PointResult], controllers: DampingControllers,
+    verdicts: Sequence[PointVerdict], points: Mapping[float, PointResult], controllers: DampingControllers,
     event: float,
-) -> list["PointVerdict"]:  # fmt: skip
+) -> list[PointVerdict]:  # fmt: skip
     """The verdicts with what the active controllers change; ``points`` are those with the converter.
 
     They have to damp where the mode needs it most, and in the response as at the eigenvalues."""
@@ -127,7 +97,7 @@ def _misfit(t: Numbers, y: Numbers, eigenvalues: Complex) -> float:
     return float(np.linalg.norm(y - columns @ np.linalg.lstsq(columns, y, rcond=1e-6)[0]))
 
 
-def pod_section(verdicts: Sequence["PointVerdict"]) -> str:
+def pod_section(verdicts: Sequence[PointVerdict]) -> str:
     rows = []
     for X_L, pod in ((f"{v.X_L:g}", v.pod) for v in verdicts if v.pod):
         named = [x and f"{x.imag / (2 * np.pi):.3f} Hz, {number(damping_percent(x), 2)} %" for x in pod.modes.values()]
