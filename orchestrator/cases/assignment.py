@@ -26,6 +26,7 @@ class Convention:
 
 
 LIKE = {"exact": Convention(True, False), "psse": Convention(False, False), "andes": Convention(False, True)}
+LIKE["powerfactory"] = LIKE["psse"]
 
 
 def assign_conventions(draft: Draft) -> None:

@@ -549,7 +549,7 @@ class KindTable(Table):
 class ConventionsTable(Table):
     """Assumptions about machines, all of a program's or each alone; `conventions` knows who makes which."""
 
-    like: Literal["exact", "psse", "andes"] = "exact"
+    like: Literal["exact", "psse", "powerfactory", "andes"] = "exact"
     speed_in_emf: Annotated[bool, Field(strict=True)] | None = None
     governor_gives: Literal["power", "torque"] | None = None
 

@@ -10,15 +10,19 @@ from numpy.typing import NDArray
 from orchestrator.analysis.identification import IdentifiedMode, identify_modes
 from orchestrator.analysis.mode_names import CLEAR
 from orchestrator.analysis.mode_tracking import THRESHOLD, ModeSet, similarities
-from orchestrator.analysis.modes import ZERO, OfEigenvalue, damping_ratio
+from orchestrator.analysis.modes import ZERO, OfEigenvalue, damping_percent, damping_ratio
 from orchestrator.analysis.threads import one_thread
+from orchestrator.arrays import Complex
 from orchestrator.errors import AnalysisError
+from orchestrator.results.mode_json import eigenvalue_json
 
 FREQUENCIES = (0.1, 1.5)  # range of frequencies of the judged modes [Hz], both ends included
 PAIRED = (0.08, 1.875)  # range of frequencies in which a judged mode may lie in the other system [Hz]
 LEAST_DAMPING = 0.05  # damping ratio that a judged mode needs
 LEAST_AMPLITUDE = 0.01
 """Components below this fraction of a signal's largest oscillation are ignored: they fit its remainder."""
+
+AGREED = 5.0  # more points between the dampings of an eigenvalue and of the recorded response are a finding
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,33 @@ class ModeVerdict(OfEigenvalue):
     def before_percent(self) -> float | None:
         """Damping of the same mode without the converter [%]; None if there is no such mode."""
         return None if self.before is None else 100 * damping_ratio(self.before)
+
+
+@dataclass(frozen=True)
+class PodEffect:
+    """``modes``: the electromechanical mode ``off``, ``on``, and nearest to it in the ``response``; None where unknown.
+
+    ``better_off``: how many times better the modes without the controllers fit the response."""
+
+    modes_off: Complex
+    modes: Mapping[str, complex | None]
+    better_off: float | None = None
+    unknown: str = ""  # why there is nothing of all that
+
+    def apart(self, one: str, other: str) -> float | None:
+        """Damping of a mode less that of another [points]."""
+        a, b = self.modes.get(one), self.modes.get(other)
+        return None if a is None or b is None else damping_percent(a) - damping_percent(b)
+
+    @property
+    def disagrees(self) -> bool:
+        return abs(self.apart("response", "on") or 0.0) > AGREED
+
+    def as_json(self) -> dict[str, Any]:
+        modes = {k: None if x is None else eigenvalue_json(x, damping_percent(x)) for k, x in self.modes.items()}
+        found = {"better_off": self.better_off, "raised": self.apart("on", "off"), "disagrees": self.disagrees}
+        return {"modes_off": [[x.real, x.imag] for x in self.modes_off], "modal": {**modes, **found},
+                "unknown": self.unknown}  # fmt: skip
 
 
 @dataclass(frozen=True)

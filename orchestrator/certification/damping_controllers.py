@@ -28,6 +28,7 @@ class DampingControllers:
     settings: Mapping[str, bool] = field(default_factory=dict)
     declared: str = ""  # letters of the controllers, active or not, that only the applicant declares
     unseen: str = ""  # letters of active controllers with a switch but without an output that shows their effect
+    can_be_off: bool = False  # whether each active one has a switch that may be set
 
     def in_words(self) -> str:
         """The active controllers for a headline, with a note on each one that is not certain."""
@@ -48,7 +49,7 @@ def damping_controllers(description: FmuDescription, request: CertificationReque
         active = "".join(letter for letter, value in known.items() if value) or "none"
         unseen = _unseen(description, known, active)
         source = UNKNOWN if None in known.values() and active == "none" else _with_unseen(READ, unseen)
-        return DampingControllers(active, source, unseen=unseen)
+        return DampingControllers(active, source, unseen=unseen, can_be_off=_switched(description, active))
     wanted = {letter: letter in request.pod.removeprefix("none") for letter in "pq"}
     settings = {}
     for letter, on in wanted.items():
@@ -59,11 +60,16 @@ def damping_controllers(description: FmuDescription, request: CertificationReque
     source = SET if all(known[letter] is not None for letter in "pq") else _partly(known, request.pod)
     unseen = _unseen(description, known, request.pod)
     declared = "".join(letter for letter, value in known.items() if value is None)
-    return DampingControllers(request.pod, _with_unseen(source, unseen), settings, declared, unseen)
+    can_be_off = _switched(description, request.pod)
+    return DampingControllers(request.pod, _with_unseen(source, unseen), settings, declared, unseen, can_be_off)
 
 
 def variable(letter: str) -> str:
     return f"pod_{letter}.enabled"
+
+
+def _switched(description: FmuDescription, pod: str) -> bool:
+    return all(_is_switch(description.variables.get(variable(letter))) for letter in pod.removeprefix("none"))
 
 
 def _unseen(description: FmuDescription, known: Mapping[str, bool | None], pod: str) -> str:

@@ -156,6 +156,7 @@ def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
         "time": None if v.time is None else time_json(v.time),
         "time_without": None if v.base_time is None else time_json(v.base_time),
         "again": {n: commands(v.X_L, n, identified=having.identified is not None) for n in points},
+        **({} if v.pod is None else {"pod": v.pod.as_json()}),
     }  # fmt: skip
 
 

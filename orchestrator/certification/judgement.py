@@ -12,6 +12,7 @@ from orchestrator.certification.criteria import (
     LEAST_DAMPING,
     ModalTest,
     ModeVerdict,
+    PodEffect,
     critical_mode,
     judged_modes,
     matched_modes,
@@ -70,6 +71,7 @@ class PointVerdict:
     unknown: str = ""  # why the point could not be judged at all; empty where it was
     # the least damped judged mode without the converter [rad/s]; None where there is none.
     base_critical: complex | None = None
+    pod: PodEffect | None = None  # what the active damping controllers change; None where none is
 
     @property
     def name(self) -> str:

@@ -11,15 +11,19 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import find_spectrum
 from orchestrator.analysis.stability import Stability, judge
-from orchestrator.arrays import Numbers
+from orchestrator.arrays import Complex, Numbers
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import Case
+from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.schema import Value
 from orchestrator.certification.frequency import bus_frequency
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
+from orchestrator.errors import CosimError
 from orchestrator.points.failure import Failure, failure_kept
 from orchestrator.points.task import Kept, Task, computed
 from orchestrator.study.modes import modes_of, running
+from orchestrator.study.naming import named_modes
 from orchestrator.watch.watch import Watch
 
 COMPUTED = (0.05, 3.0)
@@ -54,6 +58,11 @@ class PointResult(Kept):
     warnings: tuple[str, ...] = ()
     # findings of the watch on the run, in the form of `Finding.as_json`.
     findings: list[dict[str, Any]] = field(default_factory=list)
+    # eigenvalues with the damping controllers off [rad/s], and the electromechanical mode's off and on, nan where no
+    # shape tells it; None where they are not switched off, or `off_failure` says why it could not be had.
+    off: Complex | None = None
+    swings: Complex = field(default_factory=lambda: np.full(2, np.nan + 0j))
+    off_failure: str = ""
     failure: Failure | None = None  # why there are no modes, or why the response is incomplete
 
     keeps_failures = False
@@ -64,6 +73,7 @@ class CertificatePointTask(Task):
     record = PointResult
     X_L: float
     black_box: bool = False
+    off: tuple[tuple[str, Value], ...] = ()  # values by ``component.variable`` that switch the damping controllers off
 
     def failed(self, failure: Failure) -> PointResult:
         return PointResult(self.X_L, self.scenario, failure=failure)
@@ -85,27 +95,49 @@ def _compute(case: Case, task: CertificatePointTask, result: PointResult) -> Non
     watch = Watch(prepared)
     with running(prepared) as master:
         misfits = misfits_of(master)
-        converter = master.components.get(CONVERTER)
-        if converter is not None and (task.black_box or is_black_box(converter)):
-            boxed = linearize_with_box(master, CONVERTER)
-            result.residual, result.identified = boxed.residual, len(boxed.identified.A)
-            result.fit_errors, result.warnings = {CONVERTER: boxed.identified.error}, boxed.warnings
-            _keep_modes(result, boxed.model, None)
-        else:
-            found = modes_of(prepared, master, COMPUTED)
-            result.residual, result.warnings = found.operating_point.residual, found.warnings
-            _keep_modes(result, found.model, found.stability)
+        _linearised(prepared, master, result, black_box=task.black_box)
         f_n = prepared.system.components["sg1"].number("f_n")
         try:
             master.run(prepared.stop_time, prepared.events, watch.observers)
         finally:
             _keep_signals(result, watch.recorder, master, f_n)
     result.findings = [finding.as_json() for finding in watch.findings(misfits=misfits)]
+    if task.off:
+        _switch_off(case, task, result)
 
 
-def _keep_modes(result: PointResult, model: LinearModel, stability: Stability | None) -> None:
+def _switch_off(case: Case, task: CertificatePointTask, result: PointResult) -> None:
+    other = PointResult(task.X_L, task.scenario)
+    try:
+        prepared = task.study.prepare(case, {"grid.X_L": task.X_L, **dict(task.off)})
+        with running(prepared) as master:
+            _linearised(prepared, master, other, black_box=task.black_box)
+    except CosimError as error:
+        result.off_failure = str(error)
+    if other.modes is not None:
+        result.off, result.swings[0] = other.modes.eigenvalues, other.swings[1]
+
+
+def _linearised(prepared: PreparedScenario, master: Master, result: PointResult, *, black_box: bool) -> None:
+    converter = master.components.get(CONVERTER)
+    if converter is not None and (black_box or is_black_box(converter)):
+        boxed = linearize_with_box(master, CONVERTER)
+        result.residual, result.identified = boxed.residual, len(boxed.identified.A)
+        result.fit_errors, result.warnings = {CONVERTER: boxed.identified.error}, boxed.warnings
+        _keep_modes(prepared, result, boxed.model, None)
+    else:
+        found = modes_of(prepared, master, COMPUTED)
+        result.residual, result.warnings = found.operating_point.residual, found.warnings
+        _keep_modes(prepared, result, found.model, found.stability)
+
+
+def _keep_modes(
+    prepared: PreparedScenario, result: PointResult, model: LinearModel, stability: Stability | None
+) -> None:
     spectrum = find_spectrum(model, *COMPUTED)
     modes = [mode for mode in spectrum.modes if mode.is_oscillation]
+    for mode in named_modes(prepared.case, model, modes).named.values():
+        result.swings[1] = mode.eigenvalue
     result.modes = ModeSet.of(modes, model.names)
     result.linearised = dict(model.sources)
     result.components = [

@@ -29,6 +29,7 @@ from orchestrator.certification.compared import (
 from orchestrator.certification.criteria import ModeVerdict, judge_mode
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
 from orchestrator.certification.judgement import PointVerdict, judge
+from orchestrator.certification.pod_effect import kept_off, off_values, with_pod
 from orchestrator.certification.point import CONVERTER, CertificatePointTask, PointResult
 from orchestrator.certification.request import CertificationRequest, same_reactance
 from orchestrator.errors import InputError
@@ -48,6 +49,9 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
         having, lacking = (_point(point, scenario, content, responses) for scenario in (WITH, WITHOUT))
         points |= {(result.scenario, result.X_L): result for result in (having, lacking)}
         verdicts.append(_verdict(point, having, lacking, controllers.pod, event))
+    if any("pod" in point for point in content["points"]):  # until 0.3 they were not switched off
+        verdicts = with_pod(verdicts, {X: result for (name, X), result in points.items() if name == WITH},
+                            controllers, event)  # fmt: skip
     return Certificate(request, description, NTS, NTS.f_n, verdicts, points, folder / CASE,
                        damping=DampingTest(controllers, event))  # fmt: skip
 
@@ -80,6 +84,7 @@ def _point(point: dict[str, Any], scenario: str, content: dict[str, Any], respon
     shapes = np.empty((len(modes), 0), complex)
     residual = point.get("residual", {}).get(scenario)
     values = np.array([_value(mode) for mode in modes], dtype=complex)
+    off = kept_off(point["pod"]) if having and "pod" in point else {}
     return PointResult(
         point["X_L"], scenario, ModeSet(values, shapes, shapes, ()),
         growth=np.nan if growth is None else growth, stability=point["stability"][scenario],
@@ -88,7 +93,7 @@ def _point(point: dict[str, Any], scenario: str, content: dict[str, Any], respon
         power=point["power"] if having else None, times=responses["time"].values, signals=signals,
         warnings=tuple(point.get("warnings", {}).get(scenario, ())),
         findings=point.get("findings", {}).get(scenario, []),
-        units={str(name): str(values.attrs.get("units", "")) for name, values in kept.items()},
+        units={str(name): str(values.attrs.get("units", "")) for name, values in kept.items()}, **off,
     )  # fmt: skip
 
 
@@ -159,8 +164,11 @@ def tasks(folder: Path, content: Content, reactances: Sequence[float], _: Verifi
     """Each point with and without the converter."""
     case = load_case(folder / CASE)
     study = {name: StudyCase.of(case.prepare([name], {"grid.X_L": reactances[0]})[0]) for name in (WITHOUT, WITH)}
-    return [CertificatePointTask(study[scenario], X_L, bool(content["black_box"]) and scenario == WITH)
-            for X_L in reactances for scenario in (WITHOUT, WITH)]  # fmt: skip
+    off = off_values(content["pod"]) if all(p.get("pod", {}).get("modes_off") for p in content["points"]) else ()
+    return [task for X_L in reactances for task in (
+        CertificatePointTask(study[WITHOUT], X_L),
+        CertificatePointTask(study[WITH], X_L, bool(content["black_box"]), off),
+    )]  # fmt: skip
 
 
 def compare(content: Content, task: CertificatePointTask, again: PointResult, data: xr.Dataset) -> Compared:
@@ -178,9 +186,11 @@ def compare(content: Content, task: CertificatePointTask, again: PointResult, da
     tolerance = TOLERANCE_IDENTIFIED if identified else TOLERANCE
     yield from ((f"{where}: {text}", "") for text in _differ_figures(point, scenario, again, tolerance))
     values = [complex(m["real"], m["imag"]) for m in stated]
+    stated_off = [complex(*x) for x in point.get("pod", {}).get("modes_off", ()) if task.off]
     kept = data[signal].sel(scenario=scenario, X_L=task.X_L).values
     for what, (fault, said) in (
         ("modes", _differ_modes(values, again.modes.eigenvalues.tolist(), tolerance)),
+        ("modes with POD off", _differ_modes(stated_off, [] if again.off is None else again.off.tolist(), tolerance)),
         (signal, differ_signal(kept, again.signals.get(signal, np.empty(0)))),
     ):
         yield (f"{where}: {what}: {fault}", "") if fault else ("", f"{where}: {what}: {said}")

@@ -12,6 +12,7 @@ from orchestrator.certification.certificate import Certificate, DampingTest
 from orchestrator.certification.criteria import PAIRED, is_judged, is_near
 from orchestrator.certification.figures import fit_errors_of, linearised_of
 from orchestrator.certification.judgement import LOWERED, PointVerdict, TimeVerdict
+from orchestrator.certification.pod_effect import pod_section
 from orchestrator.certification.point import COMPUTED, CONVERTER, FREQUENCY, PointResult
 from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
@@ -30,6 +31,7 @@ def damping_chapters(c: Certificate, test: DampingTest, figures: Figures) -> lis
         ("Stability at all frequencies", _stability(c)),
         ("Eigenvalue criterion", eigenvalues(c, figures)),
         ("Time-domain criterion", "".join(part for v in c.verdicts for part in _response(c, v, test, figures))),
+        ("What the damping controllers change", pod_section(c.verdicts)),
     ]
 
 

@@ -11,6 +11,7 @@ from orchestrator.certification.certificate import Certificate, DampingTest, ref
 from orchestrator.certification.codes.all_codes import CODES, NTS
 from orchestrator.certification.damping_controllers import DampingControllers, damping_controllers
 from orchestrator.certification.judgement import judge
+from orchestrator.certification.pod_effect import off_values, with_pod
 from orchestrator.certification.point import CONVERTER, CertificatePointTask, compute_point
 from orchestrator.certification.request import CertificationRequest, rated_frequency
 from orchestrator.errors import InputError
@@ -46,6 +47,7 @@ def certify(
     points = {(task.scenario, task.X_L): point for task, point in zip(tasks, found, strict=True)}
     event, having = prepared[WITH].events[0].time, prepared[WITH]
     verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
+    verdicts = with_pod(verdicts, {X: points[WITH, X] for X in request.reactances}, controllers, event)
     description = having.system.components[CONVERTER].description
     return Certificate(
         request, description, NTS, NTS.f_n, verdicts, points, having.case.path, values=having.values,
@@ -60,13 +62,19 @@ def tasks_of(
     own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **controllers.settings}.items()}
     settings: dict[str, dict[str, Value]] = {WITHOUT: dict(request.study_values), WITH: {**request.study_values, **own}}
     without = _tasks(prepared[WITHOUT], settings[WITHOUT], request.reactances, black_box=False)
-    having = _tasks(prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box)
+    off = off_values(controllers.pod) if controllers.can_be_off else ()
+    having = _tasks(prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box, off=off)
     return [task for pair in zip(without, having, strict=True) for task in pair]
 
 
 def _tasks(
-    prepared: PreparedScenario, values: dict[str, Value], reactances: Sequence[float], *, black_box: bool
+    prepared: PreparedScenario,
+    values: dict[str, Value],
+    reactances: Sequence[float],
+    *,
+    black_box: bool,
+    off: tuple[tuple[str, Value], ...] = (),
 ) -> list[CertificatePointTask]:
     # The case file names the binding, if there is one. The binding's effect is part of the scenario's content.
     study = StudyCase.of(prepared, text=BASE.read_text(encoding="utf-8"), overrides=sorted(values.items()))
-    return [CertificatePointTask(study, X_L, black_box) for X_L in reactances]
+    return [CertificatePointTask(study, X_L, black_box, off) for X_L in reactances]

@@ -20,15 +20,18 @@ from orchestrator.api.scenario import Scenario
 from orchestrator.arrays import Complex
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.schema import Value
+from orchestrator.cases.service import in_service
 from orchestrator.cases.sharing import SharingRule
 from orchestrator.errors import CosimError, InputError
 from orchestrator.explore.copied import copied, events_of, explored, saved
 from orchestrator.explore.diagram import diagram
 from orchestrator.explore.responses import linear, plotted, recorded, simulated
 from orchestrator.fmi.interrupts import calls
+from orchestrator.operating_points.bench import PointBench
 from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.preparation import ItemPreparation
 from orchestrator.spelling import as_options
+from orchestrator.study.modes import modes_of
 
 _CHANGE = 2e-3  # of the parameter, in parts of its value, or of 1 where that is 0
 
@@ -40,6 +43,7 @@ _WIDER = 1.5  # the range in which changed modes are looked for, beyond that whi
 def slopes(
     scenario_with: Callable[[Mapping[str, Value]], Scenario], values: Mapping[str, Value], parameter: str,
     frequencies: tuple[float, float], say: Callable[[str], None],
+    computed: Callable[[Scenario, tuple[float, float]], Modes] = Scenario.modes,
 ) -> dict[str, Any]:  # fmt: skip
     """``value``, ``eigenvalues`` there, and ``slopes``, each a list of [real, imag]; None where no slope is known.
 
@@ -56,10 +60,11 @@ def slopes(
     least, most = (-np.inf if info.minimum is None else info.minimum, np.inf if info.maximum is None else info.maximum)
     ends = [min(max(end, least), most) for end in (value - change, value + change)]
     say("modes at the value itself")
-    base = eigenvalues(here.modes(frequencies))
+    base = eigenvalues(computed(here, frequencies))
     wider = (frequencies[0] / _WIDER, frequencies[1] * _WIDER)
     say(f"modes at both sides of {parameter} = {value:.5g}")
-    moved = [matched(base, eigenvalues(scenario_with({**values, parameter: end}).modes(wider))) for end in ends]
+    beside = (scenario_with({**values, parameter: end}) for end in ends)
+    moved = [matched(base, eigenvalues(computed(one, wider))) for one in beside]
     width = ends[1] - ends[0]
     found = (moved[1] - moved[0]) / width if width > 0 else np.full(base.shape, np.nan + 0j)
     return {
@@ -99,6 +104,8 @@ class Desk:
         self._case: Case | None = None
         self._stamp: list[float] = []
         self._prepared: tuple[str, ItemPreparation, dict[str, int]] | None = None  # with its points' numbers
+        # the next question's FMUs are those of the last one, where they can be and their files have not changed
+        self._bench, self._files = PointBench(), dict[Path, list[float]]()
 
     def answer(self, question: Mapping[str, Any], say: Say) -> dict[str, Any]:
         """What is asked for under ``ask``: open, cell, parameters, modes, slopes, response, recorded, run, save."""
@@ -122,7 +129,12 @@ class Desk:
             "parameters": lambda: _parameters(case, scenario(values)),
             "modes": lambda: self._modes(case, scenario(values), values, (low, high), question),
             "slopes": lambda: slopes(
-                scenario, values, str(question["parameter"]), (low, high), lambda text: say({"progress": text})
+                scenario,
+                values,
+                str(question["parameter"]),
+                (low, high),
+                lambda text: say({"progress": text}),
+                self._computed,
             ),
             "response": lambda: linear(scenario(values), signals),
             "recorded": lambda: recorded(
@@ -159,12 +171,24 @@ class Desk:
         lost = [name for name in lost if name not in own]
         return preparation.live(Item(point, int(bool(lost)), values, (*own, *lost), tuple(lost)))
 
+    def _computed(self, scenario: Scenario, frequencies: tuple[float, float]) -> Modes:
+        prepared = scenario.prepared
+        files = {path: _stamp(path) for plan in prepared.system.components.values() if (path := plan.description.path)}
+        if files != self._files:
+            self._bench.close()
+            self._files = files
+        try:
+            return Modes(modes_of(prepared, self._bench.master(in_service(prepared)), frequencies))
+        except BaseException:
+            self._bench.close()
+            raise
+
     def _modes(
         self, case: Case, scenario: Scenario, values: Mapping[str, Value], frequencies: tuple[float, float],
         question: Mapping[str, Any],
     ) -> dict[str, Any]:  # fmt: skip
         """The JSON of ``gfor modes``, the verdict in its words, and what reproduces it."""
-        modes = scenario.modes(frequencies)
+        modes = self._computed(scenario, frequencies)
         hidden = modes.result.hidden
         return {
             "modes": modes.as_json(),

@@ -49,6 +49,7 @@ def test_each_assumption_alone_and_an_override_by_name(folder):
     torque = swings(folder, 'governor_gives = "torque"')
     both = swings(folder, 'speed_in_emf = false\ngovernor_gives = "torque"')
     np.testing.assert_array_equal(both, swings(folder, 'like = "andes"'))
+    np.testing.assert_array_equal(psse, swings(folder, 'like = "powerfactory"'))
     assert np.all(damping(exact) - damping(psse) > 0.1)
     assert np.all(damping(exact) - damping(torque) > 0.25)
     named = swings(folder, 'like = "andes"', **{"sg*.governor.output_is_torque": False})
@@ -58,7 +59,7 @@ def test_each_assumption_alone_and_an_override_by_name(folder):
 def test_machines_with_stator_transients_and_other_programs_are_refused(folder):
     text = (folder / "five.toml").read_text(encoding="utf-8").replace("_phasor", "").replace('"phasor_grid"', '"grid"')
     text = text.replace('raw = "five.raw"', 'raw = "five.raw"\nstray_B = 0.05')
-    for like, words in (("psse", "its emf has the speed in it"), ("powerfactory", "'exact', 'psse' or 'andes'")):
+    for like, words in (("psse", "its emf has the speed in it"), ("eurostag", "'psse', 'powerfactory' or 'andes'")):
         case = folder / "emt.toml"
         case.write_text(text.replace("[units]", f'[conventions]\nlike = "{like}"\n[units]'), encoding="utf-8")
         with pytest.raises(CaseError, match=words):

@@ -267,7 +267,7 @@ def test_our_converter_passes_and_the_report_can_be_checked_by_hand(tmp_path, fm
     [("pod_q", False, 2000.0, (0.1, 0.3)), ("pod_p", True, 2000.0, (0.01,)), ("pod_q", True, 200.0, (0.1,))],
 )
 def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, controller, sign_turned, gain, reactances):
-    """A tenfold gain, a turned sign, or both; a turned POD-Q of the usual gain is weak enough to pass."""
+    """A tenfold gain, a turned sign, or both; a turned POD-Q of the usual gain is told by what it changes."""
     model = turned(controller) if sign_turned else build_model("gfor")
     values = {f"{controller}.enabled": True, f"{controller}.K": gain}
     request = CertificationRequest(cached(NativeFmu(model)), values=values, reactances=reactances)
@@ -275,7 +275,9 @@ def test_a_detuned_pod_fails_where_its_eigenvalues_say(tmp_path, executor, contr
     own = {f"converter.{name}": value for name, value in values.items()}
     wanted = {X: is_bad(exact_eigenvalues(model, result.case, own, X)) for X in reactances}
     for verdict in result.verdicts:
-        assert verdict.accepted != wanted[verdict.X_L], verdict.faults
+        against = any("does not damp the electromechanical mode" in fault for fault in verdict.faults)
+        assert verdict.accepted != (wanted[verdict.X_L] or against), verdict.faults
+        assert against or gain > 1000
     assert any(wanted.values()) == (gain > 1000)
     sentence = figures_of(result)["sentence"]
     for X_L, bad in wanted.items():

@@ -5,6 +5,7 @@ import json
 import os
 import queue
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,10 +16,15 @@ import tomllib
 import pytest
 
 import orchestrator as gfor
+from fmus.toolchain.catalogue import build_model
+from fmus.toolchain.exporter import cached
+from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.cli import main
 from orchestrator.explore.computing import Computing
 from orchestrator.explore.files import FILES, SCRIPTS, content_of
 from orchestrator.explore.server import Explorer
+from orchestrator.explore.worker import Desk
+from tests.certification.sign_turned import turned
 
 BEGINNING = {"case": "two_area", "scenario": "pod_p", "values": {}, "range": [0.1, 2.0]}
 
@@ -165,7 +171,6 @@ def test_figures_are_those_of_the_command_that_is_copied(computing, capsys, valu
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(computing, tmp_path, capsys):
     values = {"gfor.pod_p.K": 137.25, "grid.X_L": 0.31}
     found = answer(computing, values=values)["answer"]
@@ -180,7 +185,6 @@ def test_the_scenario_and_the_python_that_are_copied_give_the_same_figures(compu
     assert names["modes"].as_json()["scenarios"][0]["modes"] == before["modes"]
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_slopes_are_those_of_the_sensitivities(computing):
     found = answer(computing, ask="slopes", parameter="gfor.pod_p.K")["answer"]
@@ -209,7 +213,6 @@ def test_parameters_have_units_bounds_and_words(computing):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
     done = in_background(computing, values={"grid.X_L": 0.2})
@@ -219,7 +222,6 @@ def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
@@ -231,7 +233,6 @@ def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_a_hanging_process_is_ended_after_a_while():
     computing = Computing("two_area", longest=1.0)
@@ -245,7 +246,6 @@ def test_a_hanging_process_is_ended_after_a_while():
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     first = in_background(computing, values={"grid.X_L": 0.21})
     wait_until(lambda: computing._at_work is not None)
@@ -256,7 +256,6 @@ def test_of_several_questions_of_a_page_the_last_one_wins(computing):
     assert "grid.X_L=0.23" in third()["answer"]["copied"]["command"]
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_two_pages_do_not_disturb_each_other(computing):
     first = in_background(computing, page="one", values={"grid.X_L": 0.21})
@@ -291,7 +290,6 @@ def wait_until(holds, seconds=30):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(gfor.load("infinite_bus").file.text, encoding="utf-8")
@@ -304,7 +302,6 @@ def test_a_case_that_changes_on_disk_is_read_again(tmp_path):
     computing.close()
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -329,7 +326,6 @@ def test_a_run_is_streamed_and_kept_as_that_of_the_command(tmp_path, monkeypatch
 # -- the command -----------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_the_command_prints_its_address_and_ends_by_ctrl_c():
     words = [sys.executable, "-m", "orchestrator.cli", "explore", "infinite_bus", "--no-browser"]
@@ -361,3 +357,45 @@ def test_a_port_is_a_number(port, capsys):
     with pytest.raises(SystemExit):
         main(["explore", "two_area", "--port", port])
     assert "is not a port" in capsys.readouterr().err or port == "-1"
+
+
+@pytest.mark.parametrize("name", ["own.fmu", "other.fmu"])
+def test_fmus_serve_the_next_question_and_an_exchanged_file_is_read_anew(tmp_path, name):
+    """To the last digit: a value back and forth, and another FMU in the place of the one that is open."""
+    first, second = (cached(PythonFmu(model)) for model in (build_model("gfor"), turned("pod_p")))
+    shutil.copy(first, tmp_path / "own.fmu")
+    case = tmp_path / "case.toml"
+    text = gfor.load("infinite_bus").file.text.replace('model = "gfor"', 'fmu = "own.fmu"')
+    assert "own.fmu" in text
+    case.write_text(text, encoding="utf-8")
+    desk = Desk(str(case), False)
+    values = {"gfor.pod_p.enabled": True}
+
+    def found(**more):
+        asked = {"ask": "modes", "scenario": "dip", "values": values | more, "range": [0.05, 5.0]}
+        mine = json.loads(json.dumps(desk.answer(asked, print)["modes"]))
+        fresh = gfor.load(str(case)).scenario("dip", values | more).modes((0.05, 5.0)).as_json()
+        assert mine == json.loads(json.dumps(fresh))
+        return mine["scenarios"][0]["modes"]
+
+    before = found()
+    assert found(**{"gfor.P_0": 0.5}) != before
+    assert found() == before
+    shutil.copy(second, tmp_path / name)
+    if name == "other.fmu":
+        case.write_text(text.replace("own.fmu", name), encoding="utf-8")
+    assert found() != before
+
+
+def test_an_ssp_is_opened_and_its_modes_are_those_of_the_case(tmp_path):
+    scenario = gfor.load("infinite_bus").scenario("dip")
+    (archive,) = gfor.export(scenario, "ssp", tmp_path / "bus.ssp")
+    desk = Desk(str(archive), False)
+    assert list(desk.answer({"ask": "open"}, print)["scenarios"]) == ["dip"]
+    asked = {"ask": "modes", "scenario": "dip", "values": {}, "range": [0.05, 50.0]}
+    mine, own = (
+        desk.answer(asked, print)["modes"]["scenarios"][0],
+        scenario.modes((0.05, 50.0)).as_json()["scenarios"][0],
+    )
+    assert [m["imag"] for m in mine["modes"]] == pytest.approx([m["imag"] for m in own["modes"]], rel=1e-9)
+    assert str(archive) in desk.answer(asked, print)["copied"]["command"]

@@ -130,7 +130,7 @@ function download(name, kind, content) {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
-const LOOKS = ["stroke", "stroke-width", "stroke-dasharray", "fill", "opacity", "font-size", "font-family"];
+const LOOKS = ["paint-order", "stroke", "stroke-width", "stroke-dasharray", "fill", "opacity", "font-size", "font-family"];
 function pictureOf(svg) {
   const copy = svg.cloneNode(true), box = svg.getBoundingClientRect();
   const from = svg.querySelectorAll("*"), to = copy.querySelectorAll("*");

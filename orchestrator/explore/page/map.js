@@ -43,11 +43,16 @@ function paintMap() {
   parts.push(draw("text", { class: "faint", x: f.w - PAD.right, y: f.h - 6, "text-anchor": "end" }, "Real part [1/s]"), draw("text", { class: "faint", x: 12, y: PAD.top + 2, transform: `rotate(-90 12 ${PAD.top + 2})`, "text-anchor": "end" }, "Frequency [Hz]"));
   const clip = draw("g", { "clip-path": "url(#inside)" });
   parts.push(draw("clipPath", { id: "inside" }, draw("rect", { x: PAD.left, y: PAD.top, width: f.w - PAD.left - PAD.right, height: f.h - PAD.top - PAD.bottom })), clip);
+  const named = [];  // places of the rays' texts: none over another
   for (const percent of RAYS) {
     const z = percent / 100, slope = -2 * Math.PI * z / Math.sqrt(1 - z * z);  // real part for one Hz
     clip.append(draw("path", { class: "ray", d: `M${f.x(0)} ${f.y(0)}L${f.x(slope * view.y1)} ${f.y(view.y1)}` }));
     const top = slope * view.y1 > view.x0 ? [slope * view.y1, view.y1] : [view.x0, view.x0 / slope];
-    if (top[1] > view.y0) clip.append(draw("text", { class: "faint", x: Math.max(f.x(top[0]) + 3, PAD.left + 3), y: Math.max(f.y(top[1]) + 12, PAD.top + 12) }, `${percent} %`));
+    const x = Math.max(f.x(top[0]) + 3, PAD.left + 3), y = Math.max(f.y(top[1]) + 12, PAD.top + 12);
+    if (top[1] > view.y0 && !named.some(at => Math.abs(at.x - x) < 34 && Math.abs(at.y - y) < 13)) {
+      named.push({ x, y });
+      clip.append(draw("text", { class: "faint", x, y }, `${percent} %`));
+    }
   }
   if ($("trails").checked) {
     for (const trail of seen.trails) {

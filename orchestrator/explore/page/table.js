@@ -6,7 +6,7 @@ const COLUMNS = [
   ["Damping [%]", m => m.damping_percent, m => fixed(m.damping_percent, 2)],
   ["σ [1/s]", m => m.real, m => fixed(m.real, 4)],
   ["Name", m => m.name ?? "", m => m.name ?? ""],
-  ["Who", m => Object.keys(m.components)[0] ?? "", m => Object.entries(m.components).slice(0, 2).map(([c, x]) => `${c} ${fixed(100 * x, 0)} %`).join(", ")],
+  ["Who", m => Object.keys(m.components)[0] ?? "", m => Object.entries(m.components).slice(0, 2).map(([c, x]) => `${c}\u00a0${fixed(100 * x, 0)}\u00a0%`).join(", ")],
 ];
 
 // Place of the chosen mode among those that are there; the least damped one where it is gone.

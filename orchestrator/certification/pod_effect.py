@@ -1,0 +1,110 @@
+"""What the active damping controllers change at a point: its modes with them off, and whether the response shows it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from orchestrator.analysis.identification import identify_modes, nearest
+from orchestrator.analysis.modes import damping_percent
+from orchestrator.arrays import Complex, Numbers
+from orchestrator.certification.criteria import AGREED, PodEffect
+from orchestrator.certification.damping_controllers import DampingControllers, variable
+from orchestrator.certification.judgement import PointVerdict
+from orchestrator.certification.point import CONVERTER, POWER, PointResult
+from orchestrator.certification.swings import slow_part
+from orchestrator.errors import AnalysisError
+from orchestrator.report.html.elements import number, table
+
+RAISED = 0.1  # by so many points they have to raise the electromechanical mode's damping, where it is least without
+TWICE = 2.0  # a response that the modes without them fit so many times better is not that of the modes with them
+_RELATED = 0.3  # change of the frequency up to which it is known to be the same mode, in parts of it
+_WINDOW = (0.5, 10.5)  # of the response, after the event [s]
+_EVERY = 10  # so many samples apart are those that are fitted
+_SLOW = (0.0, 0.1, 1.0)  # decay of what does not swing [1/s]
+
+
+def off_values(pod: str) -> tuple[tuple[str, bool], ...]:
+    return tuple((f"{CONVERTER}.{variable(letter)}", False) for letter in pod.removeprefix("none"))
+
+
+def kept_off(stated: Mapping[str, Any]) -> dict[str, Any]:
+    """What a certificate states, as a `PointResult` has it."""
+    if stated["unknown"]:
+        return {"off_failure": stated["unknown"]}
+    named = [complex(x["real"], x["imag"]) if (x := stated["modal"][k]) else np.nan for k in ("off", "on")]
+    return {"off": np.array([complex(*x) for x in stated["modes_off"]]), "swings": np.array(named, dtype=complex)}
+
+
+def with_pod(
+    verdicts: Sequence[PointVerdict], points: Mapping[float, PointResult], controllers: DampingControllers,
+    event: float,
+) -> list[PointVerdict]:  # fmt: skip
+    """The verdicts with what the active controllers change; ``points`` are those with the converter.
+
+    They have to damp where the mode needs it most, and in the response as at the eigenvalues."""
+    name = " and ".join(f"POD-{letter.upper()}" for letter in controllers.pod.removeprefix("none"))
+    why = "" if controllers.can_be_off else "no switch turns it off; name the FMU's under [signals] of a binding"
+    judged = [replace(v, pod=_effect(points[v.X_L], event, why)) for v in verdicts] if name else list(verdicts)
+    known = [(damping_percent(x), v) for v in judged if v.pod and (x := v.pod.modes["off"]) is not None]
+    least, worst = min(known, key=lambda entry: entry[0], default=(0.0, None))
+    for k, v in enumerate(judged):
+        if (pod := v.pod) is None:
+            continue
+        said = []
+        if (pod.better_off or 0.0) > TWICE:
+            said += [f"{name} acts otherwise in the response than at the eigenvalues: the modes without it fit {POWER} "
+                     f"{pod.better_off:.3g} times better"]  # fmt: skip
+        if v is worst and (by := pod.apart("on", "off") or 0.0) < RAISED:
+            said += [
+                f"{name} does not damp the electromechanical mode: {least:.2f} % without, {by:+.2f} points with it"
+            ]
+        faults = tuple(dict.fromkeys((*v.faults, *said)))
+        unknown = v.unknown or (f"what {name} changes is not known: {pod.unknown}" if pod.unknown else "")
+        judged[k] = replace(v, faults=faults, unknown="" if faults else unknown)
+    return judged
+
+
+def _effect(point: PointResult, event: float, why: str) -> PodEffect:
+    modes: dict[str, complex | None] = {"off": None, "on": None, "response": None}
+    if point.off is None or point.modes is None:
+        why = point.off_failure or why or str(point.failure or "it has no modes")
+        return PodEffect(np.empty(0, complex), modes, None, why)
+    if np.ptp(point.swings.imag) <= _RELATED * point.swings[0].imag and not np.isnan(point.swings).any():
+        listed = zip(("off", "on"), (point.off, point.modes.eigenvalues), point.swings, strict=True)
+        modes |= {name: complex(own[np.abs(own - x).argmin()]) for name, own, x in listed}
+    window = (point.times >= event + _WINDOW[0]) & (point.times <= event + _WINDOW[1])
+    signal = point.signals.get(POWER)
+    if point.failure or signal is None or not np.isfinite(signal).all() or window.sum() < 99:
+        return PodEffect(point.off, modes)
+    t, y = point.times[window], slow_part(point.times, signal.astype(np.float32).astype(float))[window]  # as it is kept
+    if modes["on"] is not None:
+        try:
+            found = nearest([m for m in identify_modes(t, y) if m.eigenvalue.imag > 0], modes["on"])
+            modes["response"] = None if found is None else complex(found.eigenvalue)
+        except AnalysisError:
+            pass  # it does not swing
+    with_it, without = (_misfit(t[::_EVERY] - t[0], y[::_EVERY], x) for x in (point.modes.eigenvalues, point.off))
+    return PodEffect(point.off, modes, with_it / without if without > 0 else None)
+
+
+def _misfit(t: Numbers, y: Numbers, eigenvalues: Complex) -> float:
+    """What is left of a signal when swings of these eigenvalues, and slow decays, are taken away."""
+    swings = np.exp(np.outer(t, eigenvalues))
+    columns = np.hstack([np.exp(-np.outer(t, _SLOW)), swings.real, swings.imag])
+    columns /= np.linalg.norm(columns, axis=0)
+    return float(np.linalg.norm(y - columns @ np.linalg.lstsq(columns, y, rcond=1e-6)[0]))
+
+
+def pod_section(verdicts: Sequence[PointVerdict]) -> str:
+    rows = []
+    for X_L, pod in ((f"{v.X_L:g}", v.pod) for v in verdicts if v.pod):
+        named = [x and f"{x.imag / (2 * np.pi):.3f} Hz, {number(damping_percent(x), 2)} %" for x in pod.modes.values()]
+        change, better = ("–" if x is None else number(x, 2) for x in (pod.apart("on", "off"), pod.better_off))
+        rows.append([X_L, *(text or "–" for text in named), "<b>yes</b>" if pod.disagrees else "no", change, better])
+    columns = ["X_L [pu]", "Off", "On", "In SG1's power", "It disagrees", "Raised by [points]", "Off fits better"]
+    note = (f"<p>Where it is damped least with them off they have to raise it by {RAISED:g} points; nowhere may the "
+            f"modes with them off fit SG1's power more than {TWICE:g} times better. More than {AGREED:g} points "
+            "between the dampings of eigenvalue and power are a finding. A dash: no mode is it.</p>")  # fmt: skip
+    return table("The electromechanical mode", columns, rows) + note if rows else "<p>None is active.</p>"
