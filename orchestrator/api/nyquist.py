@@ -14,11 +14,13 @@ from orchestrator.black_box.port import start_of
 from orchestrator.cases.given import case_values, plain
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import InputError
+from orchestrator.fmi.vendor_files import DEVICE_ENDING, DLL_ENDINGS
 from orchestrator.immittance.retune import REACH, Tunable
 from orchestrator.immittance.scan_files import ENDINGS
 from orchestrator.immittance.study import CutRequest, CutResult, study_cut
 from orchestrator.immittance.view import Nyquist
 from orchestrator.sensitivities.parameters import Parameter, parameters_in
+from orchestrator.toml_files import read_toml
 
 _FMU = "device."  # before the names of an FMU's own parameters
 
@@ -167,4 +169,8 @@ def _range(x: Parameter) -> Tunable:
 
 
 def _is_case(text: str) -> bool:
-    return Path(text).suffix.lower() not in (*ENDINGS, ".fmu", ".so", ".dll")
+    """Whether it is neither a scan nor a device: an FMU, a DLL, or a device's file around one."""
+    path = Path(text)
+    if path.suffix.lower() == DEVICE_ENDING and path.is_file():
+        return "dll" not in read_toml(path, "the case, or the file of a device", "give one of the two")[1]
+    return path.suffix.lower() not in (*ENDINGS, ".fmu", *DLL_ENDINGS)

@@ -121,3 +121,12 @@ def test_scans_at_two_operating_points(tmp_path):
     given = files(tmp_path, plant=PortPoint(100.0, 50.0, 5.0, 0.1), network=PortPoint(100.0, 80.0, 5.0, 0.1))
     with pytest.raises(InputError, match=r"another operating point than network.txt: active power \[MW\] 50 and 80"):
         gfor.nyquist(*given)
+
+
+def test_the_file_of_a_device_around_a_dll_is_a_device(tmp_path, capsys):
+    """Not a case, though both are TOML; what is wrong with it is said of the device."""
+    (tmp_path / "plant.toml").write_text('dll = "plant.so"\nfilter = "LC"\n')
+    assert main(["fmu", "nyquist", str(tmp_path / "plant.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "plant.toml: give its network as well" in " ".join(capsys.readouterr().err.split())
+    assert main(["fmu", "nyquist", str(tmp_path / "plant.toml"), "--scr", "2", "--out", str(tmp_path / "out")]) == 2
+    assert "plant.so: cannot be read" in " ".join(capsys.readouterr().err.split())
