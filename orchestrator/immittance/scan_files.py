@@ -83,7 +83,11 @@ def _points(path: Path, ports: tuple[str, ...]) -> dict[str, PortPoint]:
                 raise InputError(
                     f"{beside.name}, line {number}: {error}; its columns are {', '.join(names)}"
                 ) from error
-            found.setdefault(cells[0].strip(), {}).update(figures)
+            other, angle = found.setdefault(cells[0].strip(), {}).get("[rad]"), figures.get("[rad]", 0.0)
+            if abs(angle) > 2 * math.pi or (other is not None and "[rad]" in figures and abs(angle - other) > 1e-3):
+                rule = "an angle in rad is at most 2π" if other is None else f"{root}_angles.txt has {other:g} rad"
+                raise InputError(f"{beside.name}, line {number}: {angle:g} rad, and {rule}; mend the wrong one")
+            found[cells[0].strip()].update(figures)
     points = {}
     for port in ports:
         figures = found.get(port, found.get(re.sub(r"-[12]$", "", port), {}))

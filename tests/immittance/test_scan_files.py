@@ -139,3 +139,14 @@ def test_a_generators_sign_is_told_by_the_resistance():
     check_sign(a_scan(), "--generator device")
     with pytest.raises(InputError, match="generator sign"):
         check_sign(a_scan().turned_sign(), "--generator device")
+
+
+@pytest.mark.parametrize(("stated", "said"), [("0.5", "plant_angles.txt has 0.5 rad"), ("30", "at most 2π")])
+def test_two_angles_of_one_bus_and_degrees_are_refused(tmp_path, stated, said):
+    """The scan's power flow says 0.2 rad."""
+    point = PortPoint(kilovolt=230.0, megawatt=1.0, megavar=0.0, angle=0.2)
+    write_ztool(a_scan(points={"PCC-1": point}), tmp_path / "plant.txt")
+    beside = tmp_path / "plant_angles.txt"
+    beside.write_text(beside.read_text().replace("0.20000000000000", stated))
+    with pytest.raises(InputError, match=said):
+        read_scan(tmp_path / "plant.txt", 50.0)
