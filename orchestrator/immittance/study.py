@@ -193,6 +193,11 @@ def study_cut(request: CutRequest, report: Callable[[str], None] | None = None) 
     questions = tuple(q for scan in scans.values() for q in scan.questions) + (cut.warnings if cut else ())
     device: Side | None = sampled(scans["device"]) if "device" in scans else cut.device if cut else None
     rating, kilovolt = _rating(request, cut), request.kilovolt
+    questions += tuple(
+        f"{scan.source} was scanned at {point.megawatt:g} MW, and the device is rated at {rating:g} MVA; do both hold?"
+        for side, scan in scans.items() for point in scan.points.values()
+        if side != "network" and rating and abs(point.megawatt or 0.0) > 1.1 * rating
+    )  # fmt: skip
     for scan in scans.values():
         kilovolt = kilovolt or next((point.kilovolt for point in scan.points.values() if point.kilovolt), None)
     base = SYSTEM_BASE_MVA if unit == PER_UNIT else kilovolt**2 if kilovolt else None

@@ -130,3 +130,10 @@ def test_the_file_of_a_device_around_a_dll_is_a_device(tmp_path, capsys):
     assert "plant.toml: give its network as well" in " ".join(capsys.readouterr().err.split())
     assert main(["fmu", "nyquist", str(tmp_path / "plant.toml"), "--scr", "2", "--out", str(tmp_path / "out")]) == 2
     assert "plant.so: cannot be read" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_scan_at_more_than_its_rating_is_asked_about(tmp_path, capsys):
+    for megawatts, asked in ((200.0, True), (80.0, False)):
+        plant, _ = files(tmp_path, plant=PortPoint(kilovolt=100.0, megawatt=megawatts, megavar=0.0, angle=0.0))
+        assert main(["fmu", "nyquist", plant, "--scr", "3", "--rating", "100 MVA", "--out", str(tmp_path / "out")]) == 0
+        assert ("rated at 100 MVA; do both hold?" in " ".join(capsys.readouterr().err.split())) == asked
