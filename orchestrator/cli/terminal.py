@@ -87,7 +87,7 @@ def print_questions(scenarios: Sequence[PreparedScenario], *, as_json: bool) -> 
     that are most unusual."""
     from orchestrator.cases.facts import facts_of  # noqa: PLC0415 - imports the reading of cases
 
-    facts = None if as_json else facts_of(scenarios[0])
+    facts = facts_of(scenarios[0]) if scenarios and not as_json else None
     if facts is not None:
         make_console().print(facts.sentence(), soft_wrap=True, highlight=False, markup=False)
     ask(q for prepared in scenarios for q in prepared.questions)
