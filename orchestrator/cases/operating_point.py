@@ -26,7 +26,8 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         raw = draft.given.case.network.raw if draft.given.case.network else None
         none = f"no bus of {raw} is the reference (IDE = 3), and " if raw is not None else ""
         text = f"{none}the key 'slack' is missing; name a unit or a bus with one that feeds what is left"
-        draft.note(draft.given.place("power_flow"), f'{text}, such as slack = "{next(iter(units.values()), "bus_1")}"')
+        one = next(iter(units.values()), "bus_1")
+        draft.note(draft.given.place("power_flow"), f'{text}, such as slack = "{one}" (`gfor new --slack`)')
         return None
     slack = units.get(wanted, wanted)
     if slack not in units.values():
