@@ -14,7 +14,7 @@ taken from i_q through a short lag, so that the emf follows from states alone; i
 from functools import partial
 
 from fmus.synchronous_generator.declarations import MACHINE
-from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.excitation.common import Exciter, Regulated
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations, terminal_power
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
 from fmus.synchronous_generator.variants import (
@@ -64,7 +64,7 @@ def with_controls(
     close_stator(m, g, port, emf)
     v_t = phasor_terminal_voltage(g, port, emf)
     v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))
-    E_fd, _ = exciter(m, g.start, lambda E: v_t, g.field_current, v_s)
+    E_fd, _ = exciter(m, Regulated(g.start, lambda E: v_t, g.field_current, v_s))
     P_m = governor(m, g.w, g.start.T_e)
     rotor_equations(m, g, port, E_fd, P_m)
     declare_phasor_port(m, g, port, emf)
