@@ -251,14 +251,14 @@ def _operating_point(
     airgap_d, airgap_q = E_fd - X_md * i_d, -X_mq * i_q
     psi_f = airgap_d + reactances["d"][1].X_1 * E_fd / X_md
 
-    def axis(name: str, psi: Expr, *fluxes: tuple[str, Expr, str]) -> Axis:
+    def axis_of(name: str, psi: Expr, *fluxes: tuple[str, Expr, str]) -> Axis:
         X_m, b, X_sub, X_between = reactances[name]
         stator = stator_flux(m, f"psi_{name}", psi, f"Flux of stator and transformer, {name} axis")
         branches = zip(((b.X_1, b.R_1), (b.X_2, b.R_2)), fluxes, strict=True)
         windings = tuple(Winding(X, R, flux_state(m, *flux)) for (X, R), flux in branches)
         return Axis(X_m, windings, stator, X_sub, X_between)
 
-    d = axis("d", psi_d, ("psi_f", psi_f, "Field flux"), ("psi_1d", airgap_d, "Damper flux, d axis"))
-    q = axis("q", psi_q, ("psi_1q", airgap_q, "First damper flux, q axis"),
-             ("psi_2q", airgap_q, "Second damper flux, q axis"))  # fmt: skip
+    d = axis_of("d", psi_d, ("psi_f", psi_f, "Field flux"), ("psi_1d", airgap_d, "Damper flux, d axis"))
+    q = axis_of("q", psi_q, ("psi_1q", airgap_q, "First damper flux, q axis"),
+                ("psi_2q", airgap_q, "Second damper flux, q axis"))  # fmt: skip
     return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i), d, q, delta_0

@@ -6,7 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from fmus.synchronous_generator.declarations import require_between, require_rising, saturated_part, time_constant
+from fmus.synchronous_generator.declarations import (
+    per_unit,
+    require_between,
+    require_rising,
+    saturated_part,
+    time_constant,
+)
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
 from fmus.toolchain.model_builder import ModelBuilder
@@ -34,11 +40,7 @@ Exciter = Callable[[ModelBuilder, Regulated], tuple[Expr, Expr]]
 """Declares an excitation system and returns (E_fd, |v_t|) [pu]."""
 
 
-def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> Expr:
-    """Declare a gain or limit per unit of the field voltage."""
-    return m.parameter(name, value, "pu", text, base=E_FD, minimum=minimum, source=SOURCE)
-
-
+gain = partial(per_unit, base=E_FD, source=SOURCE)
 time = partial(time_constant, source=SOURCE)
 
 
