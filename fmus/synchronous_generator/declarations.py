@@ -12,6 +12,13 @@ MACHINE = TRANSFORMER | usual_beside(__file__)
 """Usual ranges of machines, exciters, stabilisers, governors and turbines, by the parameter's full name."""
 
 
+def per_unit(
+    m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None, *, base: str, source: str
+) -> Expr:
+    """Declare a gain or limit per unit of a base."""
+    return m.parameter(name, value, "pu", text, base=base, minimum=minimum, source=source)
+
+
 def time_constant(m: ModelBuilder, name: str, value: float, text: str, minimum: float = 0.0, *, source: str) -> Expr:
     """Declare a time constant [s]; where it may be 0, 0 leaves its block out."""
     T = m.parameter(name, value, "s", text, minimum=minimum, source=source)

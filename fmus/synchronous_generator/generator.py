@@ -3,7 +3,7 @@
 from functools import partial
 
 from fmus.synchronous_generator.declarations import MACHINE
-from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.excitation.common import Exciter, Regulated
 from fmus.synchronous_generator.machine import (
     Machine,
     declare_machine,
@@ -61,7 +61,7 @@ def with_controls(
 ) -> Model:
     """A machine with stator transients and its controls."""
     v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))
-    E_fd, v_t = exciter(m, g.start, lambda E: terminal_voltage(g, port, E), g.field_current, v_s)
+    E_fd, v_t = exciter(m, Regulated(g.start, lambda E: terminal_voltage(g, port, E), g.field_current, v_s))
     P_m = governor(m, g.w, g.start.T_e)
     machine_equations(m, g, port, E_fd, P_m)
     declare_port_outputs(m, port, g.current.rotated(g.delta))

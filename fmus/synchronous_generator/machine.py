@@ -204,11 +204,9 @@ def _saturation_factor(
 ) -> Expr:
     """1 + s(ψ) at the air-gap flux of the operating point, s(ψ) = s(1.0)·ψⁿ through s(1.2); 1 where switched off."""
     on = m.switch("saturation", False, "Divide the magnetising reactances by 1 + s at the operating point")
-    s_10 = m.parameter(
-        "s_10", data.s_10, "1", "Saturation s(1.0) of the open-circuit curve", minimum=1e-6, source=data.source
-    )
-    s_12 = m.parameter(
-        "s_12", data.s_12, "1", "Saturation s(1.2) of the open-circuit curve", minimum=1e-6, source=data.source
+    s_10, s_12 = (
+        m.parameter(name, s, "1", f"Saturation s({x}) of the open-circuit curve", minimum=1e-6, source=data.source)
+        for name, s, x in (("s_10", data.s_10, "1.0"), ("s_12", data.s_12, "1.2"))
     )
     psi = (port.v_0 + Phasor(R_s + R_t, X_t + X_l) * port.i_0).magnitude()
     s = s_10 * exp(log(s_12 / s_10) / log(1.2) * log(psi))
@@ -253,28 +251,14 @@ def _operating_point(
     airgap_d, airgap_q = E_fd - X_md * i_d, -X_mq * i_q
     psi_f = airgap_d + reactances["d"][1].X_1 * E_fd / X_md
 
-    stator_d = stator_flux(m, "psi_d", psi_d, "Flux of stator and transformer, d axis")
-    X_md, b_d, X_sub, X_between = reactances["d"]
-    d = Axis(
-        X_md,
-        (
-            Winding(b_d.X_1, b_d.R_1, flux_state(m, "psi_f", psi_f, "Field flux")),
-            Winding(b_d.X_2, b_d.R_2, flux_state(m, "psi_1d", airgap_d, "Damper flux, d axis")),
-        ),
-        stator_d,
-        X_sub,
-        X_between,
-    )
-    X_mq, b_q, X_sub, X_between = reactances["q"]
-    stator_q = stator_flux(m, "psi_q", psi_q, "Flux of stator and transformer, q axis")
-    q = Axis(
-        X_mq,
-        (
-            Winding(b_q.X_1, b_q.R_1, flux_state(m, "psi_1q", airgap_q, "First damper flux, q axis")),
-            Winding(b_q.X_2, b_q.R_2, flux_state(m, "psi_2q", airgap_q, "Second damper flux, q axis")),
-        ),
-        stator_q,
-        X_sub,
-        X_between,
-    )
+    def axis_of(name: str, psi: Expr, *fluxes: tuple[str, Expr, str]) -> Axis:
+        X_m, b, X_sub, X_between = reactances[name]
+        stator = stator_flux(m, f"psi_{name}", psi, f"Flux of stator and transformer, {name} axis")
+        branches = zip(((b.X_1, b.R_1), (b.X_2, b.R_2)), fluxes, strict=True)
+        windings = tuple(Winding(X, R, flux_state(m, *flux)) for (X, R), flux in branches)
+        return Axis(X_m, windings, stator, X_sub, X_between)
+
+    d = axis_of("d", psi_d, ("psi_f", psi_f, "Field flux"), ("psi_1d", airgap_d, "Damper flux, d axis"))
+    q = axis_of("q", psi_q, ("psi_1q", airgap_q, "First damper flux, q axis"),
+                ("psi_2q", airgap_q, "Second damper flux, q axis"))  # fmt: skip
     return Start(v_t.magnitude(), E_fd, psi_d * i_q - psi_q * i_d, v, i), d, q, delta_0

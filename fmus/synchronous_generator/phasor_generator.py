@@ -14,7 +14,7 @@ taken from i_q through a short lag, so that the emf follows from states alone; i
 from functools import partial
 
 from fmus.synchronous_generator.declarations import MACHINE
-from fmus.synchronous_generator.excitation.common import Exciter
+from fmus.synchronous_generator.excitation.common import Exciter, Regulated
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations, terminal_power
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
 from fmus.synchronous_generator.variants import (
@@ -31,7 +31,6 @@ from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.phasor_port import declare_phasor_outputs, phasor_builder, source_emf
 from fmus.toolchain.port import DevicePort, device_port
-from fmus.toolchain.symbols import Expr
 
 
 def synchronous_generator_ac4a_phasor() -> Model:
@@ -62,9 +61,10 @@ def with_controls(
     """A machine without stator transients, its stator's fluxes as open signals, and its controls."""
     emf = Phasor(g.d.emf, g.q.emf) * (g.w if g.emf_speed is None else g.emf_speed)
     close_stator(m, g, port, emf)
-    v_t = phasor_terminal_voltage(g, port, emf)
+    at_port = port.through_breaker(port.v.rotated(-g.delta), emf)  # the emf behind an open breaker
+    v_t = (at_port + Phasor(g.R_t, g.X_t) * g.current).magnitude()
     v_s = 0.0 if stabilizer is None else stabilizer(m, g.w - 1, *terminal_power(g, port))
-    E_fd, _ = exciter(m, g.start, lambda E: v_t, g.field_current, v_s)
+    E_fd, _ = exciter(m, Regulated(g.start, lambda E: v_t, g.field_current, v_s))
     P_m = governor(m, g.w, g.start.T_e)
     rotor_equations(m, g, port, E_fd, P_m)
     declare_phasor_port(m, g, port, emf)
@@ -94,12 +94,6 @@ def close_stator(m: ModelBuilder, g: Machine, port: DevicePort, emf: Phasor) -> 
     i_d = (X_q * over.re - R * over.im) / determinant
     m.close(g.d.psi, g.d.emf - X_d * i_d)
     m.close(g.q.psi, g.q.emf - X_q * i_q)
-
-
-def phasor_terminal_voltage(g: Machine, port: DevicePort, emf: Phasor) -> Expr:
-    """|v_t|: the bus voltage plus the transformer's drop; the emf behind an open breaker."""
-    at_port = port.through_breaker(port.v.rotated(-g.delta), emf)
-    return (at_port + Phasor(g.R_t, g.X_t) * g.current).magnitude()
 
 
 def _saliency(m: ModelBuilder, g: Machine) -> Phasor:

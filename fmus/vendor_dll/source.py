@@ -31,11 +31,6 @@ def kernel_source(model: Model) -> str:
     return "\n".join(["#define KERNEL static", define, c_source(model), undefine, size])
 
 
-def no_kernel_source() -> str:
-    """The same for a controller alone."""
-    return "enum { CIRCUIT_SIZE = 0 };"
-
-
 def circuit_source(model: Model, device: Device) -> str:
     places = model.value_references
     at = ", ".join(f"{name} = {places[variable]}" for name, variable in _PLACES.items())
@@ -57,11 +52,6 @@ def circuit_source(model: Model, device: Device) -> str:
         (_C / "circuit.c").read_text(encoding="utf-8"),
     ]
     return "\n".join(lines)
-
-
-def no_circuit_source() -> str:
-    """The same for a controller alone."""
-    return (_C / "no_circuit.c").read_text(encoding="utf-8")
 
 
 def _routes(routes: Sequence[Route], model: Model) -> str:
@@ -210,8 +200,9 @@ def host_source(
     functions = (_TOOLCHAIN / "fmi2.c").read_text(encoding="utf-8")
     export = (_TOOLCHAIN / "fmi.h").read_text(encoding="utf-8").split("typedef")[0]
     tables = _tables(interface, trial, {**texts, **carried}, carried, vendor_file, variables)
-    before, after = no_kernel_source(), no_circuit_source()
-    if around is not None:
+    if around is None:
+        before, after = "enum { CIRCUIT_SIZE = 0 };", (_C / "no_circuit.c").read_text(encoding="utf-8")
+    else:
         device, circuit = around
         before, after = kernel_source(circuit), circuit_source(circuit, device)
     return "\n".join([_HEADERS, before, export, *tables, *code, after, functions])

@@ -175,24 +175,17 @@ class _Reader:
             def scale(unit: str, info: VariableInfo) -> float:
                 if table.form == "power":
                     return bases.power_unit(unit, table.base, info.name)
-                return bases.current_unit(
-                    unit, table.base, _phase(table) if table.form == "abc" else table.value, info.name
-                )
+                return bases.current_unit(unit, table.base, _phase(table), info.name)
 
             form, to_fmu, angle_factor = self._phasor("current", table, "output", scale)
             direction = 1.0 if table.direction == "into the grid" else -1.0
             # On the 100 MVA base of the network, for one unit of the rating as delivered.
-            matrix = _inverse(to_fmu, direction * bases.rating / SYSTEM_BASE_MVA)
-            if form is Form.POWER:
-                # Signs act on P and Q, before the current is taken from them.
-                matrix = self._power_matrix(to_fmu, direction * bases.rating / SYSTEM_BASE_MVA)
-            on_rating = unit_of(self._variable(table.variables[0]), table.unit) == PER_UNIT and table.base in (
-                None,
-                "S_n",
-            )
-            found = PhasorMap(
-                form, tuple(table.variables), matrix, angle_factor, per_rating=not own_rating or on_rating
-            )
+            factor = direction * bases.rating / SYSTEM_BASE_MVA
+            # Signs of powers act on P and Q, before the current is taken from them.
+            matrix = self._power_matrix(to_fmu, factor) if form is Form.POWER else _inverse(to_fmu, factor)
+            per_unit = unit_of(self._variable(table.variables[0]), table.unit) == PER_UNIT
+            per_rating = not own_rating or (per_unit and table.base in (None, "S_n"))
+            found = PhasorMap(form, tuple(table.variables), matrix, angle_factor, per_rating)
         return found
 
     @staticmethod
@@ -216,23 +209,18 @@ class _Reader:
 
     def _start_map(self, name: str, table: StartTable, bases: Bases, own_rating: bool) -> StartMap:
         info = self._variable(table.variable, "parameter", "input")
+        unit = unit_of(info, table.unit)
         if name == "theta_0":
-            unit = unit_of(info, table.unit)
             offset = radians(to_unit(self._table.voltage.frame_angle, "deg"))
             factor = 1.0 if unit == PER_UNIT else to_unit("1 rad", unit)
             return StartMap(info.name, table.sign * factor, table.sign * factor * offset)
         if name == "S_n":
-            unit = unit_of(info, table.unit)
             return StartMap(info.name, bases.power_unit(unit, table.base or "1 MVA", info.name) / bases.rating)
         if name == "v_0":
-            return StartMap(
-                info.name, bases.voltage_unit(unit_of(info, table.unit), table.base, table.value, info.name)
-            )
-        unit = unit_of(info, table.unit)
+            return StartMap(info.name, bases.voltage_unit(unit, table.base, table.value, info.name))
         absolute = unit != PER_UNIT or table.base not in (None, "S_n")
-        return StartMap(
-            info.name, table.sign * bases.power_unit(unit, table.base, info.name), 0.0, absolute and own_rating
-        )
+        power = table.sign * bases.power_unit(unit, table.base, info.name)
+        return StartMap(info.name, power, 0.0, absolute and own_rating)
 
     def _signals(self, bases: Bases) -> dict[str, SignalMap]:
         found = {}

@@ -6,9 +6,8 @@ from pydantic import Field, field_validator, model_validator
 
 from orchestrator.toml_files import Table
 
-REQUIRED = (
-    "REQUIRED"  # word that `gfor fmu bind` writes for an unknown value. A binding that still contains it is refused.
-)
+REQUIRED = "REQUIRED"
+"""Word that `gfor fmu bind` writes for an unknown value. A binding that still contains it is refused."""
 
 
 class DraftedTable(Table):
@@ -17,11 +16,8 @@ class DraftedTable(Table):
     @model_validator(mode="before")
     @classmethod
     def _nothing_left_to_fill_in(cls, values: Any) -> Any:
-        left = (
-            [k for k, v in values.items() if isinstance(v, str) and v.startswith(REQUIRED)]
-            if isinstance(values, dict)
-            else []
-        )
+        given = values.items() if isinstance(values, dict) else ()
+        left = [k for k, v in given if isinstance(v, str) and v.startswith(REQUIRED)]
         if left:
             raise ValueError(f"still to be filled in: {', '.join(left)}; the comments in the draft say what is meant")
         return values

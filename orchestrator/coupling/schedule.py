@@ -150,7 +150,5 @@ def of_kind(name: ScheduleName, groups: tuple[tuple[str, ...], ...], micro_step:
             return jacobi(tuple(component for group in groups for component in group))
         case "gauss-seidel":
             return gauss_seidel(groups)
-        case "midpoint":
-            return midpoint(groups, micro_step)
-        case "newton":
-            return newton(groups, micro_step)
+        case "midpoint" | "newton":
+            return Schedule(name, groups, coupling=name, micro_step=micro_step)

@@ -289,25 +289,17 @@ class Hub:
                 helics.helicsBrokerDisconnect(self._broker)
 
 
-def end_with(parent_is_gone: threading.Event) -> None:
-    """Wait until standard input ends, which is when the process that started this one is gone."""
+def _end_with_parent(hub: Hub) -> None:
+    """Leave once standard input ends, which is when the process that started this one is gone."""
     while sys.stdin.buffer.read(4096):
         pass
-    parent_is_gone.set()
+    hub.leave("gfor ended")
+    os._exit(1)
 
 
 def main() -> None:
-    request = json.loads(sys.stdin.buffer.readline())
-    gone = threading.Event()
-    threading.Thread(target=end_with, args=(gone,), daemon=True).start()
-    hub = Hub(request)
-
-    def leave() -> None:
-        gone.wait()
-        hub.leave("gfor ended")
-        os._exit(1)
-
-    threading.Thread(target=leave, daemon=True).start()
+    hub = Hub(json.loads(sys.stdin.buffer.readline()))
+    threading.Thread(target=_end_with_parent, args=(hub,), daemon=True).start()
     hub.serve()
     os._exit(0)
 

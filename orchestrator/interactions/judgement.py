@@ -18,9 +18,6 @@ from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
 SAME = 0.01  # A damping that falls by no more than this [points] is the same: what a perturbation leaves open
 
 
-"""In the reason why a component that hides its states cannot be linearised."""
-
-
 @dataclass(frozen=True)
 class JudgedMode:
     mode: SharedMode
@@ -198,10 +195,6 @@ class JudgedInteractions:
     def worst_assignment(self) -> JudgedSystem | None:
         """The worst of those that have a verdict; None where none has."""
         return next((one for one in self.assignments if one.is_known), None)
-
-    @property
-    def unknown_assignments(self) -> list[JudgedSystem]:
-        return [one for one in self.assignments if not one.is_known]
 
     @property
     def stable(self) -> bool | None:

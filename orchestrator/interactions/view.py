@@ -317,9 +317,7 @@ def _swap(judgement: JudgedInteractions, figures: Figures) -> str:
 
 def _heat_picture(name: str, labels: Sequence[str], cells: Sequence[Sequence[JudgedSystem]]) -> str:
     """A square for each system, coloured by its least damping; the figure, and U where it is unstable, stand in it."""
-    parts = []
-    for k, label in enumerate(labels):
-        parts.append(_text(_MARGIN + (k + 0.5) * _CELL, 20, label))
+    parts = [_text(_MARGIN + (k + 0.5) * _CELL, 20, label) for k, label in enumerate(labels)]
     for i, label in enumerate(labels):
         middle = 30 + (i + 0.5) * _CELL
         parts.append(_text(_MARGIN - 8, middle + 4, label, "end"))

@@ -23,8 +23,7 @@ def frequency_text(system: JudgedSystem) -> str:
 
 def verdict_of(judgement: JudgedInteractions) -> VerdictSentence:
     whole = judgement.whole.record
-    word = {True: "stable", False: "UNSTABLE", None: "not known"}[whole.stable]
-    return VerdictSentence(whole.stable, word, whole.error or whole.because)
+    return VerdictSentence(whole.stable, verdict_word(judgement.whole), whole.error or whole.because)
 
 
 def modes_sentence(judgement: JudgedInteractions) -> str:
@@ -72,7 +71,7 @@ def swap_sentence(judgement: JudgedInteractions) -> str:
     swapped, found = judgement.result.plan.swapped, judgement.assignments
     if not swapped:
         return ""
-    worst, unknown = judgement.worst_assignment, judgement.unknown_assignments
+    worst, unknown = judgement.worst_assignment, [one for one in found if not one.is_known]
     if worst is None:
         return f"worst assignment: not known: {found[0].why_unknown}"
     grows = sum(one.stable is False for one in found)

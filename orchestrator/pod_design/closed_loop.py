@@ -157,7 +157,8 @@ class PodLoop:
             raise ValueError("a mode is followed along the gain; with other lead/lag it starts from a gain of 0")
         if gain == start.setting.gain:
             return Placed(setting, start.pair)
-        what = {"from": astuple(start.setting), "pair": _digest_of(start.pair), "to": astuple(setting)}
+        pair = digest(np.array(start.pair.eigenvalue), start.pair.left, start.pair.right)
+        what = {"from": astuple(start.setting), "pair": pair, "to": astuple(setting)}
         found = self.figures("place", what, lambda: self._followed(start, setting))
         return Placed(setting, Eigenpair(complex(found["eigenvalue"]), found["left"], found["right"]))
 
@@ -177,10 +178,6 @@ class PodLoop:
                   "T_S2": setting.filters.T_S2}  # fmt: skip
         for name in self._components:
             self._master.components[name].set({f"{self._controller}.{key}": value for key, value in values.items()})
-
-
-def _digest_of(pair: Eigenpair) -> str:
-    return digest(np.array(pair.eigenvalue), pair.left, pair.right)
 
 
 def check_tunable(name: str, description: FmuDescription, controller: str) -> None:

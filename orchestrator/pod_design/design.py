@@ -110,7 +110,6 @@ class GainSensitivities:
 
     mode: complex
     value: complex
-    compensated_mode: complex
     compensated: complex
 
 
@@ -333,7 +332,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     return PodDesign(
         request=request, case=start.case, target=start.target, prepared=start.prepared, mode_name=start.mode_name,
         initial=initial, required_damping=required, predicted=predicted,
-        sensitivities=GainSensitivities(bare.eigenvalue, S, turned.eigenvalue, S_turned), filters=filters,
+        sensitivities=GainSensitivities(bare.eigenvalue, S, S_turned), filters=filters,
         gain_non_compensated=gains[0], gain_compensated=gains[1], gain=gain, designed=designed, refinement=refinement,
         other_gain=other_gain, final=final, before=before, after=after,
         broken=breach(before, after, request.least_damping) or _unstable(examined.stability), margins=margins,

@@ -34,7 +34,7 @@ def sheet(d: PodDesign) -> Iterable[Table | str]:
         yield _margins(d.margins, d)
     elif d.stability.stable is False:
         yield "[yellow]no margins: the system is unstable with this setting[/yellow]"
-    yield from _notes(d)
+    yield from (f"[dim]{escape(note)}[/dim]" for note in (d.refinement.notes if d.refinement else ()))
 
 
 def first_screen(d: PodDesign) -> Iterable[Table | str]:
@@ -61,7 +61,8 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
     phase, N = angle_deg(S.value), d.target.stages
     omega = d.initial.imag
     yield "Target mode, POD off", "λ₀ = σ₀ ± jω₀", f"{mode_text(d.initial)}; ω₀ = {omega:.4f} rad/s"
-    yield "Required damping", _requirement(d), f"ζ_d = {percent(d.required_damping)}"
+    asked = "as asked for" if d.request.damping is not None else f"ζ₀ + {percent(d.request.increment)}"
+    yield "Required damping", asked, f"ζ_d = {percent(d.required_damping)}"
     yield "Mode aimed at", "λ_d = −ζ_d·ω₀ ± jω₀", mode_text(d.predicted)
     yield f"Mode with K = ΔK = {K} pu, no lead/lag", "λ_NC (T_S1 = T_S2 = 0)", mode_text(S.mode)
     yield "Non-compensated sensitivity", "Ŝ_NC = (λ_NC − λ₀)/ΔK", f"{abs(S.value):.6f} rad/s per pu ∠ {phase:.2f}°"
@@ -92,10 +93,6 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
     bound = f"{d.active_bound} bound active" if d.active_bound else "no bound active"
     yield "Gain within its bounds", f"K ∈ [{low:g}, {high:g}] pu", f"{d.gain:.2f} pu ({bound})"
     yield "Closed loop with this design", "eigenvalue of the coupled FMUs", mode_text(d.designed.eigenvalue)
-
-
-def _requirement(d: PodDesign) -> str:
-    return "as asked for" if d.request.damping is not None else f"ζ₀ + {percent(d.request.increment)}"
 
 
 def _refinement(r: Refinement, required: float) -> Table:
@@ -154,11 +151,6 @@ def _loop_rows(m: Margins) -> Iterable[tuple[str, str]]:
         ("Largest sensitivity 1/|1 + L|", f"{m.loop.peak:.2f}", m.loop.peak_hz),
     ):
         yield name, f"{size} at {hertz:.3g} Hz" if size else never
-
-
-def _notes(d: PodDesign) -> Iterable[str]:
-    for note in d.refinement.notes if d.refinement else ():
-        yield f"[dim]{escape(note)}[/dim]"
 
 
 def verdict(d: PodDesign) -> str:

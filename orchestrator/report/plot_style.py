@@ -7,6 +7,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from orchestrator.report.html import elements
 from orchestrator.safe_files import write_bytes
 
 if TYPE_CHECKING:
@@ -23,8 +24,7 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "lines.linewidth": 1.3,
 }
-_COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""Distinguishable with any colour vision (Okabe and Ito); a scenario keeps its colour in every plot."""
+colour = elements.colour
 _DPI = 150
 _LEGEND_WIDTH = 96  # characters that fit in a line of a legend, marks included
 
@@ -33,10 +33,6 @@ def add_legend(figure: Figure, handles: Sequence[Any], labels: Sequence[str]) ->
     """Below the axes, in as many columns as the longest label leaves room for."""
     columns = max(1, min(3, _LEGEND_WIDTH // (6 + max(map(len, labels), default=1))))
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
-
-
-def colour(index: int) -> str:
-    return _COLOURS[index % len(_COLOURS)]
 
 
 def save_figure(figure: Figure, path: Path) -> None:

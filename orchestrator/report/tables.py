@@ -68,6 +68,11 @@ def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
     return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")
 
 
+def counted(number: int, what: str) -> str:
+    """``3 points``."""
+    return f"{number} {what}" + ("s" if number != 1 else "")
+
+
 def short(text: str, longest: int) -> str:
     """A remark, cut at a word where it has more characters."""
     return text if len(text) <= longest else f"{text[: longest - 1].rsplit(' ', 1)[0]} …"

@@ -162,7 +162,7 @@ def join_netcdf(
             columns = create_columns(file, names, sum(rows), units, attributes, max(rows))
             begin = 0
             for part, count in zip(parts, rows, strict=True):
-                with h5py.File(part, "r") as source:
+                with opened(part) as source:
                     for column, name in zip(columns, ("time", *names), strict=True):
                         _copy(source[stored_name(name)], column, begin, count)
                 begin += count
@@ -172,9 +172,7 @@ def join_netcdf(
 
 
 def _rows(part: Path) -> int:
-    import h5py  # noqa: PLC0415 - as above
-
-    with h5py.File(part, "r") as file:
+    with opened(part) as file:
         return len(file["time"])
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from orchestrator.coupling.recorder import Block
 from orchestrator.errors import InputError, ResultsError
-from orchestrator.results.netcdf import DAMAGED, Attributes, join_netcdf, netcdf_image, stored_name
+from orchestrator.results.netcdf import DAMAGED, Attributes, join_netcdf, netcdf_image, opened, stored_name
 from orchestrator.results.storage import column_attributes, origin_of_rows
 from orchestrator.safe_files import flush, not_written, write_bytes
 
@@ -147,12 +147,10 @@ def parts_of(folder: Path) -> list[Path]:
 
 def rows_in(parts: Sequence[Path]) -> int:
     """Rows of an unfinished recording that follow each other without a gap, up to a part that cannot be read."""
-    import h5py  # noqa: PLC0415 - as below
-
     rows = 0
     for part in parts:
         try:
-            with h5py.File(part, "r") as file:
+            with opened(part) as file:
                 if int(part.stem) != rows:
                     break
                 rows += len(file["time"])
@@ -162,10 +160,8 @@ def rows_in(parts: Sequence[Path]) -> int:
 
 
 def _read(part: Path, names: Sequence[str]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    import h5py  # noqa: PLC0415 - a tenth of a second that only recordings need
-
     try:
-        with h5py.File(part, "r") as file:
+        with opened(part) as file:
             return file["time"][...], np.column_stack([file[stored_name(name)][...] for name in names])
     except DAMAGED as error:
         raise InputError(f"{part}: it cannot be read as part of a recording: {error}") from error

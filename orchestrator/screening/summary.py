@@ -55,6 +55,11 @@ class ModeAt:
         return sorted(found, key=lambda entry: -max(abs(entry[1]), abs(entry[2])))[:most]
 
 
+def least_of(item: ScreenedItem) -> ModeAt | None:
+    """Its least damped critical mode; None where it has none."""
+    return ModeAt(item, item.record.critical[0]) if item.record.critical else None
+
+
 @dataclass(frozen=True)
 class ScreenedMode:
     name: str
@@ -89,9 +94,7 @@ class Summary:
     @property
     def stable(self) -> bool | None:
         """Whether nothing grows anywhere; None where an item has no verdict, or is missing, and none grows."""
-        if self.unstable:
-            return False
-        return True if self.result.complete and all(item.record.stable for item in self.result.items) else None
+        return self.stable_here if self.unstable or self.result.complete else None
 
     @property
     def stable_here(self) -> bool | None:
@@ -115,8 +118,7 @@ class Summary:
 
     def least_damped(self) -> list[ModeAt]:
         """The least damped critical mode of every item that has one, the worst first."""
-        found = [ModeAt(item, item.record.critical[0]) for item in self.result.items if item.record.critical]
-        return sorted(found, key=lambda mode: mode.damping)
+        return sorted(filter(None, map(least_of, self.result.items)), key=lambda mode: mode.damping)
 
     def _modes(self) -> list[ScreenedMode]:
         followed: dict[int, list[ModeAt]] = {}

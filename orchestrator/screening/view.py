@@ -18,11 +18,12 @@ from orchestrator.report.html.elements import Figures, colour, document, paragra
 from orchestrator.report.notebook import page
 from orchestrator.report.table import Column, ColumnTable, Marked, damping
 from orchestrator.report.tables import eigenvalue_text
+from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json
 from orchestrator.safe_files import made_folder, write_text
 from orchestrator.screening.study import ScreenedItem, ScreeningResult
-from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration
+from orchestrator.screening.summary import ModeAt, ScreenedMode, Summary, duration, least_of
 from orchestrator.screening.words import OutageRow, by_outage, verdict_of, verdict_sentence, what_was_counted, where
 
 ITEMS, MODES, SUMMARY, PAGE = "items.csv", "modes.csv", "screening.json", "screening.html"
@@ -93,10 +94,6 @@ class Screening:
         return page(f"Screening of {self.result.plan.case.name}", lines, self.modes())
 
 
-def _least(item: ScreenedItem) -> ModeAt | None:
-    return ModeAt(item, item.record.critical[0]) if item.record.critical else None
-
-
 def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
     return ColumnTable("Items", (
         Column("Point", lambda item: item.point.name, name="point"),
@@ -105,8 +102,8 @@ def items_table(summary: Summary) -> ColumnTable[ScreenedItem]:
         Column("What", lambda item: str(item.record.status), name="status"),
         Column("", lambda item: item.record.stable, name="stable"),
         Column("", lambda item: item.record.counted, name="counted"),
-        Column("", lambda item: None if (one := _least(item)) is None else one.damping, name="least_damping_percent"),
-        Column("", lambda item: None if (one := _least(item)) is None else one.frequency, name="frequency_hz"),
+        Column("", lambda item: None if (one := least_of(item)) is None else one.damping, name="least_damping_percent"),
+        Column("", lambda item: None if (one := least_of(item)) is None else one.frequency, name="frequency_hz"),
         Column("", lambda item: "; ".join(filter(None, (item.record.text, *item.record.warnings))), name="why"),
         Column("Why", lambda item: item.record.text),
     ), summary.result.items, left=4)  # fmt: skip
@@ -122,7 +119,7 @@ def _cells(summary: Summary) -> Cells:
     def cell(item: ScreenedItem | None) -> Cell | None:
         if item is None:
             return None
-        least, record = _least(item), item.record
+        least, record = least_of(item), item.record
         text = "; ".join(filter(None, ("" if record.status is Status.COMPUTED else record.status, record.text)))
         if least is None:
             return Cell(text or f"no mode below {100 * plan.wanted.damping:g} %", None, record.stable)
@@ -196,7 +193,7 @@ def _cell(item: ScreenedItem | None) -> str | Marked:
     """The least damping at an item, or what became of it."""
     if item is None or item.record.status is not Status.COMPUTED:
         return "–" if item is None else str(item.record.status)
-    least = _least(item)
+    least = least_of(item)
     if item.record.stable is False:
         return Marked(f"{least.damping:.2f} UNSTABLE" if least else "UNSTABLE", "bad")
     return "more" if least is None else damping(least.damping)
@@ -268,13 +265,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
         "modes": [
             {
                 "name": mode.name,
-                "worst": _where(mode.worst.item)
-                | {
-                    "real": mode.worst.value.real,
-                    "imag": mode.worst.value.imag,
-                    "frequency_hz": mode.worst.frequency,
-                    "damping_percent": mode.worst.damping,
-                },
+                "worst": _where(mode.worst.item) | eigenvalue_json(mode.worst.value, mode.worst.damping),
                 "participation": dict(mode.worst.participation()),
                 "converters": [
                     {"component": name, "residue_p": abs(p), "residue_q": abs(q)}

@@ -12,11 +12,11 @@ from orchestrator.analysis.stability import zeros_in_words
 from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Status
 from orchestrator.operating_points.points_file import OperatingCase
-from orchestrator.report.tables import VerdictSentence
+from orchestrator.report.tables import VerdictSentence, counted
 from orchestrator.screening.modes import UNSTABLE
 from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.study import ScreenedItem, ScreeningPlan
-from orchestrator.screening.summary import ModeAt, Summary
+from orchestrator.screening.summary import ModeAt, Summary, least_of
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def by_outage(summary: Summary) -> list[OutageRow]:
     for name, items in groups.items():
         known = [item for item in items if item.record.status is Status.COMPUTED]
         worst = min(known, key=lambda item: (item.record.stable is not False, _damping(item)), default=None)
-        least = ModeAt(worst, worst.record.critical[0]) if worst is not None and worst.record.critical else None
+        least = None if worst is None else least_of(worst)
         unjudged = tuple(item for item in items if item.record.status is not Status.COMPUTED)
         rows.append(OutageRow(name, worst, least, unjudged, len(items)))
     return sorted(rows, key=lambda row: (
@@ -49,7 +49,7 @@ def by_outage(summary: Summary) -> list[OutageRow]:
 
 
 def _damping(item: ScreenedItem) -> float:
-    return ModeAt(item, item.record.critical[0]).damping if item.record.critical else float("inf")
+    return float("inf") if (one := least_of(item)) is None else one.damping
 
 
 def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
@@ -65,8 +65,7 @@ def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:
 
 def not_judged(summary: Summary) -> str:
     """How many items have no modes, and what they have in common: what is out, and a high or a low load."""
-    items = [item for item in summary.result.items if item.record.status is not Status.COMPUTED]
-    if not items:
+    if not (items := list(summary.failures())):
         return ""
     which = "all" if len(items) > 1 else "it is"
     common = [text for text in (_out(summary, items), _loading(summary, items)) if text]
@@ -106,13 +105,10 @@ def verdict_sentence(summary: Summary) -> str:
 def verdict_of(summary: Summary) -> VerdictSentence:
     total = len(summary.result.items)
     if summary.unstable:
-        worst = summary.unstable[0]
-        for one in summary.least_damped():
-            if one.item.record.stable is False:
-                worst = one.item
-                break
+        growing = (one.item for one in summary.least_damped() if one.item.record.stable is False)
+        worst = next(growing, summary.unstable[0])
         lost = "".join(f"; {text}" for text in (not_judged(summary), summary.beyond) if text)
-        text = f"{_count(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}{lost}"
+        text = f"{counted(len(summary.unstable), 'item')} of {total}; worst: {where(worst)}{_least(worst)}{lost}"
         return VerdictSentence(False, "UNSTABLE", text)
     computed = summary.counts[Status.COMPUTED]
     least = summary.least_damped()[:1]
@@ -120,7 +116,7 @@ def verdict_of(summary: Summary) -> VerdictSentence:
     if summary.free:
         first = summary.free[0]
         tail += (
-            f"; at {_count(len(summary.free), 'item')}, first at {where(first)}, {zeros_in_words(first.record.zeros)}"
+            f"; at {counted(len(summary.free), 'item')}, first at {where(first)}, {zeros_in_words(first.record.zeros)}"
         )
     tail += f"; {summary.beyond}" if summary.beyond else ""
     if summary.stable:
@@ -160,10 +156,9 @@ def _what_was_linearised(summary: Summary) -> str:
     computed = [item.record.map_steps for item in summary.result.items if item.record.status is Status.COMPUTED]
     found = []
     for steps, number in sorted(Counter(computed).items()):
-        which = f"map over {steps} communication steps ({steps * step:g} s), after which sampled controllers repeat"
-        which = (
-            "map over a communication step" if steps == 1 else which if steps else "system without a communication step"
-        )
+        which = "map over a communication step" if steps else "system without a communication step"
+        if steps > 1:
+            which = f"map over {steps} communication steps ({steps * step:g} s), after which sampled controllers repeat"
         found.append(which if number == len(computed) else f"{which} at {number} of {len(computed)} items")
     return ", of the ".join(found) or "system without a communication step"
 
@@ -186,9 +181,8 @@ def where(item: ScreenedItem) -> str:
 def _least(item: ScreenedItem) -> str:
     if outside := growth_outside(item.record):
         return f": {outside}"
-    if not item.record.critical:
+    if (one := least_of(item)) is None:
         return ""
-    one = ModeAt(item, item.record.critical[0])
     who = ", ".join(f"{name} {share:.2f}" for name, share in one.participation(2))
     return f": {one.frequency:.3f} Hz, {one.damping:.2f} % ({who})"
 
@@ -208,7 +202,3 @@ def growth_outside(record: ItemRecord) -> str:
     fastest = max(known, key=lambda value: value.real)
     at = f"at {fastest.imag / (2 * np.pi):.3g} Hz" if fastest.imag else "without an oscillation"
     return f"{text}, {'the fastest ' if number > 2 else ''}by {fastest.real:.3g} 1/s {at}"
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" + ("s" if number != 1 else "")

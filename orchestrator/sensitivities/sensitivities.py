@@ -127,7 +127,9 @@ def find_sensitivities(prepared: PreparedScenario, again: Again, request: Sensit
         at = _Mode(found.model, where_given(lambda: continuous(blocks)) if blocks.serves_continuous else None, chosen)
         rows: dict[Parameter, Sensitivity] = {}
         anew: list[Parameter] = []
-        unknown = _not_of_the_catalogue(prepared, master)
+        # Components whose FMU may take a tunable parameter up at its start alone: no effect is seen while it runs.
+        files = {name for name, table in prepared.case.table.components.items() if table.file is not None}
+        unknown = files | set(foreign_components(master))
         acting = limits_that_act(master)
         for parameter in parameters:
             if held and not parameter.tunable:
@@ -233,12 +235,6 @@ def _after(master: Master, steps: int) -> Numbers:
     with state.put_back():
         master.advance(steps)
         return state.read()
-
-
-def _not_of_the_catalogue(prepared: PreparedScenario, master: Master) -> set[str]:
-    """Components whose FMU may take a tunable parameter up at its start alone: then no effect is seen while it runs."""
-    files = {name for name, table in prepared.case.table.components.items() if table.file is not None}
-    return files | set(foreign_components(master))
 
 
 def _answer(master: Master, name: str) -> Numbers:

@@ -85,7 +85,6 @@ class SiteRequest(OfCase):
 
     @property
     def name(self) -> str:
-        """The device as text."""
         return str(self.device)
 
     @property

@@ -109,7 +109,6 @@ def device_title(result: SiteResult) -> str:
 
 
 def answer(result: SiteResult) -> str:
-    """The best places in one sentence."""
     best = result.ranking[:3]
     most, at = result.least(best[0])
     mode = next(one for one in result.situations if one.name == at).modes[0]
@@ -172,7 +171,6 @@ def remarks(result: SiteResult) -> list[str]:
 
 
 def as_json(result: SiteResult) -> dict[str, Any]:
-    """The machine-readable form of ``gfor site``."""
     here = result.intact.name
     return {
         "case": result.case.name, "scenario": result.prepared.name, "device": result.request.device,
@@ -248,12 +246,9 @@ def rows(result: SiteResult) -> list[dict[str, Any]]:
 
 
 def ranking_table(result: SiteResult) -> Table:
-    """The best buses for a terminal."""
     modes = [f"{seen.label}, {seen.mode.damping_percent:.2f} %" for seen in result.intact.modes]
-    found = make_table(f"{unit(result, '100')}; best first", "Bus", *modes)
-    for bus in result.ranking[:_SHOWN]:
-        found.add_row(bus, *_cells(result, bus))
-    return found
+    rows = [[bus, *_cells(result, bus)] for bus in result.ranking[:_SHOWN]]
+    return make_table(f"{unit(result, '100')}; best first", "Bus", *modes, rows=rows)
 
 
 def _cells(result: SiteResult, bus: str) -> list[str]:

@@ -111,12 +111,9 @@ def sweep_dataset(samples: Samples) -> xr.Dataset:
             errors[(s, *place)] = sweep.points[place].error or ""
             warnings[(s, *place)] = _SEPARATOR.join(sweep.points[place].warnings)
             verdict = sweep.points[place].stability
-            if verdict.get("stable") is not None:
-                stable[(s, *place)] = verdict["stable"]
-            if verdict.get("largest_growth_rate") is not None:
-                growth[(s, *place)] = verdict["largest_growth_rate"]
-            if verdict.get("frequency_hz") is not None:
-                hertz[(s, *place)] = verdict["frequency_hz"]
+            for key, array in (("stable", stable), ("largest_growth_rate", growth), ("frequency_hz", hertz)):
+                if verdict.get(key) is not None:
+                    array[(s, *place)] = verdict[key]
     flags = {"flag_values": list(range(5)), "flag_meanings": _BEGINNINGS, "_FillValue": np.int8(-1)}
     at_points = {
         "residual": residual, "stable": stable, "largest_growth_rate": growth, "largest_growth_frequency": hertz,

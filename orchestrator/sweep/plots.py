@@ -1,6 +1,6 @@
 """Plots of a sweep: trajectories in the complex plane, and figures of the named modes over the parameter."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -121,40 +121,33 @@ def _draw(axis: Any, samples: Samples, curve: Curve, value: Callable[[dict[str, 
 
 def plot_named(samples: Samples, path: Path) -> bool:
     """Damping and frequency of the named modes over the last parameter; False if none has a name."""
-    curves = _named(samples)
-    if not curves:
-        return False
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 6.0), layout="constrained")
-        axes = figure.subplots(2, 1, sharex=True)
-        for k, _, trajectory, curve in curves:
-            style = {"color": colour(k), "linestyle": _dash(trajectory)}
-            for axis, figure_of in zip(axes, ("damping", "frequency"), strict=True):
-                _draw(axis, samples, curve, itemgetter(figure_of), **style)
-        axes[0].axhline(0, color="#888888", linewidth=0.8)
-        axes[0].set_ylabel("Damping [%]")
-        axes[1].set_ylabel("Frequency [Hz]")
-        axes[1].set_ylim(bottom=0)
-        _finish(figure, axes, samples, curves)
-        save_figure(figure, path)
-    return True
+    panels = [("Damping [%]", itemgetter("damping")), ("Frequency [Hz]", itemgetter("frequency"))]
+    return _plot_panels(samples, path, panels, 6.0)
 
 
 def plot_swing(samples: Samples, path: Path) -> bool:
     """Participation of the swing states in the named modes; False if there are none."""
+    panels = [(f"{state} [%]", _percent_of(state)) for state in samples.states[:6]]
+    return _plot_panels(samples, path, panels, 0.8 + 2.3 * len(panels), sharey=True)
+
+
+def _plot_panels(
+    samples: Samples, path: Path, panels: Sequence[tuple[str, Callable[[dict[str, Any]], float]]], height: float, *,
+    sharey: bool = False,
+) -> bool:  # fmt: skip
     curves = _named(samples)
-    states = samples.states[:6]
-    if not curves or not states:
+    if not curves or not panels:
         return False
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.6, 0.8 + 2.3 * len(states)), layout="constrained")
-        axes = figure.subplots(len(states), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        figure = Figure(figsize=(7.6, height), layout="constrained")
+        axes = figure.subplots(len(panels), 1, sharex=True, sharey=sharey, squeeze=False)[:, 0]
         for k, _, trajectory, curve in curves:
-            style = {"color": colour(k), "linestyle": _dash(trajectory)}
-            for axis, state in zip(axes, states, strict=True):
-                _draw(axis, samples, curve, _percent_of(state), **style)
-                axis.set_ylabel(f"{state} [%]")
-        axes[0].set_ylim(bottom=0)
+            for axis, (label, value) in zip(axes, panels, strict=True):
+                _draw(axis, samples, curve, value, color=colour(k), linestyle=_dash(trajectory))
+                axis.set_ylabel(label)
+        if not sharey:
+            axes[0].axhline(0, color="#888888", linewidth=0.8)
+        axes[-1].set_ylim(bottom=0)
         _finish(figure, axes, samples, curves)
         save_figure(figure, path)
     return True

@@ -91,9 +91,7 @@ class ScenarioSweep:
     @property
     def stable(self) -> bool | None:
         verdicts = [record.stability.get("stable") for record in self.points.values()]
-        if any(verdict is False for verdict in verdicts):
-            return False
-        return True if all(verdicts) else None
+        return False if False in verdicts else None if None in verdicts else True
 
 
 @dataclass

@@ -6,7 +6,7 @@ import re
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.report.tables import make_table
+from orchestrator.report.tables import counted, make_table
 from orchestrator.sweep.axes import grid_places
 from orchestrator.sweep.dataset import Samples
 from orchestrator.sweep.limit import Ending
@@ -104,7 +104,7 @@ def remarks(samples: Samples) -> list[str]:
     texts += [text for limit in result.limits for text in limit.remarks]
     failures = list(result.failures())
     if failures:
-        texts.append(f"{_count(len(failures), 'point')} of {result.plan.number_of_points} failed:")
+        texts.append(f"{counted(len(failures), 'point')} of {result.plan.number_of_points} failed:")
         texts += [
             f"  {sweep.prepared.name}, {place_text(samples, place)}: {error}"
             for sweep, place, error in failures[:_FAILURES_SHOWN]
@@ -127,7 +127,7 @@ def remarks(samples: Samples) -> list[str]:
     texts += [f"… and {more} more beginnings, marked 'broken' in sweep.csv"] if more > 0 else []
     if result.refined and not result.limits:
         texts.append(
-            f"{_count(result.refined, 'point')} between those of the grid served to recognise modes "
+            f"{counted(result.refined, 'point')} between those of the grid served to recognise modes "
             "(where, is marked 'refined' in sweep.csv)"
         )
     return [*texts, *_warnings(samples)]
@@ -146,10 +146,6 @@ def _warnings(samples: Samples) -> list[str]:
                     points.add((sweep.prepared.name, place))
     total = sum(len(sweep.points) for sweep in samples.result.scenarios)
     return [f"at {len(points)} of {total} points: {text}" for text, points in kinds.values()]
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" + ("s" if number != 1 else "")
 
 
 def place_text(samples: Samples, place: GridPlace) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Container
 from dataclasses import dataclass
+from functools import partial
 
 from orchestrator.coupling.system import System
 
@@ -58,12 +59,11 @@ class Limit:
 _EXCITER, _GOVERNOR, _PSS = "exciter", "governor", "pss"
 
 
-def _exciter(what: str, signal: str, high: str, low: str, **further: object) -> Limit:
-    return _part(_EXCITER, what, signal, high, low, **further)
-
-
 def _part(part: str, what: str, signal: str, high: str, low: str, **further: object) -> Limit:
     return Limit(what, f"{part}.{signal}", f"{part}.{high}", low=f"{part}.{low}", **further)  # type: ignore[arg-type]
+
+
+_exciter = partial(_part, _EXCITER)
 
 
 def _names(part: str, *names: str) -> tuple[str, ...]:

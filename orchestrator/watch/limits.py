@@ -60,10 +60,8 @@ SCALED = 1e-3
 """The same for a limit in proportion to a signal: the model may take that from an earlier pass of its iteration."""
 
 
-def limits_of(plan: ComponentPlan) -> Iterator[Limit]:
-    for limit in LIMITS:
-        if limit.fits(plan.description.variables):
-            yield limit
+def limits_of(plan: ComponentPlan) -> list[Limit]:
+    return [limit for limit in LIMITS if limit.fits(plan.description.variables)]
 
 
 def limit_signals(system: System) -> list[str]:
@@ -75,7 +73,7 @@ def active_limits(seen: Seen, system: System, settings: Settings) -> Iterator[Fi
     """Limits that act for longer than `LEAST_DURATION` in all, or still act at the end, while their component is on the
     grid: what a tripped one limits concerns nobody. An upper and a lower limit of one signal are one finding."""
     for name, plan in system.components.items():
-        limits = list(limits_of(plan))
+        limits = limits_of(plan)
         if not limits:
             continue
         on = settings.connected(name) > 0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch.finding import Finding
-from orchestrator.watch.seen import Seen, unit
+from orchestrator.watch.seen import Seen, shown, unit
 from orchestrator.watch.settings import Settings
 from orchestrator.watch.stretches import Stretch
 
@@ -271,13 +271,9 @@ def _finding(
     left = f"; it leaves {ALLOWED[0]:g} to {ALLOWED[1]:g} pu at t = {outside:.4g} s" if outside is not None else ""
     well = f"; so {'does' if others == 1 else 'do'} {others} more" if others else ""
     message = (
-        f"the {course.what} runs away from t = {begin:.4g} s on: {_shown(course.name)} is {value:.4g} {unit} at "
+        f"the {course.what} runs away from t = {begin:.4g} s on: {shown(course.name)} is {value:.4g} {unit} at "
         f"t = {times[row]:.4g} s and moves at {rate:+.3g} {unit}/s{left}{well}"
     )
     component, _, variable = course.name.partition(".")
     figures = {"value": value, "rate": rate}
     return Finding("run_away", begin, component, variable, message, None if last else float(times[row]), figures)
-
-
-def _shown(name: str) -> str:
-    return f"|{name[:-3]}|" if name.endswith("_re") else name

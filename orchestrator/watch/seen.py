@@ -84,6 +84,11 @@ def unit(name: str, system: System) -> str:
     return system.components[component].description.variables[variable].unit
 
 
+def shown(name: str) -> str:
+    """A pair of real and imaginary part is shown as its magnitude."""
+    return f"|{name[:-3]}|" if name.endswith(("_re", "_im")) else name
+
+
 def look_every(step_size: float, record_every: int, stop_time: float) -> int:
     """Number of communication steps between two looks. It is a multiple of the steps between two records if the records
     are close enough."""

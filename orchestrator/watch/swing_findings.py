@@ -5,6 +5,7 @@ import numpy as np
 from orchestrator.watch.confirmation import KEPT, STEADY, Swing, change, needed_end, rises, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.watch.oscillation import Oscillation, too_fast
+from orchestrator.watch.seen import shown
 from orchestrator.watch.stretches import Stretch
 
 _PARTS, _SHORT = 40, 0.1
@@ -31,7 +32,7 @@ def _since(swing: Swing, frequency: float | None) -> float:
 
 def growing(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretch) -> Finding:
     message = (
-        f"the response grows from t = {stretch.begin:.4g} s on: {_shown(swing.name)} swings at "
+        f"the response grows from t = {stretch.begin:.4g} s on: {shown(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and grows at {oscillation.rate:+.3g} 1/s; at {_end(stretch)} its amplitude "
         f"is {oscillation.amplitude:.3g} {unit}"
     )
@@ -42,7 +43,7 @@ def sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretc
     since = _since(swing, oscillation.frequency_hz)
     message = (
         f"the response neither decays nor grows, as in a limit cycle: from t = {since:.4g} s to {_end(stretch)} "
-        f"{_shown(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
+        f"{shown(swing.name)} swings at {oscillation.frequency_hz:.4g} Hz with an amplitude of "
         f"{oscillation.amplitude:.3g} {unit}"
     )
     return _finding("sustained_oscillation", since, swing, message, oscillation, stretch)
@@ -54,7 +55,7 @@ def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: St
     ``why``: the reason; see `confirmation.doubt`."""
     seems = "grow" if change(swing, oscillation.rate) > STEADY else "last"
     message = (
-        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {_shown(swing.name)} swings at "
+        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and seems to {seems} ({oscillation.rate:+.3g} 1/s until {_end(stretch)}), "
         f"but {why}; {_remedy(swing, oscillation, stretch)}"
     )
@@ -72,7 +73,7 @@ def irregular_swing(swing: Swing, unit: str, stretch: Stretch) -> Finding:
     grows = swing_rises(swing)
     message = (
         f"the response {'grows' if grows else 'does not settle'}: from t = {since:.4g} s to {_end(stretch)} "
-        f"{_shown(swing.name)} swings by about {amplitude:.3g} {unit}, at no single frequency{fast}"
+        f"{shown(swing.name)} swings by about {amplitude:.3g} {unit}, at no single frequency{fast}"
     )
     kind: Kind = "growing_oscillation" if grows else "sustained_oscillation"
     figures = {"amplitude": amplitude}
@@ -85,7 +86,7 @@ def doubtful_irregular_swing(swing: Swing, why: str, unit: str, stretch: Stretch
     ``why``: the reason; see `confirmation.irregular_doubt`."""
     amplitude = _irregular_amplitude(swing)
     message = (
-        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {_shown(swing.name)} swings by "
+        f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown(swing.name)} swings by "
         f"about {amplitude:.3g} {unit} at {_end(stretch)}, at no single frequency, but {why}; "
         f"{_remedy(swing, None, stretch)}"
     )
@@ -119,8 +120,3 @@ def _until(stretch: Stretch) -> float | None:
 def _place(name: str) -> tuple[str, str]:
     component, _, variable = name.partition(".")
     return component, variable
-
-
-def _shown(name: str) -> str:
-    """A pair of real and imaginary part is shown as its magnitude."""
-    return f"|{name[:-3]}|" if name.endswith(("_re", "_im")) else name

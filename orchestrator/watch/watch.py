@@ -40,10 +40,6 @@ MORE = 1.2  # A signal departs if it moves by this factor more in the last quart
 _FEWEST = 40  # least number of looks by which a departure is judged
 
 
-def is_short(stretch: Stretch) -> bool:
-    return stretch.end - stretch.begin < SETTLING * (1 - 1e-9)
-
-
 def too_short(stretches: Sequence[Stretch]) -> list[Finding]:
     """One remark on stretches whose end shows a motion, or has too few looks to show any, and which are too short."""
     if not stretches:
@@ -199,7 +195,7 @@ class _Responses:
         found = [finding for finding in found if not any(one.explains(finding) for one in acting)]
         if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units):
             self.masked[part] = acting
-        if not is_short(part):
+        if part.end - part.begin >= SETTLING * (1 - 1e-9):
             return found
         growing = [finding for finding in found if finding.kind == "growing_oscillation"]
         if told and growing != found:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fmus.synchronous_generator.excitation.common import Regulated
 from fmus.synchronous_generator.machine import Start
 from fmus.synchronous_generator.parts import EXCITERS, GOVERNORS, STABILIZERS
 from fmus.toolchain.frames import Phasor
@@ -24,7 +25,7 @@ def exciter(name, values=None):
     v_t, I_fd, v_s = (
         m.input(name, "pu", name, base="S_n", start=start) for name, start in (("v_t", V_T), ("I_fd", E_FD), ("v_s", 0))
     )
-    E_fd, _ = EXCITERS[name](m, START, lambda E: v_t, I_fd, v_s)
+    E_fd, _ = EXCITERS[name](m, Regulated(START, lambda E: v_t, I_fd, v_s))
     m.output("E_fd", E_fd, "pu", "Field voltage", base="E_fd")
     return Evaluated(m.build(), {f"exciter.{key}": value for key, value in (values or {}).items()})
 

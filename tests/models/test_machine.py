@@ -5,6 +5,7 @@ from cmath import exp
 import numpy as np
 import pytest
 
+from fmus.synchronous_generator.excitation.common import Regulated
 from fmus.synchronous_generator.excitation.without_ceilings import ac4a, st1, st4b
 from fmus.synchronous_generator.machine import Start
 from fmus.synchronous_generator.stabilization.norm631 import pss2a
@@ -108,7 +109,7 @@ def excited(exciter, values):
     v_t, I_fd, v_s = (
         m.input(name, "pu", name, base="S_n", start=start) for name, start in (("v_t", 1.01), ("I_fd", 2.2), ("v_s", 0))
     )
-    E_fd, _ = exciter(m, START, lambda E: v_t, I_fd, v_s)
+    E_fd, _ = exciter(m, Regulated(START, lambda E: v_t, I_fd, v_s))
     m.output("E_fd", E_fd, "pu", "Field voltage", base="E_fd")
     return Evaluated(m.build(), {f"exciter.{name}": value for name, value in values.items()})
 

@@ -13,7 +13,7 @@ AC4A has a controlled rectifier:
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
-    TerminalVoltage,
+    Regulated,
     exciter_saturation,
     gain,
     lead_lag_stage,
@@ -23,19 +23,16 @@ from fmus.synchronous_generator.excitation.common import (
     time,
     voltage_before_rectifier,
 )
-from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import clamp, held_at_limits, limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, fmax
+from fmus.toolchain.symbols import Expr, fmax
 
 _MOST = 1e9  # no upper limit of V_E [pu]
 
 _LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
 
 
-def ac1a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-) -> tuple[Expr, Expr]:
+def ac1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 400.0, "Gain", 1e-3), time(m, "T_A", 0.02, "Amplifier; 0 leaves the lag out")
@@ -45,35 +42,33 @@ def ac1a(
         K_C = gain(m, "K_C", 0.2, "Rectifier loading factor", 0)
         K_D = gain(m, "K_D", 0.38, "Demagnetising factor", 0)
         curve = exciter_saturation(m, 4.18, 0.1, 3.14, 0.03)
-        V_E0 = voltage_before_rectifier(start.E_fd, K_C * start.E_fd)
-        V_R0 = K_E * V_E0 + curve.part(V_E0) + K_D * start.E_fd
+        V_E0 = voltage_before_rectifier(seen.start.E_fd, K_C * seen.start.E_fd)
+        V_R0 = K_E * V_E0 + curve.part(V_E0) + K_D * seen.start.E_fd
         require_within(m, V_R0, A_low, A_high, ("exciter.V_AMIN", "exciter.V_AMAX"))
         require_within(m, V_R0, R_low, R_high, ("exciter.V_RMIN", "exciter.V_RMAX"))
         x = m.state("V_E", V_E0, "pu", "Voltage before the rectifier", base="E_fd")
         V_E = fmax(x, 0)
-        V_FE = K_E * V_E + curve.part(V_E) + K_D * I_fd
+        V_FE = K_E * V_E + curve.part(V_E) + K_D * seen.I_fd
         V_F, _ = rate_feedback(m, V_FE, V_R0, 0.03, 1.0)
-        measured = Measurement(m, start, terminal_voltage, I_fd)
-        error = lead_lag_stage(m, measured.error(V_R0 / K_A, v_s) - V_F, V_R0 / K_A)
+        measured = Measurement(m, seen)
+        error = lead_lag_stage(m, measured.error(V_R0 / K_A) - V_F, V_R0 / K_A)
         V_A = limited_low_pass(m, "amplifier", K_A * error, T_A, A_low, A_high, V_R0)
         m.derivative(x, held_at_limits(x, (clamp(V_A, R_low, R_high) - V_FE) / T_E, 0.0, _MOST))
-        return measured.close(V_E * rectifier(K_C * I_fd / fmax(V_E, _LEAST)))
+        return measured.close(V_E * rectifier(K_C * seen.I_fd / fmax(V_E, _LEAST)))
 
 
-def ac4a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-) -> tuple[Expr, Expr]:
+def ac4a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.015, "Amplifier; 0 leaves the lag out")
         I_high, I_low = gain(m, "V_IMAX", 10.0, "Upper limit of the error"), gain(m, "V_IMIN", -10.0, "Lower one")
         high, low = gain(m, "V_RMAX", 5.64, "Upper ceiling of E_fd"), gain(m, "V_RMIN", -4.53, "Lower ceiling of E_fd")
         K_C = gain(m, "K_C", 0.0, "Rectifier loading factor", 0)
-        V_I0 = start.E_fd / K_A
+        V_I0 = seen.start.E_fd / K_A
         require_within(m, V_I0, I_low, I_high, ("exciter.V_IMIN", "exciter.V_IMAX"))
-        require_within(m, start.E_fd, low, high - K_C * start.E_fd, ("exciter.V_RMIN", "exciter.V_RMAX"))
-        measured = Measurement(m, start, terminal_voltage, I_fd)
-        error = clamp(measured.error(V_I0, v_s), I_low, I_high)
+        require_within(m, seen.start.E_fd, low, high - K_C * seen.start.E_fd, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        measured = Measurement(m, seen)
+        error = clamp(measured.error(V_I0), I_low, I_high)
         compensated = lead_lag_stage(m, error, V_I0, lead=1.0)
-        ceiling = fmax(high - K_C * I_fd, low)
-        return measured.close(limited_low_pass(m, "amplifier", K_A * compensated, T_A, low, ceiling, start.E_fd))
+        ceiling = fmax(high - K_C * seen.I_fd, low)
+        return measured.close(limited_low_pass(m, "amplifier", K_A * compensated, T_A, low, ceiling, seen.start.E_fd))

@@ -3,10 +3,16 @@
 Signals of a regulator are per unit of the terminal voltage (base S_n) before the gain and of E_fd after it."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
 
-from fmus.synchronous_generator.declarations import require_between, require_rising, saturated_part, time_constant
+from fmus.synchronous_generator.declarations import (
+    per_unit,
+    require_between,
+    require_rising,
+    saturated_part,
+    time_constant,
+)
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
 from fmus.toolchain.model_builder import ModelBuilder
@@ -20,50 +26,48 @@ SOURCE = "typical data, IEEE 421.5"
 E_FD = "E_fd"
 
 
-class Exciter(Protocol):
-    """Declares an excitation system and returns (E_fd, |v_t|) [pu]; ``v_s`` is a stabiliser's signal [pu]."""
+@dataclass(frozen=True)
+class Regulated:
+    """What an exciter sees: operating point, terminal voltage and field current of its machine, and a stabiliser."""
 
-    def __call__(
-        self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-    ) -> tuple[Expr, Expr]:
-        """Declare the exciter; returns (E_fd, |v_t|) [pu]."""
-
-
-def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> Expr:
-    """Declare a gain or limit per unit of the field voltage."""
-    return m.parameter(name, value, "pu", text, base=E_FD, minimum=minimum, source=SOURCE)
+    start: Start
+    terminal_voltage: TerminalVoltage
+    I_fd: Expr  # 1 pu gives 1 pu of voltage on open circuit
+    v_s: Scalar = 0.0  # added to the voltage reference [pu, S_n]
 
 
+Exciter = Callable[[ModelBuilder, Regulated], tuple[Expr, Expr]]
+"""Declares an excitation system and returns (E_fd, |v_t|) [pu]."""
+
+
+gain = partial(per_unit, base=E_FD, source=SOURCE)
 time = partial(time_constant, source=SOURCE)
 
 
 class Measurement:
     """The measured terminal voltage, 1/(1 + s·T_R), and the reference that it is compared with.
 
-    ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
-    field current [pu]; the first guess of E_fd where T_R = 0 lets |v_t| pass directly."""
+    The field current is the first guess of E_fd where T_R = 0 lets |v_t| pass directly."""
 
-    def __init__(self, m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr) -> None:
-        self._m, self._v_t, self._start = m, terminal_voltage, start
+    def __init__(self, m: ModelBuilder, seen: Regulated) -> None:
+        self._m, self._seen = m, seen
         T_R = time(m, "T_R", 0.01, "Voltage measurement; 0 leaves it out")
         self._left_out = T_R <= 0
         self._T_R = if_else(self._left_out, BYPASS_TIME, T_R)
-        self._state = m.state("v_m", start.v_t, "pu", "Measured terminal voltage", base="S_n")
-        self.nearly = terminal_voltage(I_fd)
+        self._state = m.state("v_m", seen.start.v_t, "pu", "Measured terminal voltage", base="S_n")
+        self.nearly = seen.terminal_voltage(seen.I_fd)
         """|v_t| [pu] for an E_fd that equals the field current, as it does in steady state."""
 
-    def error(self, at_start: Scalar, v_s: Scalar) -> Expr:
+    def error(self, at_start: Scalar) -> Expr:
         """Reference and stabiliser's signal less the measured voltage [pu, S_n]; ``at_start`` in steady state."""
-        m = self._m
-        V_ref = m.calculated(
-            "V_ref", self._start.v_t + at_start, "pu", "Voltage reference of the operating point", base="S_n"
-        )
+        m, v_t_0 = self._m, self._seen.start.v_t
+        V_ref = m.calculated("V_ref", v_t_0 + at_start, "pu", "Voltage reference of the operating point", base="S_n")
         delta = m.parameter("delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True)
-        return V_ref + delta + v_s - if_else(self._left_out, self.nearly, self._state)
+        return V_ref + delta + self._seen.v_s - if_else(self._left_out, self.nearly, self._state)
 
     def close(self, E_fd: Expr) -> tuple[Expr, Expr]:
         """(E_fd, |v_t|) of the exciter."""
-        v_t = self._v_t(E_fd)
+        v_t = self._seen.terminal_voltage(E_fd)
         self._m.derivative(self._state, (v_t - self._state) / self._T_R)
         return E_fd, v_t
 

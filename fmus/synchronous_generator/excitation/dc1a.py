@@ -10,7 +10,7 @@ from functools import partial
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
-    TerminalVoltage,
+    Regulated,
     exciter_saturation,
     gain,
     lead_lag_stage,
@@ -18,16 +18,12 @@ from fmus.synchronous_generator.excitation.common import (
     require_within,
     time,
 )
-from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import limited_low_pass
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar
+from fmus.toolchain.symbols import Expr
 
 
-def dc1a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0, *,
-    compensated: bool = True,
-) -> tuple[Expr, Expr]:  # fmt: skip
+def dc1a(m: ModelBuilder, seen: Regulated, *, compensated: bool = True) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu].
 
     ``compensated``: whether it has the stage (1+sT_C)/(1+sT_B)."""
@@ -37,12 +33,12 @@ def dc1a(
         K_E = gain(m, "K_E", 1.0, "Field resistance, separately excited")
         T_E = time(m, "T_E", 0.314, "Exciter's field", 1e-3)
         curve = exciter_saturation(m, 3.0, 0.41, 4.0, 1.96)
-        V_R0 = K_E * start.E_fd + curve.part(start.E_fd)
+        V_R0 = K_E * seen.start.E_fd + curve.part(seen.start.E_fd)
         require_within(m, V_R0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
-        E_fd = m.state("E", start.E_fd, "pu", "Field voltage", base="E_fd")
-        V_F, _ = rate_feedback(m, E_fd, start.E_fd, 0.063, 0.35)
-        measured = Measurement(m, start, terminal_voltage, I_fd)
-        error = measured.error(V_R0 / K_A, v_s) - V_F
+        E_fd = m.state("E", seen.start.E_fd, "pu", "Field voltage", base="E_fd")
+        V_F, _ = rate_feedback(m, E_fd, seen.start.E_fd, 0.063, 0.35)
+        measured = Measurement(m, seen)
+        error = measured.error(V_R0 / K_A) - V_F
         if compensated:
             error = lead_lag_stage(m, error, V_R0 / K_A)
         V_R = limited_low_pass(m, "amplifier", K_A * error, T_A, low, high, V_R0)

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 from fmus.synchronous_generator.excitation.common import (
     Measurement,
-    TerminalVoltage,
+    Regulated,
     gain,
     lead_lag_stage,
     rate_feedback,
@@ -32,7 +32,6 @@ from fmus.synchronous_generator.excitation.common import (
     require_within,
     time,
 )
-from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import (
     BYPASS_TIME,
     clamp,
@@ -43,12 +42,10 @@ from fmus.toolchain.blocks import (
     low_pass_or_nothing,
 )
 from fmus.toolchain.model_builder import ModelBuilder
-from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and, logic_or
+from fmus.toolchain.symbols import Expr, fmax, fmin, if_else, logic_and, logic_or
 
 
-def st1a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-) -> tuple[Expr, Expr]:
+def st1a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_A, T_A = gain(m, "K_A", 200.0, "Gain", 1e-3), time(m, "T_A", 0.0, "Amplifier; 0 leaves the lag out")
@@ -65,23 +62,23 @@ def st1a(
 
         def held(signal: Expr, v_t: Expr) -> Expr:
             floor = v_t * low
-            return clamp(signal - relieved(I_fd), floor, fmax(v_t * high - K_C * I_fd, floor))
+            return clamp(signal - relieved(seen.I_fd), floor, fmax(v_t * high - K_C * seen.I_fd, floor))
 
-        V_A0 = start.E_fd + relieved(start.E_fd)
+        V_A0 = seen.start.E_fd + relieved(seen.start.E_fd)
         V_I0 = V_A0 / K_A
         require_within(m, V_I0, I_low, I_high, ("exciter.V_IMIN", "exciter.V_IMAX"))
         require_within(m, V_A0, A_low, A_high, ("exciter.V_AMIN", "exciter.V_AMAX"))
-        ceiling = start.v_t * high - K_C * start.E_fd
-        require_within(m, start.E_fd, start.v_t * low, ceiling, ("exciter.V_RMIN", "exciter.V_RMAX"))
-        measured = Measurement(m, start, terminal_voltage, I_fd)
+        ceiling = seen.start.v_t * high - K_C * seen.start.E_fd
+        require_within(m, seen.start.E_fd, seen.start.v_t * low, ceiling, ("exciter.V_RMIN", "exciter.V_RMAX"))
+        measured = Measurement(m, seen)
         amplifier = m.state("amplifier", V_A0, "pu", "first-order lag with limits", base="E_fd")
-        V_F, K_F = rate_feedback(m, held(clamp(amplifier, A_low, A_high), measured.nearly), start.E_fd)
+        V_F, K_F = rate_feedback(m, held(clamp(amplifier, A_low, A_high), measured.nearly), seen.start.E_fd)
         m.require(if_else(logic_and(K_F > 0, T_A <= 0), -1, 1), "exciter.K_F > 0 needs exciter.T_A > 0")
-        error = clamp(measured.error(V_I0, v_s) - V_F, I_low, I_high)
+        error = clamp(measured.error(V_I0) - V_F, I_low, I_high)
         error = lead_lag_stage(m, error, V_I0)
         error = lead_lag_stage(m, error, V_I0, mark="1")
         V_A = close_limited_low_pass(m, amplifier, K_A * error, T_A, A_low, A_high)
-        E_fd = held(V_A, terminal_voltage(held(V_A, measured.nearly)))
+        E_fd = held(V_A, seen.terminal_voltage(held(V_A, measured.nearly)))
         return measured.close(E_fd)
 
 
@@ -97,9 +94,7 @@ class _Inner:
     at_start: Expr
 
 
-def st4b(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-) -> tuple[Expr, Expr]:
+def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K_PR = gain(m, "K_PR", 3.15, "Proportional gain", 0)
@@ -107,21 +102,21 @@ def st4b(
         high, low = gain(m, "V_RMAX", 1.0, "Upper limit of V_R"), gain(m, "V_RMIN", -0.87, "Lower limit of V_R")
         T_A = time(m, "T_A", 0.02, "Bridge; 0 leaves the lag out")
         source = _source(m)
-        inner = _inner(m, start.E_fd / source(start.v_t, start.E_fd))
-        V_A0 = if_else(inner.K_IM > 0, 0, inner.at_start / fmax(inner.K_PM, 1e-9)) + inner.K_G * start.E_fd
+        inner = _inner(m, seen.start.E_fd / source(seen.start.v_t, seen.start.E_fd))
+        V_A0 = if_else(inner.K_IM > 0, 0, inner.at_start / fmax(inner.K_PM, 1e-9)) + inner.K_G * seen.start.E_fd
         require_within(m, V_A0, low, high, ("exciter.V_RMIN", "exciter.V_RMAX"))
-        measured = Measurement(m, start, terminal_voltage, I_fd)
-        error = measured.error(0.0, v_s)
+        measured = Measurement(m, seen)
+        error = measured.error(0.0)
         V_R = limited_proportional_integral(m, "regulator", error, K_PR, K_IR, low, high, V_A0)
         V_A = low_pass_or_nothing(m, "bridge", V_R, T_A, V_A0)
         x = m.state("inner", if_else(inner.K_IM > 0, inner.at_start, 0), "pu", "integrator with limits", base="E_fd")
 
         def field_voltage(v_t: Expr) -> Expr:
-            V_B = source(v_t, I_fd)
+            V_B = source(v_t, seen.I_fd)
             free = (inner.K_PM * V_A + x) / (1 + V_B * inner.K_PM * inner.K_G)
             return V_B * clamp(free, inner.low, inner.high)
 
-        E_fd = field_voltage(terminal_voltage(field_voltage(measured.nearly)))
+        E_fd = field_voltage(seen.terminal_voltage(field_voltage(measured.nearly)))
         rest = V_A - inner.K_G * E_fd
         free = inner.K_PM * rest + x
         outward = logic_or(logic_and(free > inner.high, rest > 0), logic_and(free < inner.low, rest < 0))
@@ -157,9 +152,7 @@ def _inner(m: ModelBuilder, V_M0: Expr) -> _Inner:
     return inner
 
 
-def sexs(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-) -> tuple[Expr, Expr]:
+def sexs(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """Declare it and return (E_fd, |v_t|) [pu]."""
     with m.scope("exciter"):
         K = gain(m, "K", 100.0, "Gain", 1e-3)
@@ -168,8 +161,8 @@ def sexs(
         T_E = time(m, "T_E", 0.05, "Exciter; 0 leaves the lag out")
         low, high = gain(m, "E_MIN", 0.0, "Lower ceiling of E_fd"), gain(m, "E_MAX", 5.0, "Upper ceiling of E_fd")
         m.require(if_else(logic_and(T_B <= 0, T_A > 0), -1, 1), "exciter.T_B = 0 needs exciter.T_A = 0 as well")
-        require_within(m, start.E_fd, low, high, ("exciter.E_MIN", "exciter.E_MAX"))
-        measured = Measurement(m, start, terminal_voltage, I_fd)
-        error = measured.error(start.E_fd / K, v_s)
-        compensated = lead_lag(m, "lead_lag", error, T_A, T_B, start.E_fd / K)
-        return measured.close(limited_low_pass(m, "amplifier", K * compensated, T_E, low, high, start.E_fd))
+        require_within(m, seen.start.E_fd, low, high, ("exciter.E_MIN", "exciter.E_MAX"))
+        measured = Measurement(m, seen)
+        error = measured.error(seen.start.E_fd / K)
+        compensated = lead_lag(m, "lead_lag", error, T_A, T_B, seen.start.E_fd / K)
+        return measured.close(limited_low_pass(m, "amplifier", K * compensated, T_E, low, high, seen.start.E_fd))

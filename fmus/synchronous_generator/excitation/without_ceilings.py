@@ -4,8 +4,7 @@ Each takes the machine's terminal voltage as a function of its own E_fd, because
 series makes |v_t| depend, weakly, on E_fd itself; returned are E_fd and the |v_t| that belongs to it."""
 
 from fmus.synchronous_generator.data import NTS631, PAPER, STAMP
-from fmus.synchronous_generator.excitation.common import TerminalVoltage
-from fmus.synchronous_generator.machine import Start
+from fmus.synchronous_generator.excitation.common import Regulated
 from fmus.toolchain.blocks import lead_lag, low_pass, proportional_integral
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, if_else, logic_and
@@ -13,37 +12,27 @@ from fmus.toolchain.symbols import Expr, Scalar, if_else, logic_and
 LOOP_PASSES = 4  # fixed-point passes for the algebraic loop of ST4B; each shrinks its error more than fiftyfold
 
 
-def ac4a(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-) -> tuple[Expr, Expr]:
-    """(1+sT_C)/(1+sT_B) → K_A/(1+sT_A).
-
-    ``start``: the machine's operating point; ``terminal_voltage``: gives |v_t| [pu, S_n] for an E_fd [pu]; ``I_fd``:
-    field current; 1 pu gives 1 pu of voltage on open circuit. Of the three exciters ST4B alone needs it; ``v_s``: a
-    stabiliser's signal, added to the voltage reference [pu, S_n]."""
+def ac4a(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
+    """(1+sT_C)/(1+sT_B) → K_A/(1+sT_A)."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=PAPER)
         T_A = m.parameter("T_A", 0.015, "s", "Amplifier", minimum=1e-3, source=PAPER)
-        v_m, error = _measured_error(m, start.v_t, start.v_t + start.E_fd / K_A, v_s, T_R=0.01, source=STAMP)
-        compensated = _transient_gain_reduction(m, error, start.E_fd / K_A, PAPER)
-        E_fd = low_pass(m, "amplifier", K_A * compensated, T_A, start.E_fd)
-        return _close_measurement(m, v_m, E_fd, terminal_voltage)
+        v_m, error = _measured_error(m, seen, seen.start.v_t + seen.start.E_fd / K_A, T_R=0.01, source=STAMP)
+        compensated = _transient_gain_reduction(m, error, seen.start.E_fd / K_A, PAPER)
+        E_fd = low_pass(m, "amplifier", K_A * compensated, T_A, seen.start.E_fd)
+        return _close_measurement(m, v_m, E_fd, seen)
 
 
-def st1(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-) -> tuple[Expr, Expr]:
+def st1(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """(1+sT_C)/(1+sT_B) → K_A: as AC4A, with an amplifier that has no lag."""
     with m.scope("exciter"):
         K_A = m.parameter("K_A", 200, "pu", "Gain", base="E_fd", minimum=1, source=NTS631)
-        v_m, error = _measured_error(m, start.v_t, start.v_t + start.E_fd / K_A, v_s, T_R=0.01, source=NTS631)
-        E_fd = K_A * _transient_gain_reduction(m, error, start.E_fd / K_A, NTS631)
-        return _close_measurement(m, v_m, E_fd, terminal_voltage)
+        v_m, error = _measured_error(m, seen, seen.start.v_t + seen.start.E_fd / K_A, T_R=0.01, source=NTS631)
+        E_fd = K_A * _transient_gain_reduction(m, error, seen.start.E_fd / K_A, NTS631)
+        return _close_measurement(m, v_m, E_fd, seen)
 
 
-def st4b(
-    m: ModelBuilder, start: Start, terminal_voltage: TerminalVoltage, I_fd: Expr, v_s: Scalar = 0.0
-) -> tuple[Expr, Expr]:
+def st4b(m: ModelBuilder, seen: Regulated) -> tuple[Expr, Expr]:
     """PI → 1/(1+sT_A) → × K_P·|v_t|·f_ex, fed from the machine's own terminal through a rectifier."""
     with m.scope("exciter"):
         K_PR = m.parameter("K_PR", 3.15, "pu", "Proportional gain", base="E_fd", minimum=0, source=NTS631)
@@ -56,25 +45,25 @@ def st4b(
             f_ex = 1 - 0.577 * K_C * field_current / (K_P * v_t)
             return K_P * v_t * f_ex
 
-        control_0 = start.E_fd / bridge(start.v_t, start.E_fd)
-        v_m, error = _measured_error(m, start.v_t, start.v_t, v_s, T_R=0.02, source=NTS631)
+        control_0 = seen.start.E_fd / bridge(seen.start.v_t, seen.start.E_fd)
+        v_m, error = _measured_error(m, seen, seen.start.v_t, T_R=0.02, source=NTS631)
         control = proportional_integral(m, "regulator", error, K_PR, K_IR, control_0)
         control = low_pass(m, "bridge", control, T_A, control_0)
-        E_fd = I_fd  # equal in steady state: a good first guess
+        E_fd = seen.I_fd  # equal in steady state: a good first guess
         for _ in range(LOOP_PASSES):
-            E_fd = control * bridge(terminal_voltage(E_fd), I_fd)
-        return _close_measurement(m, v_m, E_fd, terminal_voltage)
+            E_fd = control * bridge(seen.terminal_voltage(E_fd), seen.I_fd)
+        return _close_measurement(m, v_m, E_fd, seen)
 
 
 def _measured_error(
-    m: ModelBuilder, v_t_0: Expr, V_ref_0: Scalar, v_s: Scalar, *, T_R: float, source: str
+    m: ModelBuilder, seen: Regulated, V_ref_0: Scalar, *, T_R: float, source: str
 ) -> tuple[tuple[Expr, Expr], Expr]:
     """Declare the voltage measurement and the reference; return the measurement (state, T_R) and the error."""
     T = m.parameter("T_R", T_R, "s", "Voltage measurement", minimum=1e-3, source=source)
     V_ref = m.calculated("V_ref", V_ref_0, "pu", "Voltage reference of the operating point", base="S_n")
     delta = m.parameter("delta_V_ref", 0.0, "pu", "Change of the voltage reference", base="S_n", tunable=True)
-    v_m = m.state("v_m", v_t_0, "pu", "Measured terminal voltage", base="S_n")
-    return (v_m, T), V_ref + delta + v_s - v_m
+    v_m = m.state("v_m", seen.start.v_t, "pu", "Measured terminal voltage", base="S_n")
+    return (v_m, T), V_ref + delta + seen.v_s - v_m
 
 
 def _transient_gain_reduction(m: ModelBuilder, error: Expr, initial: Scalar, source: str) -> Expr:
@@ -85,9 +74,9 @@ def _transient_gain_reduction(m: ModelBuilder, error: Expr, initial: Scalar, sou
 
 
 def _close_measurement(
-    m: ModelBuilder, measurement: tuple[Expr, Expr], E_fd: Expr, terminal_voltage: TerminalVoltage
+    m: ModelBuilder, measurement: tuple[Expr, Expr], E_fd: Expr, seen: Regulated
 ) -> tuple[Expr, Expr]:
     v_m, T_R = measurement
-    v_t = terminal_voltage(E_fd)
+    v_t = seen.terminal_voltage(E_fd)
     m.derivative(v_m, (v_t - v_m) / T_R)
     return E_fd, v_t

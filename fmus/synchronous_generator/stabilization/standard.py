@@ -17,7 +17,7 @@ from the operating point. A block whose time constant is 0 is left out. M = 5 an
 
 from functools import partial
 
-from fmus.synchronous_generator.declarations import time_constant
+from fmus.synchronous_generator.declarations import per_unit, time_constant
 from fmus.synchronous_generator.stabilization.norm631 import RAMP_LAGS
 from fmus.toolchain.blocks import BYPASS_TIME, clamp, lead_lag, low_pass_or_nothing, washout, washout_or_nothing
 from fmus.toolchain.model_builder import ModelBuilder
@@ -26,11 +26,7 @@ from fmus.toolchain.symbols import Expr, fmax, if_else, logic_and, logic_or, sqr
 SOURCE = "typical data, IEEE 421.5"
 
 
-def gain(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> Expr:
-    """Declare a gain or limit per unit."""
-    return m.parameter(name, value, "pu", text, base="S_n", minimum=minimum, source=SOURCE)
-
-
+gain = partial(per_unit, base="S_n", source=SOURCE)
 time = partial(time_constant, source=SOURCE)
 
 

@@ -32,7 +32,7 @@ HYGOV has a transient droop, and a penstock with inelastic water; in steady stat
 from collections.abc import Callable
 from functools import partial
 
-from fmus.synchronous_generator.declarations import require_between, time_constant
+from fmus.synchronous_generator.declarations import per_unit, require_between, time_constant
 from fmus.toolchain.blocks import (
     clamp,
     held_at_limits,
@@ -48,11 +48,7 @@ from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
 SOURCE = "typical data, IEEE PES-TR1"
 
 
-def power(m: ModelBuilder, name: str, value: float, text: str, minimum: float | None = None) -> Expr:
-    """Declare a gain or limit per unit of the rating."""
-    return m.parameter(name, value, "pu", text, base="S_n", minimum=minimum, source=SOURCE)
-
-
+power = partial(per_unit, base="S_n", source=SOURCE)
 time = partial(time_constant, source=SOURCE)
 
 

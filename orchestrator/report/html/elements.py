@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 COLOURS = ("#4d4d4d", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
-"""As in the picture files: a scenario keeps its colour everywhere."""
+"""Distinguishable with any colour vision (Okabe and Ito); a scenario keeps its colour everywhere."""
 
 
 def colour(index: int) -> str:

@@ -62,7 +62,8 @@ def page(places: Sequence[Path], against: Path | None = None, title: str | None 
     title = title or (case.table.title or case.name if case else f"Report on {', '.join(map(_name, places))}")
     kind = "Small-signal and time-domain study by co-simulation of FMUs"
     found = "".join(map(sections.findings, runs))
-    return document(title, kind, first_page(chapters) + picture + found + kept_answers(chapters), content)
+    answers = held_data("answers", _answers(chapters))  # for `changes` of a later page
+    return document(title, kind, first_page(chapters) + picture + found + answers, content)
 
 
 def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter, Sections]], list[Results]]:
@@ -79,7 +80,7 @@ def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter,
                 told.append((of_run(part, run.scenarios, kind=run.case.table.models or ""), _of_run(run, figures)))
             for sweep in sweeps_of(part):
                 shown = studies.sweep(sweep, scenarios, figures)
-                told.append((of_sweep(part, sweep), [(studies.sweep_title(sweep), shown)]))
+                told.append((of_sweep(part, sweep), [(f"Trajectories along {studies.axis_of(sweep)}", shown)]))
             for chapter in chapters_of(part):
                 text = sections_of(chapter, len(told) + 1)
                 told.append((chapter, [(chapter.title or chapter.question, text)]))
@@ -227,8 +228,3 @@ def _by_name(answers: Sequence[dict[str, str]], others: Sequence[dict[str, str]]
             place += 1
         found[*key[:2], place] = answer
     return found
-
-
-def kept_answers(chapters: Sequence[Chapter]) -> str:
-    """The answers as data in the page, for `changes` of a later one."""
-    return held_data("answers", _answers(chapters))

@@ -15,10 +15,6 @@ def axis_of(sweep: xr.Dataset) -> str:
     return str([d for d in sweep["frequency"].dims if d not in ("scenario", "trajectory")][-1])
 
 
-def sweep_title(sweep: xr.Dataset) -> str:
-    return f"Trajectories along {axis_of(sweep)}"
-
-
 def sweep(sweep: xr.Dataset, scenarios: Sequence[Mapping[str, Any]], figures: Figures) -> str:
     axis = axis_of(sweep)
     others = [d for d in sweep["frequency"].dims if d not in ("scenario", "trajectory", axis)]
@@ -150,10 +146,6 @@ def _states(shown: xr.Dataset, axis: str, label: str, names: list[str], title: d
         key + "".join(charts), f"Participation of the swing states in the modes with a name along {label}."
     )
     return f"<p>{link}: who carries the mode along the sweep.</p>{picture}"
-
-
-def design_title(sheet: dict[str, Any]) -> str:
-    return f"Design of {sheet['controller']}"
 
 
 def design(sheet: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from orchestrator.errors import InputError
 
@@ -104,7 +104,7 @@ def read_configuration(text: str, place: str) -> Configuration:
     counts = lines.next("the number of channels")
     analog_count, status_count = (_channel_count(lines, counts, letter) for letter in "AD")
     analog = [_analog(lines, k) for k in range(1, analog_count + 1)]
-    status = [_status(lines, k) for k in range(1, status_count + 1)]
+    status = [Channel((*lines.next(f"status channel {k}"), "")[1]) for k in range(1, status_count + 1)]
     frequency = lines.number_of(lines.next("the line's frequency"), 0, "the line's frequency [Hz]", 0.0)
     rates = _rates(lines)
     start, trigger = ("  ".join(lines.next("the time of the first sample and of the trigger")[:2]) for _ in range(2))
@@ -116,7 +116,7 @@ def read_configuration(text: str, place: str) -> Configuration:
         raise lines.error(f"the multiplier of time stamps is {multiplier:g}; it must exceed 0")
     nanoseconds = revision == "2013" and any(re.search(r"\.\d{7,}$", time) for time in (start, trigger))
     names = _distinct([*analog, *status], analog_count)
-    channels = [_renamed(channel, name) for channel, name in zip([*analog, *status], names, strict=True)]
+    channels = [replace(channel, name=name) for channel, name in zip([*analog, *status], names, strict=True)]
     return Configuration(
         place, station, device, revision, tuple(channels[:analog_count]), tuple(channels[analog_count:]), frequency,
         rates, start, trigger, form, multiplier * (1e-9 if nanoseconds else 1e-6),
@@ -149,11 +149,6 @@ def _analog(lines: _Lines, k: int) -> Channel:
     return Channel(fields[1], fields[4], ratio * scale, ratio * offset, 1e-6 * skew, on_secondary)
 
 
-def _status(lines: _Lines, k: int) -> Channel:
-    fields = lines.next(f"status channel {k}")
-    return Channel(fields[1] if len(fields) > 1 else "")
-
-
 def _rates(lines: _Lines) -> tuple[tuple[float, int], ...]:
     count = lines.count_of(lines.next("the number of sampling rates")[0], "the number of sampling rates", 999)
     rates: list[tuple[float, int]] = []
@@ -178,7 +173,3 @@ def _distinct(channels: list[Channel], analog_count: int) -> list[str]:
         alone = channel.name and seen[channel.name] == 1 and channel.name != "time"
         names.append(channel.name if alone else f"{channel.name} ({number})" if channel.name else number)
     return names
-
-
-def _renamed(channel: Channel, name: str) -> Channel:
-    return Channel(name, channel.unit, channel.scale, channel.offset, channel.skew, channel.secondary)
