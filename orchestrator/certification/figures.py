@@ -19,8 +19,8 @@ from orchestrator.certification.judgement import PointVerdict, TimeVerdict
 from orchestrator.certification.point import COMPUTED, CONVERTER
 from orchestrator.certification.request import REACTANCES
 from orchestrator.certification.swings import RecordedSwing, SwingTest
+from orchestrator.fmi.archive import read_origin
 from orchestrator.fmi.description import FmuDescription, VariableInfo
-from orchestrator.fmi.origin import read_origin
 from orchestrator.fmi.port import START, BoundDescription, without_binding
 from orchestrator.fmi.values import Scalar
 from orchestrator.results.mode_json import eigenvalue_json
@@ -117,7 +117,7 @@ def damping_json(c: Certificate, test: DampingTest) -> dict[str, Any]:
         "departures": list(c.request.departures),
         "details": c.details.texts(),
         "fmu": {"file": c.request.fmu.name, "model": c.description.model_name, "guid": c.description.guid}
-        | asdict(read_origin(c.description.path)),
+        | read_origin(c.description.path),
         "binding": c.request.binding.name if c.request.binding else None,
         "values": dict(c.request.values),
         "study_values": dict(c.request.study_values),

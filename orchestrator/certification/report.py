@@ -15,7 +15,7 @@ from orchestrator.certification.figures import commands, parameter_rows
 from orchestrator.certification.point import FREQUENCY
 from orchestrator.certification.report_criteria import damping_chapters, damping_findings, told_of_damping
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
-from orchestrator.fmi.origin import read_origin
+from orchestrator.fmi.archive import read_origin
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.values import Scalar, as_text
 from orchestrator.report.html.elements import Figures, document, listed, table
@@ -39,10 +39,10 @@ def converter(c: Certificate, hashes: Hashes) -> str:
     switched = {} if c.damping is None else c.damping.controllers.settings
     values = {**c.request.values, **switched, **c.request.study_values}
     given = {
-        "FMU": c.request.fmu.name, "Model": c.description.model_name, "Description": origin.description,
-        "Author": origin.author, "Version": origin.version, "Made by": origin.generation_tool,
-        "Made on": origin.generated, "Copyright": origin.copyright, "License": origin.license,
-        "FMI": f"{origin.fmi_version}, co-simulation", "Guid": c.description.guid, "SHA-256": hashes[FMU],
+        "FMU": c.request.fmu.name, "Model": c.description.model_name, "Description": origin["description"],
+        "Author": origin["author"], "Version": origin["version"], "Made by": origin["generation_tool"],
+        "Made on": origin["generated"], "Copyright": origin["copyright"], "License": origin["license"],
+        "FMI": f"{origin['fmi_version']}, co-simulation", "Guid": c.description.guid, "SHA-256": hashes[FMU],
         "Rating": _rating(c), "Voltage": _voltage(c),
         "Binding": c.request.binding.name if c.request.binding else "none: the port is ours",
         "Values set": ", ".join(f"{k} = {as_text(v)}" for k, v in values.items()) or "none",

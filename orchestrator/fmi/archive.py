@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from xml.etree import ElementTree
 from xml.parsers import expat
 
 from fmus.toolchain.removal import remove_tree
@@ -278,3 +279,15 @@ def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path, left:
                 )
             sink.write(chunk)
     return left
+
+
+_ORIGIN = {
+    "author": "author", "version": "version", "description": "description", "generation_tool": "generationTool",
+    "generated": "generationDateAndTime", "copyright": "copyright", "license": "license", "fmi_version": "fmiVersion",
+}  # fmt: skip
+
+
+def read_origin(path: Path) -> dict[str, str]:
+    """Who made an FMU, when and with what; empty where its modelDescription does not say."""
+    root = ElementTree.fromstring(read_model_description_text(path))
+    return {name: root.get(attribute, "").strip() for name, attribute in _ORIGIN.items()}
