@@ -62,8 +62,9 @@ class PodEffect:
         return None if a is None or b is None else damping_percent(a) - damping_percent(b)
 
     @property
-    def disagrees(self) -> bool:
-        return abs(self.apart("response", "on") or 0.0) > AGREED
+    def disagrees(self) -> bool | None:
+        apart = self.apart("response", "on")
+        return None if apart is None else abs(apart) > AGREED
 
     def as_json(self) -> dict[str, Any]:
         shown = {k: eigenvalue_json(x, damping_percent(x)) for k, x in self.modes.items()}

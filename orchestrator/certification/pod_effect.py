@@ -99,10 +99,10 @@ def pod_section(verdicts: Sequence[PointVerdict]) -> str:
     for X_L, pod in ((f"{v.X_L:g}", v.pod) for v in verdicts if v.pod):
         named = {k: f"{x.imag / (2 * np.pi):.3f} Hz, {number(damping_percent(x), 2)} %" for k, x in pod.modes.items()}
         change, better = ("–" if x is None else number(x, 2) for x in (pod.apart("on", "off"), pod.better_off))
-        told = (named.get(k, "–") for k in NAMES)
-        rows.append([X_L, *told, "<b>yes</b>" if pod.disagrees else "no", change, better])
+        said = "–" if pod.disagrees is None else "<b>yes</b>" if pod.disagrees else "no"
+        rows.append([X_L, *(named.get(k, "–") for k in NAMES), said, change, better])
     columns = ["X_L [pu]", "Off", "On", "In SG1's power", "It disagrees", "Raised by [points]", "Off fits better"]
     note = (f"<p>Where it is damped least with them off they have to raise it by {RAISED:g} points; nowhere may the "
             f"modes with them off fit SG1's power more than {TWICE:g} times better. More than {AGREED:g} points "
-            "between the dampings of eigenvalue and power are a finding. A dash: no mode is it.</p>")  # fmt: skip
+            "between the dampings of eigenvalue and power are a finding. A dash: it is not known.</p>")  # fmt: skip
     return table("The electromechanical mode", columns, rows) + note if rows else "<p>None is active.</p>"

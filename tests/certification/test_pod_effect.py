@@ -39,7 +39,7 @@ def test_an_honest_one_is_accepted_and_its_figures_are_told():
     assert figures["off"]["damping_percent"] == pytest.approx(100 * 0.4 / abs(OFF))
     assert figures["response"]["damping_percent"] == pytest.approx(figures["on"]["damping_percent"], abs=0.5)
     assert figures["better_off"] < 0.1
-    assert not figures["disagrees"]
+    assert figures["disagrees"] is False
     assert "11.04 %" in pod_section([v])
 
 
@@ -84,6 +84,8 @@ def test_a_response_that_is_damped_otherwise_is_a_finding():
     (v,) = judged(point(recorded=-0.8 + 4.2j))
     assert v.pod.disagrees
     assert "<b>yes</b>" in pod_section([v])
+    assert "<b>yes</b>" not in pod_section(judged(point()))
+    assert all(word not in pod_section(judged(point(named=False))) for word in ("<b>yes</b>", ">no<"))
 
 
 def test_a_point_that_could_not_be_had_with_it_off_is_computed_anew():
