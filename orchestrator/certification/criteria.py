@@ -22,6 +22,7 @@ LEAST_DAMPING = 0.05  # damping ratio that a judged mode needs
 LEAST_AMPLITUDE = 0.01
 """Components below this fraction of a signal's largest oscillation are ignored: they fit its remainder."""
 
+NAMES = ("off", "on", "response")
 AGREED = 5.0  # more points between the dampings of an eigenvalue and of the recorded response are a finding
 
 
@@ -46,12 +47,12 @@ class ModeVerdict(OfEigenvalue):
 
 @dataclass(frozen=True)
 class PodEffect:
-    """``modes``: the electromechanical mode ``off``, ``on``, and nearest to it in the ``response``; None where unknown.
+    """``modes``: the electromechanical mode ``off``, ``on``, and nearest to it in the ``response``, where known.
 
     ``better_off``: how many times better the modes without the controllers fit the response."""
 
     modes_off: Complex
-    modes: Mapping[str, complex | None]
+    modes: Mapping[str, complex]
     better_off: float | None = None
     unknown: str = ""  # why there is nothing of all that
 
@@ -61,11 +62,13 @@ class PodEffect:
         return None if a is None or b is None else damping_percent(a) - damping_percent(b)
 
     @property
-    def disagrees(self) -> bool:
-        return abs(self.apart("response", "on") or 0.0) > AGREED
+    def disagrees(self) -> bool | None:
+        apart = self.apart("response", "on")
+        return None if apart is None else abs(apart) > AGREED
 
     def as_json(self) -> dict[str, Any]:
-        modes = {k: None if x is None else eigenvalue_json(x, damping_percent(x)) for k, x in self.modes.items()}
+        shown = {k: eigenvalue_json(x, damping_percent(x)) for k, x in self.modes.items()}
+        modes = {k: shown.get(k) for k in NAMES}
         found = {"better_off": self.better_off, "raised": self.apart("on", "off"), "disagrees": self.disagrees}
         return {"modes_off": [[x.real, x.imag] for x in self.modes_off], "modal": {**modes, **found},
                 "unknown": self.unknown}  # fmt: skip

@@ -1,15 +1,17 @@
 """What the active damping controllers change at a point: its modes with them off, and whether the response shows it."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from orchestrator.analysis.identification import identify_modes, nearest
+from orchestrator.analysis.identification import identify_modes
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.arrays import Complex, Numbers
-from orchestrator.certification.criteria import AGREED, PodEffect
+from orchestrator.certification.case_file import WITH
+from orchestrator.certification.criteria import AGREED, NAMES, PodEffect
 from orchestrator.certification.damping_controllers import DampingControllers, variable
 from orchestrator.certification.judgement import PointVerdict
 from orchestrator.certification.point import CONVERTER, POWER, PointResult
@@ -38,36 +40,33 @@ def kept_off(stated: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def with_pod(
-    verdicts: Sequence[PointVerdict], points: Mapping[float, PointResult], controllers: DampingControllers,
-    event: float,
-) -> list[PointVerdict]:  # fmt: skip
-    """The verdicts with what the active controllers change; ``points`` are those with the converter.
+    verdicts: Sequence[PointVerdict], points: Mapping[Any, PointResult], controllers: DampingControllers, event: float
+) -> list[PointVerdict]:
+    """The verdicts with what the active controllers change.
 
     They have to damp where the mode needs it most, and in the response as at the eigenvalues."""
-    name = " and ".join(f"POD-{letter.upper()}" for letter in controllers.pod.removeprefix("none"))
+    if not (name := " and ".join(f"POD-{letter.upper()}" for letter in controllers.pod.removeprefix("none"))):
+        return list(verdicts)
     why = "" if controllers.can_be_off else "no switch turns it off; name the FMU's under [signals] of a binding"
-    judged = [replace(v, pod=_effect(points[v.X_L], event, why)) for v in verdicts] if name else list(verdicts)
-    known = [(damping_percent(x), v) for v in judged if v.pod and (x := v.pod.modes["off"]) is not None]
-    least, worst = min(known, key=lambda entry: entry[0], default=(0.0, None))
-    for k, v in enumerate(judged):
-        if (pod := v.pod) is None:
-            continue
+    effects = [_effect(points[WITH, v.X_L], event, why) for v in verdicts]
+    known = [damping_percent(pod.modes["off"]) if "off" in pod.modes else np.inf for pod in effects]
+    judged = []
+    for v, pod, least in zip(verdicts, effects, known, strict=True):
         said = []
         if (pod.better_off or 0.0) > TWICE:
-            said += [f"{name} acts otherwise in the response than at the eigenvalues: the modes without it fit {POWER} "
-                     f"{pod.better_off:.3g} times better"]  # fmt: skip
-        if v is worst and (by := pod.apart("on", "off") or 0.0) < RAISED:
-            said += [
-                f"{name} does not damp the electromechanical mode: {least:.2f} % without, {by:+.2f} points with it"
-            ]
+            said = [f"{name} acts otherwise in the response than at the eigenvalues: the modes without it fit {POWER} "
+                    f"{pod.better_off:.3g} times better"]  # fmt: skip
+        if least == min(known) < np.inf and (by := pod.apart("on", "off") or 0.0) < RAISED:
+            told = f"{least:.2f} % without, {by:+.2f} points with it"
+            said.append(f"{name} does not damp the electromechanical mode: {told}")
         faults = tuple(dict.fromkeys((*v.faults, *said)))
         unknown = v.unknown or (f"what {name} changes is not known: {pod.unknown}" if pod.unknown else "")
-        judged[k] = replace(v, faults=faults, unknown="" if faults else unknown)
+        judged.append(replace(v, faults=faults, unknown="" if faults else unknown, pod=pod))
     return judged
 
 
 def _effect(point: PointResult, event: float, why: str) -> PodEffect:
-    modes: dict[str, complex | None] = {"off": None, "on": None, "response": None}
+    modes: dict[str, complex] = {}
     if point.off is None or point.modes is None:
         why = point.off_failure or why or str(point.failure or "it has no modes")
         return PodEffect(np.empty(0, complex), modes, None, why)
@@ -79,12 +78,10 @@ def _effect(point: PointResult, event: float, why: str) -> PodEffect:
     if point.failure or signal is None or not np.isfinite(signal).all() or window.sum() < 99:
         return PodEffect(point.off, modes)
     t, y = point.times[window], slow_part(point.times, signal.astype(np.float32).astype(float))[window]  # as it is kept
-    if modes["on"] is not None:
-        try:
-            found = nearest([m for m in identify_modes(t, y) if m.eigenvalue.imag > 0], modes["on"])
-            modes["response"] = None if found is None else complex(found.eigenvalue)
-        except AnalysisError:
-            pass  # it does not swing
+    with suppress(AnalysisError):  # it does not swing
+        found = [m.eigenvalue for m in identify_modes(t, y) if m.eigenvalue.imag > 0] if modes else []
+        if found:
+            modes["response"] = complex(min(found, key=lambda x: abs(x - modes["on"])))
     with_it, without = (_misfit(t[::_EVERY] - t[0], y[::_EVERY], x) for x in (point.modes.eigenvalues, point.off))
     return PodEffect(point.off, modes, with_it / without if without > 0 else None)
 
@@ -100,11 +97,12 @@ def _misfit(t: Numbers, y: Numbers, eigenvalues: Complex) -> float:
 def pod_section(verdicts: Sequence[PointVerdict]) -> str:
     rows = []
     for X_L, pod in ((f"{v.X_L:g}", v.pod) for v in verdicts if v.pod):
-        named = [x and f"{x.imag / (2 * np.pi):.3f} Hz, {number(damping_percent(x), 2)} %" for x in pod.modes.values()]
+        named = {k: f"{x.imag / (2 * np.pi):.3f} Hz, {number(damping_percent(x), 2)} %" for k, x in pod.modes.items()}
         change, better = ("–" if x is None else number(x, 2) for x in (pod.apart("on", "off"), pod.better_off))
-        rows.append([X_L, *(text or "–" for text in named), "<b>yes</b>" if pod.disagrees else "no", change, better])
+        said = "–" if pod.disagrees is None else "<b>yes</b>" if pod.disagrees else "no"
+        rows.append([X_L, *(named.get(k, "–") for k in NAMES), said, change, better])
     columns = ["X_L [pu]", "Off", "On", "In SG1's power", "It disagrees", "Raised by [points]", "Off fits better"]
     note = (f"<p>Where it is damped least with them off they have to raise it by {RAISED:g} points; nowhere may the "
             f"modes with them off fit SG1's power more than {TWICE:g} times better. More than {AGREED:g} points "
-            "between the dampings of eigenvalue and power are a finding. A dash: no mode is it.</p>")  # fmt: skip
+            "between the dampings of eigenvalue and power are a finding. A dash: it is not known.</p>")  # fmt: skip
     return table("The electromechanical mode", columns, rows) + note if rows else "<p>None is active.</p>"

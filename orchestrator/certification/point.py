@@ -7,10 +7,9 @@ import numpy as np
 
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.analysis.device_start import misfits_of
-from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.analysis.modes import find_spectrum
-from orchestrator.analysis.stability import Stability, judge
+from orchestrator.analysis.stability import judge
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.black_box.coupled_modes import is_black_box, linearize_with_box
 from orchestrator.cases.case import Case
@@ -19,7 +18,6 @@ from orchestrator.cases.schema import Value
 from orchestrator.certification.frequency import bus_frequency
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
-from orchestrator.errors import CosimError
 from orchestrator.points.failure import Failure, failure_kept
 from orchestrator.points.task import Kept, Task, computed
 from orchestrator.study.modes import modes_of, running
@@ -43,29 +41,28 @@ class PointResult(Kept):
     growth: float = float("nan")  # largest real part of any eigenvalue [1/s], zeros left out
     stability: dict[str, Any] | None = None  # the verdict over the whole spectrum, as `Stability.as_json` has it
     residual: float = float("nan")
-    # order of the identified model that replaces the converter in the modes; None if the converter's own states are
-    # used.
-    identified: int | None = None
-    # how the linear model of every component was found: perturbed, directional, packed or identified.
+    identified: int | None = None  # order of the model in the converter's place; None where its own states are used
+    # by component: perturbed, directional, packed or identified; and how far a fit is from what was measured, relative
     linearised: dict[str, str] = field(default_factory=dict)
-    # largest relative difference between the fitted model and the measured response, for each identified component.
     fit_errors: dict[str, float] = field(default_factory=dict)
-    # active power of the converter at the start, from its current [MW]; None without the converter.
-    power: float | None = None
+    power: float | None = None  # of the converter at the start, from its current [MW]; None without the converter
     times: Numbers = field(default_factory=lambda: np.empty(0))
     signals: dict[str, Numbers] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
-    # findings of the watch on the run, in the form of `Finding.as_json`.
-    findings: list[dict[str, Any]] = field(default_factory=list)
-    # eigenvalues with the damping controllers off [rad/s], and the electromechanical mode's off and on, nan where no
-    # shape tells it; None where they are not switched off, or `off_failure` says why it could not be had.
+    findings: list[dict[str, Any]] = field(default_factory=list)  # of the watch on the run, as `Finding.as_json`
+    # eigenvalues with the damping controllers off [rad/s], None where none are or `off_failure` says why; and the
+    # electromechanical mode's off and on, nan where no shape tells it
     off: Complex | None = None
     swings: Complex = field(default_factory=lambda: np.full(2, np.nan + 0j))
     off_failure: str = ""
     failure: Failure | None = None  # why there are no modes, or why the response is incomplete
 
     keeps_failures = False
+
+    @property
+    def lasting(self) -> bool:
+        return super().lasting and not self.off_failure
 
 
 @dataclass(frozen=True)
@@ -86,34 +83,29 @@ def compute_point(task: CertificatePointTask) -> PointResult:
 def _result(task: CertificatePointTask, case: Case) -> PointResult:
     result = PointResult(task.X_L, task.scenario)
     with failure_kept(result):
-        _compute(case, task, result)
+        prepared = task.study.prepare(case, {"grid.X_L": task.X_L})
+        watch = Watch(prepared)
+        with running(prepared) as master:
+            misfits = misfits_of(master)
+            _linearised(prepared, master, result, black_box=task.black_box)
+            f_n = prepared.system.components["sg1"].number("f_n")
+            try:
+                master.run(prepared.stop_time, prepared.events, watch.observers)
+            finally:
+                _keep_signals(result, watch.recorder, master, f_n)
+        result.findings = [finding.as_json() for finding in watch.findings(misfits=misfits)]
+        if task.off:
+            _switch_off(case, task, result)
     return result
-
-
-def _compute(case: Case, task: CertificatePointTask, result: PointResult) -> None:
-    prepared = task.study.prepare(case, {"grid.X_L": task.X_L})
-    watch = Watch(prepared)
-    with running(prepared) as master:
-        misfits = misfits_of(master)
-        _linearised(prepared, master, result, black_box=task.black_box)
-        f_n = prepared.system.components["sg1"].number("f_n")
-        try:
-            master.run(prepared.stop_time, prepared.events, watch.observers)
-        finally:
-            _keep_signals(result, watch.recorder, master, f_n)
-    result.findings = [finding.as_json() for finding in watch.findings(misfits=misfits)]
-    if task.off:
-        _switch_off(case, task, result)
 
 
 def _switch_off(case: Case, task: CertificatePointTask, result: PointResult) -> None:
     other = PointResult(task.X_L, task.scenario)
-    try:
+    with failure_kept(other):
         prepared = task.study.prepare(case, {"grid.X_L": task.X_L, **dict(task.off)})
         with running(prepared) as master:
             _linearised(prepared, master, other, black_box=task.black_box)
-    except CosimError as error:
-        result.off_failure = str(error)
+    result.off_failure = other.error or ""
     if other.modes is not None:
         result.off, result.swings[0] = other.modes.eigenvalues, other.swings[1]
 
@@ -124,18 +116,12 @@ def _linearised(prepared: PreparedScenario, master: Master, result: PointResult,
         boxed = linearize_with_box(master, CONVERTER)
         result.residual, result.identified = boxed.residual, len(boxed.identified.A)
         result.fit_errors, result.warnings = {CONVERTER: boxed.identified.error}, boxed.warnings
-        _keep_modes(prepared, result, boxed.model, None)
+        model, stability = boxed.model, judge(boxed.model, find_spectrum(boxed.model, *COMPUTED))
     else:
         found = modes_of(prepared, master, COMPUTED)
         result.residual, result.warnings = found.operating_point.residual, found.warnings
-        _keep_modes(prepared, result, found.model, found.stability)
-
-
-def _keep_modes(
-    prepared: PreparedScenario, result: PointResult, model: LinearModel, stability: Stability | None
-) -> None:
-    spectrum = find_spectrum(model, *COMPUTED)
-    modes = [mode for mode in spectrum.modes if mode.is_oscillation]
+        model, stability = found.model, found.stability
+    modes = [mode for mode in find_spectrum(model, *COMPUTED).modes if mode.is_oscillation]
     for mode in named_modes(prepared.case, model, modes).named.values():
         result.swings[1] = mode.eigenvalue
     result.modes = ModeSet.of(modes, model.names)
@@ -144,9 +130,7 @@ def _keep_modes(
         ", ".join(f"{name} {100 * share:.0f} %" for name, share in mode.by_component.items() if share >= 0.01)
         for mode in modes
     ]
-    verdict = stability or judge(model, spectrum)
-    result.stability = verdict.as_json()
-    growth = verdict.largest_growth_rate
+    result.stability, growth = stability.as_json(), stability.largest_growth_rate
     result.growth = float("nan") if growth is None else growth
 
 

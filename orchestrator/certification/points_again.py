@@ -50,8 +50,7 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
         points |= {(result.scenario, result.X_L): result for result in (having, lacking)}
         verdicts.append(_verdict(point, having, lacking, controllers.pod, event))
     if any("pod" in point for point in content["points"]):  # until 0.3 they were not switched off
-        verdicts = with_pod(verdicts, {X: result for (name, X), result in points.items() if name == WITH},
-                            controllers, event)  # fmt: skip
+        verdicts = with_pod(verdicts, points, controllers, event)
     return Certificate(request, description, NTS, NTS.f_n, verdicts, points, folder / CASE,
                        damping=DampingTest(controllers, event))  # fmt: skip
 
@@ -172,11 +171,8 @@ def tasks(folder: Path, content: Content, reactances: Sequence[float], _: Verifi
 
 
 def compare(content: Content, task: CertificatePointTask, again: PointResult, data: xr.Dataset) -> Compared:
-    point, scenario, signal = (
-        next(p for p in content["points"] if p["X_L"] == task.X_L),
-        task.scenario,
-        content["signal"],
-    )
+    point = next(p for p in content["points"] if p["X_L"] == task.X_L)
+    scenario, signal = task.scenario, content["signal"]
     where = f"X_L = {task.X_L:g} pu, {scenario} the converter"
     if again.failure or again.modes is None:
         yield f"{where}: it cannot be computed again: {again.failure or 'there are no modes'}", ""

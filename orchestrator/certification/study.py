@@ -1,6 +1,6 @@
 """The norm's study of one converter: a case file of its own, all points, and the verdict on each."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from orchestrator.binding.binding import bound_fmu
@@ -47,7 +47,7 @@ def certify(
     points = {(task.scenario, task.X_L): point for task, point in zip(tasks, found, strict=True)}
     event, having = prepared[WITH].events[0].time, prepared[WITH]
     verdicts = [judge(points[WITH, X], points[WITHOUT, X], controllers.pod, event) for X in request.reactances]
-    verdicts = with_pod(verdicts, {X: points[WITH, X] for X in request.reactances}, controllers, event)
+    verdicts = with_pod(verdicts, points, controllers, event)
     description = having.system.components[CONVERTER].description
     return Certificate(
         request, description, NTS, NTS.f_n, verdicts, points, having.case.path, values=having.values,
@@ -58,23 +58,12 @@ def certify(
 def tasks_of(
     prepared: Mapping[str, PreparedScenario], request: CertificationRequest, controllers: DampingControllers
 ) -> list[CertificatePointTask]:
-    """Both scenarios at all reactances, the one without the converter first."""
     own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **controllers.settings}.items()}
     settings: dict[str, dict[str, Value]] = {WITHOUT: dict(request.study_values), WITH: {**request.study_values, **own}}
-    without = _tasks(prepared[WITHOUT], settings[WITHOUT], request.reactances, black_box=False)
-    off = off_values(controllers.pod) if controllers.can_be_off else ()
-    having = _tasks(prepared[WITH], settings[WITH], request.reactances, black_box=request.black_box, off=off)
-    return [task for pair in zip(without, having, strict=True) for task in pair]
-
-
-def _tasks(
-    prepared: PreparedScenario,
-    values: dict[str, Value],
-    reactances: Sequence[float],
-    *,
-    black_box: bool,
-    off: tuple[tuple[str, Value], ...] = (),
-) -> list[CertificatePointTask]:
     # The case file names the binding, if there is one. The binding's effect is part of the scenario's content.
-    study = StudyCase.of(prepared, text=BASE.read_text(encoding="utf-8"), overrides=sorted(values.items()))
-    return [CertificatePointTask(study, X_L, black_box, off) for X_L in reactances]
+    text = BASE.read_text(encoding="utf-8")
+    study = {k: StudyCase.of(prepared[k], text=text, overrides=sorted(v.items())) for k, v in settings.items()}
+    off = off_values(controllers.pod) if controllers.can_be_off else ()
+    return [task for X_L in request.reactances for task in (
+        CertificatePointTask(study[WITHOUT], X_L), CertificatePointTask(study[WITH], X_L, request.black_box, off)
+    )]  # fmt: skip

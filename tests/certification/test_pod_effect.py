@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.analysis.mode_tracking import ModeSet
+from orchestrator.certification.case_file import WITH
 from orchestrator.certification.damping_controllers import DampingControllers
 from orchestrator.certification.judgement import PointVerdict
 from orchestrator.certification.pod_effect import kept_off, pod_section, with_pod
@@ -28,7 +29,7 @@ def point(on=ON, off=OFF, recorded=ON, named=True, X_L=0.1):
 
 def judged(*points, controllers=CONTROLLERS):
     before = [PointVerdict(p.X_L, (), None, None, ()) for p in points]
-    return with_pod(before, {p.X_L: p for p in points}, controllers, 1.0)
+    return with_pod(before, {(WITH, p.X_L): p for p in points}, controllers, 1.0)
 
 
 def test_an_honest_one_is_accepted_and_its_figures_are_told():
@@ -38,7 +39,7 @@ def test_an_honest_one_is_accepted_and_its_figures_are_told():
     assert figures["off"]["damping_percent"] == pytest.approx(100 * 0.4 / abs(OFF))
     assert figures["response"]["damping_percent"] == pytest.approx(figures["on"]["damping_percent"], abs=0.5)
     assert figures["better_off"] < 0.1
-    assert not figures["disagrees"]
+    assert figures["disagrees"] is False
     assert "11.04 %" in pod_section([v])
 
 
@@ -83,3 +84,11 @@ def test_a_response_that_is_damped_otherwise_is_a_finding():
     (v,) = judged(point(recorded=-0.8 + 4.2j))
     assert v.pod.disagrees
     assert "<b>yes</b>" in pod_section([v])
+    assert "<b>yes</b>" not in pod_section(judged(point()))
+    assert all(word not in pod_section(judged(point(named=False))) for word in ("<b>yes</b>", ">no<"))
+
+
+def test_a_point_that_could_not_be_had_with_it_off_is_computed_anew():
+    """What was in the way, such as a missing licence, may be gone."""
+    assert point().lasting
+    assert not replace(point(), off=None, off_failure="no licence").lasting

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from orchestrator.certification import anew
+from orchestrator.certification.codes import rows_again
 from orchestrator.certification.codes.all_codes import ERCOT
 from orchestrator.certification.codes.certificate import certify_code
 from orchestrator.certification.request import CertificationRequest
@@ -64,5 +64,6 @@ def test_a_row_is_compared_with_its_own_entry():
     again = SimpleNamespace(failure="", findings=[{"kind": "growth"}])
     row = SimpleNamespace(name="a")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(anew, "UNSTABLE", frozenset({"growth"}))
-        assert anew._fault_of_row(content, row, again, None, 1.0) == "the watch finds growth, and nothing was certified"
+        patch.setattr(rows_again, "UNSTABLE", frozenset({"growth"}))
+        told = rows_again._fault_of_row(content, row, again, None, 1.0)
+        assert told == "the watch finds growth, and nothing was certified"
