@@ -138,12 +138,19 @@ def _command(name: str, words: str) -> str:
 
 def studies() -> str:
     """What is made from the requests of studies; mkdocstrings reads files, and sees none."""
-    from orchestrator.added import rooms  # noqa: PLC0415 - only the page of Python needs the package
+    from orchestrator.added import rooms, study_in  # noqa: PLC0415 - only the page of Python needs the package
     from orchestrator.api.case import Case  # noqa: PLC0415 - as above
     from orchestrator.api.certification import certify  # noqa: PLC0415 - as above
     from orchestrator.api.scenario import Scenario  # noqa: PLC0415 - as above
+    from orchestrator.api.studies import of_study  # noqa: PLC0415 - as above
 
-    of_case = [(f"Case.{name}", getattr(Case, name)) for name in sorted({*rooms(), "design_over_points"})]
+    of_case = [
+        (
+            f"Case.{name}",
+            getattr(Case, name, None) or of_study(name, study_in(rooms()[name])),
+        )  # an added study has none
+        for name in sorted({*rooms(), "design_over_points"})
+    ]
     of_scenario = [(f"Scenario.{name}", getattr(Scenario, name)) for name in ("modes", "run", "sensitivities", "steps")]
     return "\n\n".join(_method(name, function) for name, function in (*of_case, *of_scenario, ("certify", certify)))
 

@@ -153,4 +153,6 @@ class GridCode(Generic[AnyRow]):
         texts: dict[str, Any] = {
             name: tuple(text) if isinstance(text, list) else text for name, text in _WORDS[key].items()
         }
+        if len({row.name for row in rows}) < len(rows):
+            raise ValueError(f"code {key!r}: two rows have one name, and one response would be judged as both")
         return cls(key, rows=rows, declared=dict(declared), **texts)
