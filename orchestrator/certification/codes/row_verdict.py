@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.criteria import CURRENT, carries
+from orchestrator.certification.codes.criteria import CURRENT, carries, holds_together
 from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.row import CodeRow, RowFinding
 from orchestrator.certification.margins import CriterionMargin
@@ -80,6 +80,8 @@ def judge_row(
             found = [
                 replace(f, accepted=None, margin=None, text=f"{f.text}; {why}") if f.accepted else f for f in found
             ]
+            if all(f.accepted is None for f in found):  # no criterion of the row asks for it
+                found.append(holds_together()(measured))
     if row.shown_only:
         return RowVerdict(row, tuple(replace(finding, accepted=None) for finding in found))
     return RowVerdict(row, tuple(found))

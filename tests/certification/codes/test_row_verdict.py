@@ -1,5 +1,7 @@
 """What is said of rows in which a converter does not hold together, or on which the code gives no verdict."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -208,3 +210,14 @@ def test_a_certificate_without_that_criterion_holds_where_it_is_met():
         signals = {"p": opposing(), "q": over_rating(lasts), "v": np.ones(TIMES.shape)}
         found = judge_row(row, BenchResult(row.name, TIMES, signals), 50.0, stated).findings
         assert [f.criterion for f in found[len(row.criteria) :]] == added
+
+
+def test_a_row_that_does_not_ask_whether_it_holds_together_says_why_it_fails():
+    row = next(row for row in CODES["aemo"].rows if row.name == "jump_30")
+    bare = replace(
+        row, criteria=tuple(c for c in row.criteria if not getattr(c, "__qualname__", "").startswith("holds_together"))
+    )
+    result = BenchResult("jump_30", TIMES, {"p": opposing(), "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)},
+                         [{"kind": "loss_of_synchronism", "time": 1.3, "message": "found"}])  # fmt: skip
+    assert len(bare.criteria) < len(row.criteria)
+    assert [f.text for f in judge_row(bare, result, 50.0).failed] == ["found"]
