@@ -18,6 +18,7 @@ from orchestrator.api.case import Case, load
 from orchestrator.api.results import Modes
 from orchestrator.api.scenario import Scenario
 from orchestrator.arrays import Complex
+from orchestrator.cases.idle_values import why_idle
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.schema import Value
 from orchestrator.cases.service import in_service
@@ -129,11 +130,7 @@ class Desk:
             "parameters": lambda: _parameters(case, scenario(values)),
             "modes": lambda: self._modes(case, scenario(values), values, (low, high), question),
             "slopes": lambda: slopes(
-                scenario,
-                values,
-                str(question["parameter"]),
-                (low, high),
-                lambda text: say({"progress": text}),
+                scenario, values, str(question["parameter"]), (low, high), lambda text: say({"progress": text}),
                 self._computed,
             ),
             "response": lambda: linear(scenario(values), signals),
@@ -188,13 +185,14 @@ class Desk:
         question: Mapping[str, Any],
     ) -> dict[str, Any]:  # fmt: skip
         """The JSON of ``gfor modes``, the verdict in its words, and what reproduces it."""
-        modes = self._computed(scenario, frequencies)
-        hidden = modes.result.hidden
+        modes, system = self._computed(scenario, frequencies), scenario.prepared.system
+        hidden, parts = modes.result.hidden, {key: key.partition(".") for key in values}
         return {
             "modes": modes.as_json(),
             "title": scenario.title,
             "verdict": modes.stability.sentence(),
             "outside": None if hidden is None else hidden.sentence(remedy=False),
+            "idle": {key: why_idle(system, one, name) for key, (one, _, name) in parts.items() if one in system.components},
             "swings": [modes.result.swing_of(mode) for mode in modes],
             "copied": copied(
                 case.file, self._word, scenario.name, values, frequencies, question.get("events"),
