@@ -172,12 +172,12 @@ function finder({ now, bounds, valuesAt, apply, words }) {
     crossings.sort((a, b) => far(a) - far(b));
     const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}: ${bad.verdict.replace(/^UNSTABLE: /, "")}`
       : `${fixed(good.damping, 2)} % at ${words} ${number(good.x, 6)}; ${bad.x > good.x ? "above" : "below"} it is less than ${number(percent)} %${bad.f < -percent ? " (unstable)" : ""}`);
+    if (percent !== null) await apply(crossings[0].good.x);
     said.replaceChildren(...crossings.flatMap((one, k) => {
       const button = make("button", {}, "set");
       button.addEventListener("click", () => apply(one.good.x));
       return [k ? "also " : "", text(one), " ", button, make("br")];
     }), tail.slice(2));
-    if (percent !== null) await apply(crossings[0].good.x);
   };
   begin.addEventListener("click", () => search(Number(wanted.value.trim().replace(",", ".") || NaN)));
   until.addEventListener("click", () => search(null));
