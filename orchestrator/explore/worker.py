@@ -18,6 +18,7 @@ from orchestrator.api.case import Case, load
 from orchestrator.api.results import Modes
 from orchestrator.api.scenario import Scenario
 from orchestrator.arrays import Complex
+from orchestrator.cases.idle_values import why_idle
 from orchestrator.cases.layers import OptionValues
 from orchestrator.cases.schema import Value
 from orchestrator.cases.service import in_service
@@ -42,7 +43,7 @@ _WIDER = 1.5  # the range in which changed modes are looked for, beyond that whi
 
 def slopes(
     scenario_with: Callable[[Mapping[str, Value]], Scenario], values: Mapping[str, Value], parameter: str,
-    frequencies: tuple[float, float], say: Callable[[str], None],
+    frequencies: tuple[float, float], say: Callable[[dict[str, Any]], None],
     computed: Callable[[Scenario, tuple[float, float]], Modes] = Scenario.modes,
 ) -> dict[str, Any]:  # fmt: skip
     """``value``, ``eigenvalues`` there, and ``slopes``, each a list of [real, imag]; None where no slope is known.
@@ -59,10 +60,10 @@ def slopes(
     change = _CHANGE * (abs(value) or 1.0)
     least, most = (-np.inf if info.minimum is None else info.minimum, np.inf if info.maximum is None else info.maximum)
     ends = [min(max(end, least), most) for end in (value - change, value + change)]
-    say("modes at the value itself")
+    say({"progress": "modes at the value itself"})
     base = eigenvalues(computed(here, frequencies))
     wider = (frequencies[0] / _WIDER, frequencies[1] * _WIDER)
-    say(f"modes at both sides of {parameter} = {value:.5g}")
+    say({"progress": f"modes at both sides of {parameter} = {value:.5g}"})
     beside = (scenario_with({**values, parameter: end}) for end in ends)
     moved = [matched(base, eigenvalues(computed(one, wider))) for one in beside]
     width = ends[1] - ends[0]
@@ -128,14 +129,7 @@ class Desk:
         answers: dict[str, Callable[[], dict[str, Any]]] = {
             "parameters": lambda: _parameters(case, scenario(values)),
             "modes": lambda: self._modes(case, scenario(values), values, (low, high), question),
-            "slopes": lambda: slopes(
-                scenario,
-                values,
-                str(question["parameter"]),
-                (low, high),
-                lambda text: say({"progress": text}),
-                self._computed,
-            ),
+            "slopes": lambda: slopes(scenario, values, str(question["parameter"]), (low, high), say, self._computed),
             "response": lambda: linear(scenario(values), signals),
             "recorded": lambda: recorded(
                 self._recorded.get(name, self._recorded.get("", "")), scenario(values), signals
@@ -188,13 +182,14 @@ class Desk:
         question: Mapping[str, Any],
     ) -> dict[str, Any]:  # fmt: skip
         """The JSON of ``gfor modes``, the verdict in its words, and what reproduces it."""
-        modes = self._computed(scenario, frequencies)
-        hidden = modes.result.hidden
+        modes, system = self._computed(scenario, frequencies), scenario.prepared.system
+        hidden, parts = modes.result.hidden, [(key, *key.partition(".")) for key in values]
         return {
             "modes": modes.as_json(),
             "title": scenario.title,
             "verdict": modes.stability.sentence(),
             "outside": None if hidden is None else hidden.sentence(remedy=False),
+            "idle": {key: why_idle(system, one, name) for key, one, _, name in parts if one in system.components},
             "swings": [modes.result.swing_of(mode) for mode in modes],
             "copied": copied(
                 case.file, self._word, scenario.name, values, frequencies, question.get("events"),

@@ -9,7 +9,7 @@ const SVG = "http://www.w3.org/2000/svg";
 const state = { scenario: "", values: {}, range: [0.1, 2], controls: [], mode: null, pin: null, tab: "map", signals: "", events: null, places: {} };
 const theCase = () => ({ scenario: state.scenario, values: state.values, events: state.events, places: state.places, step: seen.beginning?.step ?? null });
 // What was answered to it.
-const seen = { titles: {}, answer: null, modes: [], info: null, pinned: null, estimate: null, slopes: {}, trails: [], curves: {}, pinnedCurves: {}, stamp: null, timing: {} };
+const seen = { titles: {}, answer: null, modes: [], info: null, pinned: null, estimate: null, slopes: {}, trails: [], curves: {}, pinnedCurves: {}, stamp: null, timing: {}, finders: {}, cancels: 0 };
 
 const $ = id => document.getElementById(id);
 const same = (a, b) => JSON.stringify(a) === JSON.stringify(b);

@@ -24,6 +24,10 @@ function fitMap() {
   const wide = high - low;
   Object.assign(view, { x0: low - 0.12 * wide, x1: high + 0.12 * wide, y0: 0, y1: 1.15 * Math.max(0.3, ...shown.map(m => m.frequency_hz)) });
 }
+function inView(m) {
+  const wide = 0.04 * (view.x1 - view.x0);
+  return m && m.real > view.x0 + wide && m.real < view.x1 - wide && m.frequency_hz >= view.y0 && m.frequency_hz < view.y1 - 0.04 * (view.y1 - view.y0);
+}
 function ticks(low, high, count) {
   const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map(k => k * power).find(x => x >= rough);

@@ -163,11 +163,11 @@ function paintElement() {
       const now = (state.values[line.length] ?? original(line.length)) / original(line.length);
       const scaled = factor => Object.fromEntries([line.length, line.resistance, line.charging].filter(n => n && parameterOf(n) && original(n)).map(n => [n, factor === 1 ? null : original(n) * factor]));
       parts.push(times("Length, times the case's", now, 0.2, 5, factor => setOnes(scaled(factor), error)));
-      if (!SAVED) parts.push(finder(now, 0.2, 5, scaled, async (factor, text) => {
-        await setOnes(scaled(factor), error);
-        paintElement();
-        $("element").querySelector("[role=status]").textContent = text;
-      }, "length ×"));
+      const per = original(line.length), { minimum, maximum } = parameterOf(line.length);
+      if (!SAVED) parts.push(finderOf(`${state.scenario} line ${line.name}`, {
+        now: () => (state.values[line.length] ?? original(line.length)) / original(line.length), bounds: () => [minimum === null ? -Infinity : minimum / per, maximum === null ? Infinity : maximum / per],
+        valuesAt: scaled, apply: factor => setOnes(scaled(factor), $("element").querySelector("[role=alert]")), words: "length ×",
+      }));
     }
     parts.push(happens("It opens", 0, "", 0, () => ({ type: "line_trip", line: element.name })));
   } else if (element.kind === "load") {
@@ -184,11 +184,15 @@ function paintElement() {
   place.replaceChildren(...parts, added, error);
 }
 async function setOnes(values, error) {
+  const before = [...state.controls];
   for (const [name, value] of Object.entries(values)) if (value === null) delete state.values[name]; else { state.values[name] = value; if (!state.controls.includes(name)) state.controls.push(name); }
   keepState();
   paintControls();
   await compute(error);
-  if (error.textContent) paintElementAgain(error.textContent);
+  if (!error.textContent) return;
+  state.controls = before;
+  keepState(); paintControls();
+  paintElementAgain(error.textContent);
 }
 function paintElementAgain(text) { paintElement(); $("element").querySelector("[role=alert]").textContent = text; }
 

@@ -9,10 +9,13 @@ async function compute(place = null) {
   document.querySelectorAll(".control .error").forEach(one => { one.textContent = ""; });
   const found = await ask("modes", asked, place);
   if (found === undefined) return false;
-  if (found === null) {  // the figures, the address and the copies stay those of the values before
+  if (found === null) {  // figures, controls, the address and the copies stay those of the values before
+    const name = place?.closest(".control")?.dataset.name, why = place?.textContent;
     if (seen.computed) { Object.assign(state, copyOf(seen.computed)); $("scenario").value = state.scenario; keepState(); }
     seen.estimate = null;
-    if (seen.answer) { paintVerdict(); paintMap(); paintTable(); }
+    if (seen.answer) { paintVerdict(); paintMap(); paintTable(); paintControls(); }
+    const error = name && document.querySelector(`.control[data-name="${CSS.escape(name)}"] .error`);
+    if (error) error.textContent = why; else if (place && why) failed(`not computed; what is shown is the state before: ${reasonOf(why)}`);
     return false;
   }
   seen.computed = { scenario: asked.scenario, values: asked.values, events: asked.events, range: asked.range };
@@ -24,7 +27,7 @@ async function compute(place = null) {
   });
   const first = !seen.answer || seen.trailOf !== state.scenario || !same(seen.fittedRange, state.range);
   Object.assign(seen, { answer: found, modes: after, trails, trailOf: state.scenario, fittedRange: state.range, estimate: null });
-  if (first) fitMap();
+  if (first || (inView(leastOf(before)) && !inView(leastOf(after)))) fitMap();
   paintVerdict();
   paintMap(); paintTable(); paintChosen(); paintNetwork();
   if (state.tab === "network") paintElement();
@@ -33,12 +36,13 @@ async function compute(place = null) {
   if (seen.infoOf !== state.scenario) await loadInfo();
   return true;
 }
+const leastOf = modes => [...modes].sort((a, b) => a.damping_percent - b.damping_percent)[0];
 function paintVerdict() {
   const one = seen.answer.modes.scenarios[0];
   $("verdict").className = one.stable === true ? "good" : one.stable === false ? "bad" : "";
-  const least = [...seen.modes].sort((a, b) => a.damping_percent - b.damping_percent)[0], [low, high] = state.range;
+  const least = leastOf(seen.modes), [low, high] = state.range;
   const swing = least ? `least damped from ${number(low)} to ${number(high)} Hz: ${fixed(least.frequency_hz, 3)} Hz, ${fixed(least.damping_percent, 2)} % (${Object.keys(least.components).slice(0, 2).join(", ")})` : `no oscillation from ${number(low)} to ${number(high)} Hz`;
-  $("verdict").textContent = `${seen.answer.title}: ${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"}; ${swing}`;
+  $("verdict").textContent = `${seen.answer.title}: ${one.stable === true ? "stable" : one.stable === false ? "UNSTABLE" : "not known"} (small-signal); ${swing}`;
   $("outside").querySelector("span").textContent = [`${seen.answer.verdict}.`, seen.answer.outside && `${seen.answer.outside}.`, ...one.warnings.map(text => `Warning: ${text}`)].filter(Boolean).join(" ");
   $("wider").hidden = Boolean(SAVED) || !seen.answer.outside || state.range[1] >= 1000;
 }
@@ -133,7 +137,7 @@ async function begin() {
   $("pin").addEventListener("click", pin);
   $("copy").addEventListener("click", showCopies);
   $("dialog").querySelector("p button").addEventListener("click", () => $("dialog").close());
-  $("cancel").addEventListener("click", () => { ask("cancel", { ask: "cancel" }); atWork.clear(); working("cancel", false); });
+  $("cancel").addEventListener("click", () => { seen.cancels += 1; ask("cancel", { ask: "cancel" }); atWork.clear(); working("cancel", false); });
   const picture = () => (state.tab === "network" ? $("network") : state.tab === "response" ? $("plots").querySelector("svg") ?? $("map") : $("map"));
   $("svg").addEventListener("click", () => download("explore.svg", "image/svg+xml", pictureOf(picture())));
   $("png").addEventListener("click", () => asPng(picture(), "explore.png"));

@@ -69,12 +69,10 @@ function paintControls() {
       }
       box.append(row);
       if (p && typeof p.value === "number" && p.type === "Real" && !SAVED) {
-        const scale = scaleOf({ ...p, value: original(name) });
-        box.append(finder(value, scale.low, scale.high, x => ({ [name]: x }), async (x, text) => {
-          await setValue(name, x, error);
-          const status = document.querySelector(`.control[data-name="${CSS.escape(name)}"] [role="status"]`);
-          if (status) status.textContent = text;
-        }, name.split(".").at(-1)));
+        box.append(finderOf(`${state.scenario} ${name}`, {
+          now: () => state.values[name] ?? original(name), bounds: () => [p.minimum ?? -Infinity, p.maximum ?? Infinity],
+          valuesAt: x => ({ [name]: x }), apply: x => setValue(name, x), words: name.split(".").at(-1),
+        }));
       }
     }
     const bounds = p && (p.minimum !== null || p.maximum !== null) ? `, from ${p.minimum === null ? "any" : number(p.minimum)} to ${p.maximum === null ? "any" : number(p.maximum)}` : "";
@@ -87,52 +85,104 @@ function paintControls() {
 
 // -- a value that is looked for -----------------------------------------------------------------------------------
 
-// Where the least damped mode of the range reaches so many percent: outwards from the value in steps, then by halves.
-// `valuesAt` makes the case's values from one number, `apply` sets what was found.
-function finder(now, low, high, valuesAt, apply, words) {
-  const wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find");
-  const search = async () => {
-    const percent = Number(wanted.value.replace(",", ".")), error = make("span"), tried = [];
-    if (!(percent > -100 && percent < 100)) { said.textContent = "give a damping in percent"; return; }
-    const above = async x => {
-      said.textContent = `${words} ${number(x)} …`;
+const LADDER = [1.3, 1.7, 2.3, 3, 4, 5.5, 8, 12, 25, 100], HALVES_TO_AN_EDGE = 5;
+const reasonOf = text => { const reason = (text.split("\n")[1] ?? text).replace(/^\s*- /, ""); return reason.length > 200 ? `${reason.slice(0, 200)} …` : reason; };
+// Values that are tried upwards and downwards of `now`: in growing ratios, or steps where it is not above 0, and the
+// bounds; without a declared one, a value above 0 goes down to a part of itself.
+function ladders(now, least, most) {
+  if (now > 0 && least === -Infinity) least = now / 25;
+  const up = LADDER.map(k => (now > 0 ? now * k : now + (k - 1) * (Math.abs(now) || 1)));
+  const down = LADDER.map(k => (now > 0 ? now / k : now - (k - 1) * (Math.abs(now) || 1)));
+  if (now > 0 && least < 0 && Number.isFinite(least)) down.push(0, 0.1 * least, 0.3 * least);
+  const within = (values, bound) => [...values.map(x => +x.toPrecision(6)).filter(x => x > least && x < most), ...(Number.isFinite(bound) && bound !== now ? [bound] : [])];
+  return [within(up, most), within(down, least)];
+}
+// Looks for all values at which the least damped mode of the range reaches so many percent, or stability is lost: the
+// smallest change first (the smallest ratio, where it is stability), which a damping also sets. `spec`: what it is `now`, its `bounds`, `valuesAt`, which makes the case's values from one number,
+// `apply`, which sets one, and its `words`. One per key, so that what was found stays while the controls are painted anew.
+function finderOf(key, spec) {
+  const one = seen.finders[key] ??= finder(spec), others = one.others();
+  if (others !== one.of) { one.of = others; one.said.replaceChildren(); }
+  return one.box;
+}
+function finder({ now, bounds, valuesAt, apply, words }) {
+  const wanted = make("input", { value: 5, size: 3, inputmode: "decimal", "aria-label": `damping in % that ${words} is looked for` }), said = make("span", { class: "soft block", role: "status" }), begin = make("button", {}, "find"), until = make("button", { title: "the whole spectrum, aperiodic growth too" }, "until unstable");
+  const say = text => { said.textContent = text; };
+  const search = async percent => {  // null: until unstable
+    if (!(percent === null || (percent > -100 && percent < 100))) { say("give a damping in percent"); return; }
+    const here = now(), [least, most] = bounds(), error = make("span"), cancels = seen.cancels, tried = [];
+    const holds = one => { const damping = Math.min(100, ...one.modes.map(m => m.damping_percent)); return { damping, f: percent === null ? { true: 1, false: -1 }[one.stable] ?? null : (one.stable === false ? Math.min(damping, -1e-9) : damping) - percent }; };
+    let stopped = "";
+    const at = async x => {  // null where nothing is known, and where the search ends
+      say(`${words} ${number(x, 6)} …, ${tried.length} values tried`);
+      error.textContent = "";
       const values = Object.fromEntries(Object.entries({ ...state.values, ...valuesAt(x) }).filter(([, value]) => value !== null));
       const found = await ask("search", { ask: "modes", ...theCase(), values, range: state.range }, error);
-      if (!found) return found;
-      const one = found.modes.scenarios[0], least = Math.min(100, ...one.modes.map(m => m.damping_percent));
-      tried.push({ x, f: (one.stable === false ? Math.min(least, -1e-9) : least) - percent });
-      return tried.at(-1).f;
+      if (found === undefined) stopped = "another question took its place: find again";
+      else if (seen.cancels !== cancels) stopped = "cancelled";
+      else if (found) {
+        const idle = Object.keys(valuesAt(x)).map(name => found.idle[name] && `${name} cannot act: ${found.idle[name]}`).filter(Boolean);
+        if (idle.length) { stopped = idle.join("; "); return null; }
+        const point = { x, verdict: found.verdict, ...holds(found.modes.scenarios[0]) };
+        if (point.f !== null) { tried.push(point); return point; }
+        error.textContent = `the verdict is not known: ${found.verdict}`;
+      }
+      return null;
     };
-    const here = await above(now), ends = [{ x: now, f: here, to: high }, { x: now, f: here, to: low }];
-    if (here === undefined || here === null) { said.textContent = error.textContent || "a newer question took its place"; return; }
-    let bracket = null;
-    for (let k = 1; k <= 5 && !bracket; k++) {
-      for (const end of ends.filter(e => !e.refused && e.to !== now)) {
-        const x = now > 0 && low > 0 ? now * (end.to / now) ** (k / 5) : now + (end.to - now) * k / 5, f = await above(x);
-        if (f === undefined) { said.textContent = ""; return; }
-        if (f === null) { end.refused = true; continue; }
-        if (f < 0 !== here < 0) { bracket = [end, { x, f }]; break; }
-        Object.assign(end, { x, f });
+    const first = await at(here), edges = [];
+    if (!first) { say(stopped || error.textContent); return; }
+    for (const values of ladders(here, least, most)) {
+      let last = first;
+      for (const x of values) {
+        const point = await at(x);
+        if (stopped) { say(stopped); return; }
+        if (point) { last = point; continue; }
+        let edge = { x, why: error.textContent };
+        for (let k = 0; k < HALVES_TO_AN_EDGE; k++) {
+          const middle = +((last.x + edge.x) / 2).toPrecision(6), beside = await at(middle);
+          if (stopped) { say(stopped); return; }
+          if (beside) last = beside; else edge = { x: middle, why: error.textContent };
+        }
+        edges.push(`not computed from ${number(edge.x)} on: ${reasonOf(edge.why)}`);
+        break;
       }
     }
-    if (!bracket) {
-      const best = tried.reduce((a, b) => (Math.abs(b.f) < Math.abs(a.f) ? b : a));
-      said.textContent = `not reached at ${tried.length} values from ${number(ends[1].x)} to ${number(ends[0].x)}; nearest: ${fixed(best.f + percent, 2)} % at ${number(best.x)}${error.textContent ? `; ${error.textContent}` : ""}`;
+    const line = [...tried].sort((a, b) => a.x - b.x), range = `${line.length} values were tried from ${number(line[0].x)} to ${number(line.at(-1).x)}`, tail = ["", range, ...edges].join("; ");
+    const crossings = [];
+    for (let k = 1; k < line.length; k++) {
+      let a = line[k - 1], b = line[k];
+      if (a.f < 0 === b.f < 0) continue;
+      for (let n = 0; n < 40; n++) {  // to 0.00 %: by secants, every third time by halves
+        const good = a.f >= 0 ? a : b, part = percent === null || n % 3 === 2 ? 0.5 : Math.min(0.95, Math.max(0.05, (a.f - 0.002) / (a.f - b.f)));
+        const x = +(a.x + part * (b.x - a.x)).toPrecision(6);
+        if ((percent !== null && good.f < 0.004) || x === a.x || x === b.x || (percent === null && Math.abs(b.x - a.x) < 2e-4 * Math.abs(b.x))) break;
+        const point = await at(x);
+        if (stopped) { say(stopped); return; }
+        if (!point) break;
+        if (point.f < 0 === a.f < 0) a = point; else b = point;
+      }
+      crossings.push(a.f >= 0 ? { good: a, bad: b } : { good: b, bad: a });
+    }
+    if (!crossings.length) {
+      const best = line.reduce((a, b) => (Math.abs(b.f) < Math.abs(a.f) ? b : a));
+      say((percent !== null ? `not reached; nearest: ${fixed(best.damping, 2)} % at ${number(best.x)}` : `${first.f > 0 ? "stable" : "UNSTABLE"} over the whole range, ${words} from ${number(line[0].x)} to ${number(line.at(-1).x)}`) + tail);
       return;
     }
-    let [a, b] = bracket;
-    for (let k = 0; k < 20 && Math.abs(b.x - a.x) > 1e-3 * Math.abs(b.x); k++) {
-      const part = Math.min(0.9, Math.max(0.1, a.f / (a.f - b.f))), x = a.x + part * (b.x - a.x), f = await above(x);
-      if (f === undefined || f === null) { said.textContent = error.textContent; return; }
-      if (f < 0 === a.f < 0) a = { x, f }; else b = { x, f };
-      if (Math.abs(f) < 0.005) break;
-    }
-    const good = a.f >= 0 ? a : b;
-    const text = `${fixed(good.f + percent, 2)} % at ${words} ${number(good.x)}; beyond ${number(a.f >= 0 ? b.x : a.x)} it is below ${number(percent)} %`;
-    await apply(+good.x.toPrecision(6), text);
+    const far = ({ good: { x } }) => (percent === null && here > 0 ? (x > 0 ? Math.abs(Math.log(x / here)) : Infinity) : Math.abs(x - here));
+    crossings.sort((a, b) => far(a) - far(b));
+    const text = ({ good, bad }) => (percent === null ? `stable ${bad.x > good.x ? "up" : "down"} to ${words} ${number(good.x, 6)}, UNSTABLE at ${number(bad.x, 6)}: ${bad.verdict.replace(/^UNSTABLE: /, "")}`
+      : `${fixed(good.damping, 2)} % at ${words} ${number(good.x, 6)}; ${bad.x > good.x ? "above" : "below"} it is less than ${number(percent)} %${bad.f < -percent ? " (unstable)" : ""}`);
+    if (percent !== null) await apply(crossings[0].good.x);
+    said.replaceChildren(...crossings.flatMap((one, k) => {
+      const button = make("button", {}, "set");
+      button.addEventListener("click", () => apply(one.good.x));
+      return [k ? "also " : "", text(one), " ", button, make("br")];
+    }), tail.slice(2));
   };
-  begin.addEventListener("click", search);
-  return make("div", { class: "finder" }, make("label", {}, "least damped at ", wanted, " % "), begin, said);
+  begin.addEventListener("click", () => search(Number(wanted.value.trim().replace(",", ".") || NaN)));
+  until.addEventListener("click", () => search(null));
+  const names = Object.keys(valuesAt(1)), others = () => JSON.stringify([state.scenario, state.range, Object.entries(state.values).filter(([name]) => !names.includes(name)).sort()]);
+  return { said, others, of: others(), box: make("div", { class: "finder" }, make("label", {}, "least damped at ", wanted, " % "), begin, " or ", until, said) };
 }
 
 async function setValue(name, value, place = null) {
