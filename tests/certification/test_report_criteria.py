@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from orchestrator.certification import report, report_criteria
+from orchestrator.certification import report_criteria
 
 
 def test_marks_of_modes_with_the_converter_are_the_large_ones(monkeypatch):
@@ -17,17 +17,15 @@ def test_marks_of_modes_with_the_converter_are_the_large_ones(monkeypatch):
 
 
 def test_the_findings_name_where_each_criterion_is_not_accepted(monkeypatch):
-    for name in ("converter_model", "signal_name"):
-        monkeypatch.setattr(report, name, lambda *_: "")
+    monkeypatch.setattr(report_criteria, "converter_model", lambda *_: "")
     for name in ("_least_and_growth", "_remark"):
-        monkeypatch.setattr(report, name, lambda c: [])
+        monkeypatch.setattr(report_criteria, name, lambda c: [])
     good, bad = (SimpleNamespace(accepted=accepted) for accepted in (True, False))
     times = {0.1: (True, good), 0.2: (True, None), 0.3: (True, bad), 0.4: (False, bad), 0.5: (False, None)}
     verdicts = [SimpleNamespace(X_L=X, judged=judged, time=time, eigenvalues_accepted=X < 0.3)
                 for X, (judged, time) in times.items()]  # fmt: skip
-    c = SimpleNamespace(passed=False, refused=False, verdicts=verdicts, sentence=lambda: "", acceptance=None, signal="",
-                        points={("with", X): SimpleNamespace(warnings=()) for X in times}, pod=next(iter(report.PODS)),
-                        controllers=SimpleNamespace(source=""))  # fmt: skip
-    text = report._findings(c)
+    c = SimpleNamespace(verdicts=verdicts, results={("with", X): None for X in times})
+    test = SimpleNamespace(pod="none", signal="sg1.p", controllers=SimpleNamespace(source=""))
+    text = "\n".join(report_criteria.damping_findings(c, test))
     assert "Eigenvalue criterion: not accepted at X_L = 0.3 pu" in text
     assert "not accepted at X_L = 0.2, 0.3 pu" in text

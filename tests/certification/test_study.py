@@ -202,19 +202,19 @@ def test_threads_of_one_worker_compute_one_point_at_a_time(tmp_path, fmu_path, m
     """As those of a Dask worker; FMUs and the limit on BLAS threads are the whole process's."""
     inside, most = [], []
 
-    def compute(case, task, result):
+    def compute(task, case):
         inside.append(task)
         time.sleep(0.1)
         most.append(len(inside))
         inside.remove(task)
-        result.failure = "not computed"
+        return PointResult(task.X_L, task.scenario, failure="not computed")
 
     class Threads:
         def run(self, function, tasks):
             with ThreadPoolExecutor(2) as pool:
                 yield from enumerate(pool.map(function, tasks))
 
-    monkeypatch.setattr(point_module, "_compute", compute)
+    monkeypatch.setattr(point_module, "_result", compute)
     result = certify(CertificationRequest(fmu_path("gfor"), reactances=(0.1,)), Threads(), tmp_path)
     assert [point.failure for point in result.results.values()] == ["not computed"] * 2
     assert most == [1, 1]
