@@ -113,6 +113,13 @@ class ItemPreparation:
         found = overloads(prepared.system.components, meant)
         return {name: load for name, load in found.items() if load > before.get(name, 0.0) + 0.01}
 
+    def reactive(self, prepared: PreparedScenario) -> str:
+        """The bus whose units are furthest beyond their limits of reactive power, and within without the values."""
+        limits = self._case.table.power_flow and self._case.table.power_flow.reactive_limits
+        before, now = ((x.power_flow.beyond_limits if x.power_flow else ()) for x in (self.base, prepared))
+        found = [] if limits is False else [x for x in now if x.bus not in {one.bus for one in before}]
+        return max(found, key=lambda x: abs(x.q - x.limit)).text(kept=False) if found else ""
+
     def _prepare(self, values: Mapping[str, Value], dispatch: Dispatch | None = None) -> PreparedScenario:
         case = replace(self._case, sharing=SharingRule.SLACK)  # what a point has out of service is in its generation
         (prepared,) = case.prepare([self._scenario], dict(values), self._step_size, None, self._layers, dispatch)

@@ -132,8 +132,8 @@ class _Worker:
             prepared = self._preparation.prepared(item)
             warnings = self._preparation.warnings(prepared.scenario)
             found = self._modes(prepared.scenario, neighbour, warnings, count=count)
-            beyond = self._preparation.overloads(prepared.scenario)
-            found.record = replace(found.record, text=prepared.text, beyond=beyond)
+            beyond, fed = self._preparation.overloads(prepared.scenario), self._preparation.reactive(prepared.scenario)
+            found.record = replace(found.record, text=prepared.text, beyond=beyond, reactive=fed)
             return found
         except Exception as error:  # an error that nobody expected must neither end the other points nor be hidden
             kind, text, lasting = failure(error, item)

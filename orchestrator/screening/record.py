@@ -17,6 +17,7 @@ class ItemRecord:
     text: str = ""
     warnings: tuple[str, ...] = ()
     beyond: dict[str, float] = field(default_factory=dict)  # units beyond their rating [pu of it]
+    reactive: str = ""  # the bus whose units are furthest beyond their limits of reactive power
     residual: float = float("nan")
     # whether no mode grows; None where that is not known: nothing was computed, growth was not ``counted``, or a limit
     # is so close that the linear model is doubtful

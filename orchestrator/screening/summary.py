@@ -82,14 +82,16 @@ class Summary:
 
     @property
     def beyond(self) -> str:
-        """At how many items a unit is beyond its rating, and which one most; "" where none is."""
+        """At how many items a unit is beyond its rating or its reactive power, and which one; "" where none is."""
+        total, fed = len(self.result.items), [one for item in self.result.items if (one := item.record.reactive)]
         worst = [max((load, name, item.point.name, item.outage.name) for name, load in item.record.beyond.items())
                  for item in self.result.items if item.record.beyond]  # fmt: skip
-        if not worst:
-            return ""
-        load, unit, *at = max(worst)
-        number = f"at {len(worst)} of {len(self.result.items)} a unit is beyond its rating"
-        return f"{number}, most {unit} with {100 * load:.3g} % ({', '.join(at)})"
+        told = [f"at {len(fed)} of {total} limits of reactive power are exceeded: {fed[0]}"] if fed else []
+        if worst:
+            load, unit, *at = max(worst)
+            most = f"most {unit} with {100 * load:.3g} % ({', '.join(at)})"
+            told.insert(0, f"at {len(worst)} of {total} a unit is beyond its rating, {most}")
+        return "; ".join(told)
 
     @property
     def stable(self) -> bool | None:

@@ -154,7 +154,9 @@ def find_sensitivities(prepared: PreparedScenario, again: Again, request: Sensit
         about_mode += _idle(prepared, rows)
     warnings = _neighbour(found.model, chosen)
     ordered = sorted(rows.values(), key=lambda row: (row.derivative is None, -row.effect, row.parameter.name))
-    doubted = (_limited(_doubted(row, warnings), acting) for row in ordered)
+    if warnings:
+        ordered = [replace(x, doubts=(*x.doubts, "double eigenvalue")) if x.derivative else x for x in ordered]
+    doubted = (_limited(row, acting) for row in ordered)
     return SensitivityResult(found, chosen, tuple(doubted), held, (*about_mode, *warnings))
 
 
@@ -317,10 +319,3 @@ def _limited(row: Sensitivity, acting: Mapping[str, Sequence[str]]) -> Sensitivi
     if not limits or row.derivative is None:
         return row
     return replace(row, doubts=(*row.doubts, *(f"a limit acts in this component: {name}" for name in limits)))
-
-
-def _doubted(row: Sensitivity, warnings: tuple[str, ...]) -> Sensitivity:
-    if not warnings or not row.derivative:
-        return row
-    return Sensitivity(row.parameter, row.eigenvalue, row.derivative, row.continuous, row.operating_point,
-                       (*row.doubts, "double eigenvalue"), row.reason)  # fmt: skip

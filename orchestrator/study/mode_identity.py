@@ -318,7 +318,8 @@ def _differing(a: PreparedScenario, b: PreparedScenario) -> dict[str, tuple[floa
     found: dict[str, tuple[float, float]] = {}
     for key in dict.fromkeys((*a.given, *b.given)):
         pattern, _, variable = key.partition(".")
-        names = [n for n in fnmatch.filter(b.system.components, pattern) if variable in _variables(b, n)]
+        plans = b.system.components
+        names = [n for n in fnmatch.filter(plans, pattern) if variable in plans[n].description.variables]
         if not names and a.given.get(key) != b.given.get(key):
             return None
         for name in names:
@@ -336,10 +337,6 @@ def _differing(a: PreparedScenario, b: PreparedScenario) -> dict[str, tuple[floa
                 return None
             found[f"{name}.{variable}"] = (p, q)
     return found
-
-
-def _variables(prepared: PreparedScenario, name: str) -> Mapping[str, object]:
-    return prepared.system.components[name].description.variables
 
 
 def _gain(plan: ComponentPlan, controller: str) -> float:

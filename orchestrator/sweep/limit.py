@@ -104,6 +104,8 @@ class ParameterLimit:
     again: tuple[float, ...]  # values of it beyond the limit that hold again
     why: str  # the failure's text, or what the verdict is not known for
     worst_at: float  # where the least damped mode of the coarse grid is
+    # the first value on the way with units beyond their rating that are within it at the start, and their names
+    strained: tuple[float, tuple[str, ...]] | None = None
 
     @property
     def limit(self) -> float | None:
@@ -117,14 +119,16 @@ class ParameterLimit:
             f": {self._mode(self.mode)}" if self.mode else "",
             f": {short(self.why, _LONGEST)}" if self.why else "",
         )
-        at, holding = self._value(self.beyond), self.until.holding
+        at, holding, strained = self._value(self.beyond), self.until.holding, ""
+        if self.strained:
+            strained = f" (beyond its rating from {self._value(self.strained[0])} on: {', '.join(self.strained[1])})"
         if self.kind is Ending.HOLDS:
             worst = f"; least damped at {self._value(self.worst_at)}{mode}"
-            return f"{holding} over the whole range, {self.key} from {start} to {stop}{worst}"
+            return f"{holding} over the whole range, {self.key} from {start} to {stop}{strained}{worst}"
         what = self.until.failing if self.kind is Ending.FAILS else str(self.kind)
         if self.holds_at is None:
             return f"{what} already at the start, {self.key} = {at}{mode}{why}"
-        up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}{self._dip()}"
+        up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}{self._dip()}{strained}"
         if self.kind is Ending.FAILS:
             return f"{up_to}, {what} at {at}{mode}"
         return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{why}"
@@ -160,6 +164,7 @@ class ParameterLimit:
             "until": f"{self.until.damping:g} %" if self.until.damping else "unstable",
             "limit": self.limit, "reason": None if self.limit is not None else self.sentence,
             "holds_at": self.holds_at, "beyond": self.beyond, "ends_with": str(self.kind), "mode": self.mode,
+            "beyond_rating": self.strained and {"value": self.strained[0], "units": self.strained[1]},
             "why": self.why, "holds_again_at": list(self.again), "tried": list(self.tried), "sentence": self.sentence,
         }  # fmt: skip
 

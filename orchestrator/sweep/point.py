@@ -6,6 +6,7 @@ from typing import Any
 from orchestrator.analysis.mode_tracking import ModeSet
 from orchestrator.black_box.coupled_modes import coupled_with_boxes
 from orchestrator.cases.case import Case
+from orchestrator.cases.plausibility import overloads
 from orchestrator.cases.schema import Value
 from orchestrator.points.failure import Failure
 from orchestrator.points.task import Kept, Task, computed
@@ -24,6 +25,7 @@ class PointRecord(Kept):
     # words; empty where the point failed
     stability: dict[str, Any] = field(default_factory=dict)
     because: str = ""
+    overloads: dict[str, float] = field(default_factory=dict)  # units beyond their rating [pu of it]
 
     @property
     def is_unstable(self) -> bool:
@@ -57,4 +59,5 @@ def _record(result: ModesResult) -> PointRecord:
         {name: next(i for i, m in enumerate(modes) if m is mode) for name, mode in result.named.items()},
         residual=result.operating_point.residual, warnings=result.warnings, linearised=result.linearised,
         stability=result.stability.as_json(), because=result.stability.because(),
+        overloads=overloads(result.prepared.system.components, result.prepared.case.table.meant),
     )  # fmt: skip

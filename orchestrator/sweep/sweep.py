@@ -220,10 +220,16 @@ def _limit(result: SweepResult, sweep: ScenarioSweep, work: Work) -> ParameterLi
          "largest_growth_rate": record.stability.get("largest_growth_rate"), "error": record.error}
         for k, record in enumerate(grid)
     ]  # fmt: skip
+    within = sweep.points[(0,)].overloads
+    strained = next((
+        (float(_value_at(axis, place[0])), over) for place, record in sorted(sweep.points.items(), key=lambda x: x[0])
+        if holds is not None and place[0] <= holds and (over := tuple(n for n in record.overloads if n not in within))
+    ), None)  # fmt: skip
     why = shown.error or (str(shown.stability.get("reason", "")) if end is Ending.NOT_KNOWN else "")
     return ParameterLimit(
         axis.key, axis.unit, sweep.prepared.name, sweep.prepared.title, until, end, value(holds), value(beyond), mode,
         who, tuple(tried), tuple(float(axis.values[k]) for k in again), why, float(axis.values[worst]),
+        strained,
     )  # fmt: skip
 
 

@@ -69,7 +69,7 @@ def unsettled_response(
     slow = (_swing(name, y[first:], times, begin) for name, y in resting_signals(seen, system).items())
     fast = (_fast_swing(name, seen, first, begin) for name in seen.turns)
     swings = [swing for swing in chain(slow, fast) if swing is not None]
-    swings.sort(key=lambda s: (_component(s.name) not in units, -s.size))
+    swings.sort(key=lambda s: (s.name.partition(".")[0] not in units, -s.size))
     # An oscillation faster than the looks appears in the signals as a slower one, therefore it is searched first.
     quick = [s for s in swings if s.turns_hz is not None]
     others = [s for s in swings if s.turns_hz is None and not (quick and oscillations.too_fast(s.times, s.signal))]
@@ -144,10 +144,6 @@ def resting_signals(seen: Seen, system: System) -> dict[str, Numbers]:
         elif name.endswith("_re") and f"{name[:-3]}_im" in everything:
             found[name] = np.hypot(signal, everything[f"{name[:-3]}_im"])
     return found
-
-
-def _component(name: str) -> str:
-    return name.partition(".")[0]
 
 
 def _swing(name: str, signal: Numbers, times: Numbers, begin: float) -> Swing | None:

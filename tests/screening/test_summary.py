@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from orchestrator.cases.flow_limits import Excess
 from orchestrator.operating_points.item import Status
+from orchestrator.operating_points.preparation import ItemPreparation
 from orchestrator.screening.modes import CriticalRegion
 from orchestrator.screening.study import ScreeningResult
 from orchestrator.screening.summary import Summary
@@ -44,6 +46,27 @@ def test_a_screening_is_complete_with_all_its_items(there, complete):
 def test_of_a_part_the_same_holds_for_what_is_there():
     assert summary(True, complete=False).stable_here is True
     assert summary(True, None, complete=False).stable_here is None
+
+
+def test_units_beyond_their_reactive_power_stand_in_the_first_line():
+    """What the operating point brings about: not what the base has already, nor where the case means the voltages."""
+    found = summary(True, True)
+    for item, text in zip(found.result.items, ("", "'b' feeds -70 Mvar, its least being -10 Mvar"), strict=True):
+        item.record.beyond, item.record.reactive = {}, text
+    said = "at 1 of 2 limits of reactive power are exceeded: 'b' feeds -70 Mvar, its least being -10 Mvar"
+    assert found.beyond == said
+
+    def at(**fed):
+        excess = tuple(Excess(bus, q, -0.1, 1.0, 1.0) for bus, q in fed.items())
+        return SimpleNamespace(power_flow=SimpleNamespace(beyond_limits=excess))
+
+    preparation = object.__new__(ItemPreparation)
+    preparation.base = at(a=-0.2)
+    for limits, text in ((None, "'b' feeds -70 Mvar, its least being -10 Mvar"), (False, "")):
+        table = SimpleNamespace(power_flow=SimpleNamespace(reactive_limits=limits))
+        preparation._case = SimpleNamespace(table=table)
+        assert preparation.reactive(at(a=-0.3, b=-0.7, c=-0.2)) == text
+        assert preparation.reactive(at(a=-0.3)) == ""
 
 
 def test_modes_are_followed_beyond_the_range_at_both_ends_and_above_the_damping():

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+import orchestrator as gfor_in_python
 from orchestrator.cases.case import load_case
 from orchestrator.errors import InputError
 from orchestrator.points.executor import Serial
@@ -178,6 +179,15 @@ def test_a_value_that_cannot_start_is_no_limit_of_stability(loop):
     assert found["reason"].startswith("no operating point from two.T = ")
     assert "no limit of stability" in found["reason"]
     assert "T must exceed 0" in found["reason"]
+
+
+def test_a_unit_beyond_its_rating_on_the_way_is_told_in_the_answer():
+    found = gfor_in_python.load("infinite_bus").sweep(
+        ["gfor.P_0=0.9:1.1:3"], scenarios=["dip"], until="unstable", workers=1
+    )
+    (limit,) = found.as_json()["limits"]
+    assert "P_0 from 0.9 pu to 1.1 pu (beyond its rating from 1.1 pu on: gfor)" in limit["sentence"]
+    assert limit["beyond_rating"] == {"value": 1.1, "units": ("gfor",)}
 
 
 def test_on_the_terminal_the_answer_comes_first(gfor, loop):

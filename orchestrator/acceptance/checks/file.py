@@ -76,17 +76,13 @@ def _wrong_definitions(directory: Path) -> list[str]:
         said = float(base.get("factor", "1"))
         if differs:
             wrong.append(
-                f"unit {name!r} is defined with {_power(differs[0], declared)}, which it does not have"
+                f"unit {name!r} is defined with {differs[0]}^{declared[differs[0]]}, which it does not have"
                 if declared[differs[0]]
                 else f"unit {name!r} is defined without its {differs[0]}"
             )
         elif abs(said - factor) > 1e-6 * factor and not float(base.get("offset", "0")):
             wrong.append(f"unit {name!r} is defined as {said:g} SI units; it is {factor:g}")
     return wrong
-
-
-def _power(key: str, exponents: dict[str, int]) -> str:
-    return f"{key}^{exponents[key]}"
 
 
 def _wrong_port_units(described: FmuDescription, *, bound: bool) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import io
 import re
 import warnings
@@ -173,7 +174,7 @@ def _apart(path: Path) -> tuple[str, bytes, tuple[str, str]]:
     """Text of the configuration, samples, and the two paths."""
     found = []
     for suffix in (".cfg", ".dat"):
-        same = [p for p in path.parent.glob(f"{_escaped(path.stem)}.*") if p.suffix.lower() == suffix]
+        same = [p for p in path.parent.glob(f"{glob.escape(path.stem)}.*") if p.suffix.lower() == suffix]
         if not same:
             missing = path.with_suffix(suffix)
             raise InputError(f"{missing}: there is no such file; a recording needs both its .cfg and its .dat")
@@ -210,10 +211,6 @@ def _content(path: Path, most: int) -> bytes:
     if (size := path.stat().st_size) > most:
         raise InputError(f"{path}: it has {size} bytes; at most {most} are read; cut the recording into parts")
     return path.read_bytes()
-
-
-def _escaped(name: str) -> str:
-    return re.sub(r"([*?\[])", r"[\1]", name)
 
 
 def _decoded(content: bytes) -> str:
