@@ -14,7 +14,7 @@ class Evaluated:
     def __init__(self, model: Model, values: Mapping[str, float] | None = None):
         values = dict(values or {})
         assert set(values) <= {v.name for v in model.parameters}
-        self.model = model
+        self.model = model = model.written_out  # functions of (x, u, p, c) alone
         self.p = np.array([float(values.get(v.name, v.start)) for v in model.parameters])
         self.c, self.x = (np.array(v).ravel() for v in model.initialise(self.p))
 

@@ -37,6 +37,7 @@ def _parts(prepared: PreparedScenario, network: Network | None) -> dict:
     for name, plan in prepared.system.components.items():
         own = network is not None and plan.description.model_name == network.name
         model = build_model("grid", network=network) if own else build_model(plan.description.model_name)
+        model = model.written_out  # functions of (x, u, p, c) alone
         p = np.array([float(plan.parameters.get(v.name, v.start)) for v in model.parameters])
         c, x = model.initialise(p)
         parts[name] = (model, p, c, x)

@@ -111,7 +111,7 @@ REFERENCES = (
 
 def integrate(reference: Reference) -> tuple[list[str], np.ndarray]:
     """Column names and rows: time, inputs held from that time on, outputs."""
-    model = build_model(reference.model)
+    model = build_model(reference.model).written_out
     p = np.array([reference.parameters.get(v.name, v.start) for v in model.parameters])
     c, x = model.initialise(p)
     names = [v.name for v in model.outputs]

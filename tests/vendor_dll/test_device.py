@@ -172,7 +172,7 @@ inputs = { u = 0.5 }
     (prepared,) = load_case(str(case)).prepare()
     assert prepared.system.components["k"].description.states == ("held.y", "DoubleStates[1]")
     case.write_text(text.replace("dll =", 'fmu = "k.fmu"\ndll ='), encoding="utf-8")
-    with pytest.raises(InputError, match=r"give either 'model' .*, 'fmu' .* or 'dll'"):
+    with pytest.raises(InputError, match=r"give either 'model' .*, 'fmu' .*, 'dll' .* or 'scan'"):
         load_case(str(case)).prepare()
 
 
