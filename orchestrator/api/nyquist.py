@@ -108,8 +108,8 @@ class Asked:
         self, device: str, network: str | None, scenario: str | None, given: Mapping[str, Any], *,
         trust_fmus: bool = False, **rest: Any,
     ) -> None:  # fmt: skip
-        self._of_case = _is_case(device) if network is None else _is_case(network)
-        if network is None and not _is_case(device) and rest.get("scr") is None:
+        self._of_case = _is_case(network or device)
+        if network is None and not self._of_case and rest.get("scr") is None:
             raise InputError(
                 f"{device}: give its network as well: a scan, a short-circuit ratio by --scr, or a case with --bus or "
                 "--component"
