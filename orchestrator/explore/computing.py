@@ -35,6 +35,7 @@ class Computing:
         self._state = threading.Condition()
         self._numbers = count(1)
         self._newest: dict[Asker, int] = {}
+        self._cancelled: dict[str, float] = {}  # of each page, the number of its last cancel
         self._at_work: tuple[Asker, float] | None = None  # and when it began
         self._took: dict[str, float] = {}
         self._process: subprocess.Popen[str] | None = None
@@ -43,15 +44,17 @@ class Computing:
 
     def ask(self, page: str, question: Mapping[str, Any], say: Callable[[Answer], None]) -> Answer:
         """The answer; ``superseded`` where the page asked the same anew meanwhile, ``cancelled`` where it was ended."""
-        asker = (page, str(question.get("ask")))
+        asker, number = (page, str(question.get("ask"))), question.get("number", float("inf"))
         with self._state:
+            if number < self._cancelled.get(page, 0):  # it was overtaken on its way
+                return {"cancelled": True}
             ticket = self._newest[asker] = next(self._numbers)
             self._end_what_is_outdated(asker)
             self._state.notify_all()
             while self._at_work is not None and self._newest.get(asker) == ticket:
                 self._state.wait()
             if self._newest.get(asker) != ticket:
-                return {"superseded": True}
+                return {"cancelled" if number < self._cancelled.get(page, 0) else "superseded": True}
             begin = time.monotonic()
             self._at_work = (asker, begin)
             self._why = ""
@@ -75,8 +78,10 @@ class Computing:
         if self._took.get(asker[1], 0.0) - (time.monotonic() - begin) > _RESTART:
             self._end("superseded")
 
-    def cancel(self, page: str) -> None:
+    def cancel(self, page: str, number: float) -> None:
+        """End all that the page asked before this number of its questions."""
         with self._state:
+            self._cancelled[page] = number
             for asker in [one for one in self._newest if one[0] == page]:
                 del self._newest[asker]
             if self._at_work is not None and self._at_work[0][0] == page:

@@ -1,6 +1,7 @@
 """The server of the page: on loopback alone, and for nobody who does not know the token in its address."""
 
 import json
+import math
 import queue
 import secrets
 import threading
@@ -71,7 +72,7 @@ class Explorer:
         if self._pages.get(page) is told:
             del self._pages[page]
             for computing in self.computing.values():
-                computing.cancel(page)
+                computing.cancel(page, math.inf)
 
     def tell(self, page: str, what: Answer) -> None:
         if (told := self._pages.get(page)) is not None:
@@ -80,7 +81,7 @@ class Explorer:
     def answer(self, page: str, question: Answer) -> Answer:
         if question.get("ask") == "cancel":
             for computing in self.computing.values():
-                computing.cancel(page)
+                computing.cancel(page, question["number"])
             return {"answer": {}}
         computing = self.computing.get(str(question.get("ask")), self.computing["modes"])
         return computing.ask(page, question, lambda part: self.tell(page, {"of": question.get("ask"), **part}))
@@ -114,7 +115,7 @@ def _handler(explorer: Explorer) -> type[BaseHTTPRequestHandler]:
                 return
             try:
                 question = json.loads(self.rfile.read(int(length)))
-                page = str(question["page"])
+                page, question["number"] = str(question["page"]), float(question["number"])
             except (ValueError, KeyError, TypeError):
                 self._refuse(HTTPStatus.BAD_REQUEST)
                 return

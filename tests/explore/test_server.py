@@ -74,7 +74,7 @@ def test_a_host_that_is_not_ours_is_refused(explorer):
 
 
 def test_a_question_from_another_origin_is_refused(explorer):
-    path, body = f"/{explorer.token}/ask", json.dumps({"page": "p", "ask": "cancel"})
+    path, body = f"/{explorer.token}/ask", json.dumps({"page": "p", "number": 1, "ask": "cancel"})
     assert asked(explorer, path, "POST", body, Origin="http://evil.example")[0] == 403
     assert asked(explorer, path, "POST", body, Origin=f"http://127.0.0.1:{explorer.port}")[0] == 200
     assert asked(explorer, "/wrong/ask", "POST", body)[0] == 403
@@ -226,11 +226,14 @@ def test_a_dead_process_ends_its_question_and_not_the_next(computing):
 def test_a_hanging_process_is_ended_by_the_user(computing):
     assert "answer" in answer(computing)
     os.kill(computing._process.pid, signal.SIGSTOP)
-    done = in_background(computing)
+    at_work = in_background(computing, ask="parameters", number=1)
     wait_until(lambda: computing._at_work is not None)
-    computing.cancel("p")
-    assert done() == {"cancelled": True}
-    assert "answer" in answer(computing)
+    waiting = in_background(computing, number=2)
+    wait_until(lambda: ("p", "modes") in computing._newest)
+    computing.cancel("p", 4)
+    overtaken = in_background(computing, number=3)
+    assert at_work() == waiting() == overtaken() == {"cancelled": True}
+    assert "answer" in answer(computing, number=5)
 
 
 @pytest.mark.slow

@@ -81,13 +81,14 @@ function tick() {
 setInterval(tick, 200);
 
 // The answer; undefined where a newer question took its place, null where it failed, which is said at `place` or at the top.
+let questions = 0;  // a question that a cancel overtakes on its way is known by its number
 async function ask(what, question, place = null) {
   if (SAVED) return savedAnswer(question);
   working(what, true);
   const begin = performance.now(), mine = atWork.get(what);
   let found;
   try {
-    const response = await fetch("ask", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ page: PAGE_ID, ...question }) });
+    const response = await fetch("ask", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ page: PAGE_ID, number: ++questions, ...question }) });
     found = response.ok ? await response.json() : { error: `the server refused the question (${response.status}); open the address that gfor explore printed` };
   } catch {
     found = { error: "the server does not answer; it ended, or was ended by Ctrl-C: start gfor explore again" };
