@@ -60,9 +60,8 @@ class MarginSensitivity:
         return wanted
 
 
-def sensitivity_of(
-    parameter: Parameter, criterion: ChangedCriterion, mark: str, sides: Mapping[int, ChangeResult], change: float
-) -> MarginSensitivity:
+def sensitivity_of(parameter: Parameter, criterion: ChangedCriterion, mark: str, sides: Mapping[int, ChangeResult],
+                   change: float) -> MarginSensitivity:  # fmt: skip
     """The effect of one parameter, from the row as it is and as it is on either side.
 
     ``sides``: The changed rows by −1 and +1; a side that the declared bounds do not allow is missing.

@@ -96,10 +96,9 @@ def plan_changes(
     unknown = [p.variable for p in asked if plan.value(p.variable) is None]
     chosen = [p for p in asked if p.variable not in (*given, *unknown)]
     if not chosen:
-        raise InputError(
-            f"--sensitivities: {certificate.request.fmu} has no {'such' if patterns else 'tunable'} parameter that the "
-            "rows do not give it themselves; name one by --parameter, or take the fixed ones too by --fixed"
-        )
+        raise InputError(f"--sensitivities: {certificate.request.fmu} has no {'such' if patterns else 'tunable'} "
+                         "parameter that the rows do not give it themselves; name one by --parameter, or take the "
+                         "fixed ones too by --fixed")  # fmt: skip
     every = [info for info in plan.description.variables.values() if info.causality == "parameter"]
     names = {p.variable for p in chosen}
     left_out = {info.name: _why_not(info, unknown, bool(patterns))
