@@ -170,14 +170,14 @@ def _fault_of_words(key: str) -> str:
 def _fault_of_rows(key: str, rows: Sequence[Row]) -> str:
     names = [row.name for row in rows]
     if not rows:
-        return f"code {key!r} has no row; give it one at least"
+        return f"all_codes.py: code {key!r} has no row; give it one at least"
     if twice := [name for name in names if names.count(name) > 1]:
-        return f"code {key!r}: two rows are named {twice[0]!r}, and one response would be judged as both; rename one"
+        return f"all_codes.py, code {key!r}: two rows are named {twice[0]!r}, and would be judged as one; rename one"
     for row in (row for row in rows if isinstance(row, CodeRow)):
         if not re.fullmatch(r"\w+", row.name, re.ASCII):
-            return f"code {key!r}, row {row.name!r}: a file is named so; take letters, digits and _"
+            return f"all_codes.py, code {key!r}, row {row.name!r}: a file is named so; take letters, digits and _"
         if not row.criteria:
-            return f"code {key!r}, row {row.name!r} asks for nothing; give it a criterion"
+            return f"all_codes.py, code {key!r}, row {row.name!r} asks for nothing; give it a criterion"
     return ""
 
 

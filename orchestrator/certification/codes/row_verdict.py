@@ -58,7 +58,7 @@ def try_criteria(code: GridCode[CodeRow], f_n: float) -> None:
             with np.errstate(all="ignore"):
                 judge_row(row, BenchResult(row.name, times, dict.fromkeys(RECORDED, np.ones(times.shape))), f_n)
         except InputError as error:
-            raise InputError(f"code {code.key!r}, row {row.name!r}: {error}") from error
+            raise InputError(f"all_codes.py, code {code.key!r}, row {row.name!r}: {error}") from error
 
 
 def judge_row(

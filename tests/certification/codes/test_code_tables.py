@@ -45,7 +45,7 @@ def test_words_that_are_not_as_they_should_be_are_told_and_help_lives(monkeypatc
     ("rows", "said"),
     [
         ((), "code 'miso' has no row; give it one at least"),
-        ((*MISO.rows, MISO.rows[0]), "two rows are named 'llsm_charging', and one response would be judged as both"),
+        ((*MISO.rows, MISO.rows[0]), "two rows are named 'llsm_charging', and would be judged as one"),
         ((replace(MISO.rows[0], name="a/b"),), "row 'a/b': a file is named so; take letters, digits and _"),
         ((replace(MISO.rows[0], criteria=()),), "row 'llsm_charging' asks for nothing; give it a criterion"),
     ],
