@@ -244,7 +244,7 @@ def read_positive(text: str) -> float:
     return number
 
 
-def positive(given: Any, argument: str, rule: str = "give a number above 0, such as 50.0, or leave it out") -> float:
+def positive(given: Any, argument: str, rule: str = "give a number above 0, or leave it out") -> float:
     own: Any = plain_value(given)
     if not _is_number(own) or not 0 < own < 1e300:
         raise InputError(f"{argument} = {given!r}; {rule}")

@@ -1,7 +1,7 @@
 """The acceptance tests of the FMU that is certified: run, or read from a report of `gfor fmu check --json`."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
@@ -62,18 +62,14 @@ def read_checks(path: Path, fmu: Path, binding: Path | None) -> Acceptance:
     faults = tuple(dict.fromkeys(fault for verdict, fault, _ in found if verdict == "fail"))
     if said != (not faults):
         raise InputError(f"--check {path}: its checks say otherwise than its 'trusted'; {remedy}")
-    if not faults and (left := _left_out(name for *_, name in found)):
+    from orchestrator.acceptance.checks.all import CHECKS  # noqa: PLC0415 - as above
+
+    there = {name for *_, name in found}
+    if not faults and (left := [name for name in CHECKS if name not in there]):
         raise InputError(f"--check {path}: it does not hold {', '.join(left)}; {remedy}")
     if not faults and not any(verdict == "pass" for verdict, *_ in found):
         raise InputError(f"--check {path}: none of its checks was passed, so that it says nothing of the FMU; {remedy}")
     return Acceptance(not faults, faults, report)
-
-
-def _left_out(names: Iterable[str]) -> list[str]:
-    there = set(names)
-    from orchestrator.acceptance.checks.all import CHECKS  # noqa: PLC0415 - as above
-
-    return [name for name in CHECKS if name not in there]
 
 
 def _tool() -> str:

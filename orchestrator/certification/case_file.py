@@ -9,7 +9,6 @@ from typing import Any
 import tomli_w
 
 from orchestrator.cases.case import BUILT_IN, Case, load_case
-from orchestrator.cases.schema import Value
 from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.safe_files import write_text
@@ -38,8 +37,9 @@ def write_case(request: CertificationRequest, switches: Mapping[str, bool], fold
     head = _HEAD.format(fmu=_in_comment(request.fmu), binding=behind)
     write_text(path, head + tomli_w.dumps(tables))
     own = {f"{CONVERTER}.{name}": value for name, value in {**request.values, **switches}.items()}
-    _check(load_case(path), request, own)  # here an error can name the option that gave a value
-    for name, values in ((WITHOUT, request.study_values), (WITH, {**request.study_values, **own})):
+    case = load_case(path)
+    for name, values in ((WITH, {**request.study_values, **own}), (WITHOUT, request.study_values)):
+        case.components_of(name, values)  # here an error can name the option that gave a value
         scenario = tables["scenarios"][name]
         if values:
             scenario["set"] = {**scenario.get("set", {}), **values}
@@ -57,11 +57,6 @@ def lay_files(request: CertificationRequest, folder: Path) -> None:
         target = folder / name
         if file is not None and not (target.exists() and target.samefile(file)):
             shutil.copyfile(file, target)
-
-
-def _check(case: Case, request: CertificationRequest, own: Mapping[str, Value]) -> None:
-    case.components_of(WITH, {**request.study_values, **own})
-    case.components_of(WITHOUT, request.study_values)
 
 
 def _tables(request: CertificationRequest) -> dict[str, Any]:

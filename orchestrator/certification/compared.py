@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ TOLERANCE_IDENTIFIED = 1e-3
 """Largest relative difference of an eigenvalue if the system contains an identified model, whose fit amplifies
 rounding."""
 
+THIS = version("gfor-cosim")
 Content = Mapping[str, Any]
 Compared = Iterator[tuple[str, str]]  # faults, or otherwise sentences on what agrees, one of both empty
 
@@ -33,6 +35,11 @@ class Verification:
     @property
     def holds(self) -> bool:
         return not self.faults
+
+
+def issued_by(content: Content) -> str:
+    """The version of this program that wrote a record; empty where it does not say."""
+    return str(dict(content.get("environment") or {}).get("gfor-cosim", ""))
 
 
 def request_of(folder: Path, content: Content, **of_the_norm: Any) -> CertificationRequest:

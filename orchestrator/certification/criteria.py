@@ -167,12 +167,8 @@ def judge_mode(value: complex, before: complex | None) -> tuple[bool, str]:
     return False, f"the converter takes a mode from {was:.2f} % to {percent:.2f} % < {limit:g} %"
 
 
-def stability_fault(
-    growth_with: float,
-    growth_without: float,
-    with_converter: Mapping[str, Any] | None = None,
-    without: Mapping[str, Any] | None = None,
-) -> str | None:
+def stability_fault(growth_with: float, growth_without: float, with_converter: Mapping[str, Any] | None = None,
+                    without: Mapping[str, Any] | None = None) -> str | None:  # fmt: skip
     """The fault of a converter that makes the system unstable at any frequency; None without such a fault. A system
     that was unstable without the converter excuses it."""
     if not np.isfinite(growth_with):

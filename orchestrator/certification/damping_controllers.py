@@ -44,49 +44,32 @@ class DampingControllers:
 
 def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
     """The damping controllers that a request sets or declares for an FMU."""
-    known = {letter: _state(description, request, letter) for letter in "pq"}
-    if request.pod is None:
-        active = "".join(letter for letter, value in known.items() if value) or "none"
-        unseen = _unseen(description, known, active)
-        source = UNKNOWN if None in known.values() and active == "none" else _with_unseen(READ, unseen)
-        return DampingControllers(active, source, unseen=unseen, can_be_off=_switched(description, active))
-    wanted = {letter: letter in request.pod.removeprefix("none") for letter in "pq"}
-    settings = {}
-    for letter, on in wanted.items():
-        name = variable(letter)
-        _refuse_contradiction(description, request, name, on)
-        if _is_switch(description.variables.get(name)):
-            settings[name] = on
-    source = SET if all(known[letter] is not None for letter in "pq") else _partly(known, request.pod)
-    unseen = _unseen(description, known, request.pod)
-    declared = "".join(letter for letter, value in known.items() if value is None)
-    can_be_off = _switched(description, request.pod)
-    return DampingControllers(request.pod, _with_unseen(source, unseen), settings, declared, unseen, can_be_off)
+    known, settings = {letter: _state(description, request, letter) for letter in "pq"}, dict[str, bool]()
+    hidden = "".join(letter for letter, value in known.items() if value is None)
+    pod = request.pod
+    if pod is None:
+        pod, declared = "".join(letter for letter, value in known.items() if value) or "none", ""
+        source = UNKNOWN if hidden and pod == "none" else READ
+    else:
+        declared = hidden
+        for letter in "pq":
+            name, on = variable(letter), letter in pod.removeprefix("none")
+            _refuse_contradiction(description, request, name, on)
+            if _is_switch(description.variables.get(name)):
+                settings[name] = on
+        source = DECLARED if hidden == "pq" else SET
+        source += f", except POD-{hidden.upper()}: {DECLARED}" if len(hidden) == 1 and pod != "none" else ""
+    active = pod.removeprefix("none")
+    switched = [letter for letter in active if letter not in hidden]
+    unseen = "".join(letter for letter in switched if f"delta_{letter}_pod" not in description.variables)
+    names = " and ".join(f"POD-{letter.upper()}" for letter in unseen)
+    source += f"; {UNSEEN} ({names})" if unseen else ""
+    can_be_off = all(_is_switch(description.variables.get(variable(letter))) for letter in active)
+    return DampingControllers(pod, source, settings, declared, unseen, can_be_off)
 
 
 def variable(letter: str) -> str:
     return f"pod_{letter}.enabled"
-
-
-def _switched(description: FmuDescription, pod: str) -> bool:
-    return all(_is_switch(description.variables.get(variable(letter))) for letter in pod.removeprefix("none"))
-
-
-def _unseen(description: FmuDescription, known: Mapping[str, bool | None], pod: str) -> str:
-    switched = [letter for letter in pod.removeprefix("none") if known[letter] is not None]
-    return "".join(letter for letter in switched if f"delta_{letter}_pod" not in description.variables)
-
-
-def _with_unseen(source: str, unseen: str) -> str:
-    names = " and ".join(f"POD-{letter.upper()}" for letter in unseen)
-    return f"{source}; {UNSEEN} ({names})" if unseen else source
-
-
-def _partly(known: Mapping[str, bool | None], pod: str) -> str:
-    hidden = [f"POD-{letter.upper()}" for letter, value in known.items() if value is None]
-    if len(hidden) == len(known):
-        return DECLARED
-    return f"{SET}, except {hidden[0]}: {DECLARED}" if pod != "none" else SET
 
 
 def _state(description: FmuDescription, request: CertificationRequest, letter: str) -> bool | None:
@@ -117,7 +100,5 @@ def _refuse_contradiction(description: FmuDescription, request: CertificationReq
     said = {"--set": request.values.get(name), f"the binding {request.binding}": _bound(description, name)}
     for source, value in said.items():
         if value is not None and value is not on:
-            raise InputError(
-                f"--pod {request.pod} needs {name} = {as_text(on)}, but {source} has {name} = {as_text(value)}; "
-                "leave one of them away, or make them agree"
-            )
+            raise InputError(f"--pod {request.pod} needs {name} = {as_text(on)}, but {source} has {name} = "
+                             f"{as_text(value)}; leave one of them away, or make them agree")  # fmt: skip

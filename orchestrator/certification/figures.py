@@ -106,34 +106,20 @@ def fit_errors_of(c: Certificate) -> dict[str, float]:
 def damping_json(c: Certificate, test: DampingTest) -> dict[str, Any]:
     missing = missing_of(c)
     return {
-        "format": NORM,
-        "norm": c.code.source,
-        "tool": f"gfor-cosim {version('gfor-cosim')}",
-        "verdict": c.verdict,
-        "passed": c.passed,
-        "sentence": c.sentence(),
-        "judged": f"{len(REACTANCES) - len(missing)} of {len(REACTANCES)}",
-        "missing": list(missing),
-        "departures": list(c.request.departures),
-        "details": c.details.texts(),
-        "fmu": {"file": c.request.fmu.name, "model": c.description.model_name, "guid": c.description.guid}
-        | read_origin(c.description.path),
-        "binding": c.request.binding.name if c.request.binding else None,
-        "values": dict(c.request.values),
-        "study_values": dict(c.request.study_values),
-        "black_box": c.request.black_box,
-        "pod": test.pod,
-        "pod_source": test.controllers.source,
-        "pod_values": dict(test.controllers.settings),
+        "format": NORM, "norm": c.code.source, "tool": f"gfor-cosim {version('gfor-cosim')}", "verdict": c.verdict,
+        "passed": c.passed, "sentence": c.sentence(), "missing": list(missing),
+        "judged": f"{len(REACTANCES) - len(missing)} of {len(REACTANCES)}", "departures": list(c.request.departures),
+        "details": c.details.texts(), "fmu": {
+            "file": c.request.fmu.name, "model": c.description.model_name, "guid": c.description.guid,
+            **read_origin(c.description.path)},
+        "binding": c.request.binding.name if c.request.binding else None, "values": dict(c.request.values),
+        "study_values": dict(c.request.study_values), "black_box": c.request.black_box,
+        "pod": test.pod, "pod_source": test.controllers.source, "pod_values": dict(test.controllers.settings),
         "parameters": [asdict(row) for row in parameter_rows(c)],
         "acceptance": None if c.acceptance is None else dict(c.acceptance.report),
-        "signal": test.signal,
-        "event_time": test.event_time,
-        "linearised": linearised_of(c),
-        "fit_errors": fit_errors_of(c),
-        "environment": environment(),
-        "points": [_point_json(c, v) for v in c.verdicts],
-    }
+        "signal": test.signal, "event_time": test.event_time, "linearised": linearised_of(c),
+        "fit_errors": fit_errors_of(c), "environment": environment(), "points": [_point_json(c, v) for v in c.verdicts],
+    }  # fmt: skip
 
 
 def _point_json(c: Certificate, v: PointVerdict) -> dict[str, Any]:
@@ -190,12 +176,10 @@ def _figures(value: complex) -> dict[str, float]:
 def time_json(time: TimeVerdict) -> dict[str, Any]:
     modal = [_figures(m.eigenvalue) | {"amplitude": m.amplitude} for m in time.modal.modes]
     return {
-        "signal": time.signal,
-        "accepted": time.accepted,
-        "swings": _swings_json(time.swings),
+        "signal": time.signal, "accepted": time.accepted, "swings": _swings_json(time.swings),
         "swings_with_first_extremum": _swings_json(time.other_reading),
         "modal": {"accepted": time.modal.accepted, "reason": time.modal.reason, "modes": modal},
-    }
+    }  # fmt: skip
 
 
 def _swings_json(test: SwingTest) -> dict[str, Any]:
@@ -223,11 +207,8 @@ def damping_responses(c: Certificate, test: DampingTest) -> xr.Dataset:
                 signal = c.results[scenario, X_L].signals.get(name, np.empty(0))
                 values[i, k, : len(signal)] = signal
         unit = next(p.units[name] for p in c.results.values() if name in p.units)
-        data[name] = (
-            ("scenario", "X_L", "time"),
-            values.astype(np.float32 if name != test.signal else float),
-            {"units": unit},
-        )
+        kept = values if name == test.signal else values.astype(np.float32)
+        data[name] = (("scenario", "X_L", "time"), kept, {"units": unit})
     coordinates = {"scenario": scenarios, "X_L": ("X_L", reactances, {"units": "pu"}),
                    "time": ("time", whole.times, {"units": "s"})}  # fmt: skip
     return xr.Dataset(data, coords=coordinates, attrs={"source": "gfor certify"})

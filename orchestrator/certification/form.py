@@ -116,10 +116,8 @@ def check_form(file: Path, content: Any) -> None:
     kind = content.get("format") if isinstance(content, dict) else None
     form = _FORMS.get(kind) if isinstance(kind, int | str) else None
     if form is None:
-        raise InputError(
-            f"{file}: it is no certificate of format {NORM} or {CODE} (found: {kind}); older ones hold too little to "
-            "be verified, make it anew with `gfor certify`"
-        )
+        raise InputError(f"{file}: it is no certificate of format {NORM} or {CODE} (found: {kind}); older ones hold "
+                         "too little to be verified, make it anew with `gfor certify`")  # fmt: skip
     try:
         json.dumps(content, ensure_ascii=False).encode()
         form.model_validate(content)

@@ -27,6 +27,7 @@ from orchestrator.certification.files import JSON, read_record
 from orchestrator.certification.form import NORM
 from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.points_again import choose
+from orchestrator.certification.texts import TEXTS
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.recorder import Recorder
 from orchestrator.errors import CosimError, FmuFileError, InputError
@@ -41,11 +42,6 @@ from orchestrator.study.modes import running
 AFTER = 0.2  # an experiment ends so long after the first event of its row [s]
 _THINNED = 10  # steps between two reference results
 _REPEATED = 1e-9  # of its range, a coupled output may differ from that of the test
-_TEXT = (
-    "The row {row} until {after:g} s after its first event. Before each step the inputs are set to the row of the "
-    "stimuli at its time, and hold; references are outputs read after a step. The tolerance is relative to an output's "
-    "largest value."
-)
 
 
 @dataclass
@@ -88,15 +84,14 @@ def _files(row: str, prepared: PreparedScenario) -> dict[str, bytes]:
     size = np.ptp(tested, axis=0) + np.abs(tested).max(axis=0)
     if not np.all(np.abs(replay.coupled - tested) <= _REPEATED * size):
         worst = float(np.max(np.abs(replay.coupled - tested) / size))
-        raise CosimError(
-            f"--into: row {row}: with the same inputs the FMU alone answers otherwise than in the test, by {worst:.2g} "
-            "of an output's size, so that nobody could repeat it; look at `gfor fmu check`"
-        )
+        raise CosimError(f"--into: row {row}: with the same inputs the FMU alone answers otherwise than in the test, "
+                         f"by {worst:.2g} of an output's size, so that nobody could repeat it; look at `gfor fmu "
+                         "check`")  # fmt: skip
     description = _own(master.components[CONVERTER]).description
     names = {"Parameters": f"{row}.parameters.ssv", "Stimuli": f"{row}.stimuli.csv",
              "References": f"{row}.references.csv"}  # fmt: skip
     return {
-        f"{row}.exp": experiment(row, _TEXT.format(row=row, after=AFTER), steps * step, step, names),
+        f"{row}.exp": experiment(row, TEXTS["experiment"].format(row=row, after=AFTER), steps * step, step, names),
         names["Parameters"]: parameter_set(row, replay.parameters, description),
         names["Stimuli"]: as_csv(replay.stimuli),
         names["References"]: as_csv(replay.references),
@@ -130,16 +125,7 @@ def _replay(master: Master, inputs: Sequence[str], given: Numbers, outputs: Sequ
 
 FOLDER = "extra/org.gfor-cosim.certificates"
 _TESTED, _MANIFEST = f"{FOLDER}/tested.json", f"{LS_REF}/fmi-ls-manifest.xml"
-_PURPOSES = {
-    "json": ("application/json", "result", "Figures and verdict of the certificate, with hashes of all its files"),
-    "html": ("text/html", "report", "The certificate to read"),
-    "nc": ("application/x-netcdf", "result", "Responses that were judged"),
-    "toml": ("application/toml", "testcase", "System in which the FMU was tested"),
-    "pdf": ("application/pdf", "report", "The certificate to print"),
-    "csv": ("text/csv", "result", "Stimuli or reference results of an experiment"),
-    "ssv": ("application/x-ssp-parameter-set", "parameter", "Parameters of an experiment"),
-    "exp": ("application/x-ma-hs-experiments", "experiment/validation", "A row of the certificate up to its event"),
-}
+_PURPOSES = TEXTS["purposes"]
 _SIGNATURE = ("application/json", "signature", "SHA-256 of the FMU that was tested")
 
 
@@ -240,4 +226,5 @@ def _signature(tested: bytes) -> bytes:
 def _purpose(name: str) -> tuple[str, str, str]:
     if name == _TESTED:
         return _SIGNATURE
-    return _PURPOSES.get(name.rpartition(".")[2], ("application/octet-stream", "other", "File of the certificate"))
+    kind, purpose, words = _PURPOSES.get(name.rpartition(".")[2], _PURPOSES["other"])
+    return kind, purpose, words

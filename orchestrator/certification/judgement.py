@@ -93,9 +93,7 @@ class PointVerdict:
     def lowered(self) -> tuple[ModeVerdict, ...]:
         """Modes, judged or listed, whose damping is more than two points lower than without the converter."""
         every = (*self.modes, *self.neighbours)
-        return tuple(
-            m for m in every if m.before_percent is not None and m.before_percent - m.damping_percent > LOWERED
-        )
+        return tuple(m for m in every if (b := m.before_percent) is not None and b - m.damping_percent > LOWERED)
 
     def margins(self) -> list[CriterionMargin]:
         """Every mode that the norm asks 5 % of, the response, and whatever else the point is not accepted for."""
@@ -132,9 +130,8 @@ def watched(pod: str) -> str:
     return FREQUENCY if "p" in pod.removeprefix("none") else POWER
 
 
-def judge(
-    having: PointResult, lacking: PointResult, pod: str, event_time: float, known: Sequence[ModeVerdict] | None = None
-) -> PointVerdict:
+def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float,
+          known: Sequence[ModeVerdict] | None = None) -> PointVerdict:  # fmt: skip
     """All criteria at one reactance, from the system with and without the converter.
 
     ``known``: Which mode is which without the converter; None where the modes' shapes are to tell it."""
@@ -170,10 +167,9 @@ def _wrong(having: PointResult, pod: str, event_time: float) -> list[str]:
     wrong = []
     power = float("nan") if having.power is None else having.power
     if not abs(power - RATED_POWER) <= _SAME_POWER * RATED_POWER:
-        wrong.append(
-            f"the converter feeds in {power:.4g} MW at the start and not {RATED_POWER:g} MW, so that it is not the "
-            "norm's study; check whether it is connected, its rating, and what the binding makes of its current"
-        )
+        wrong.append(f"the converter feeds in {power:.4g} MW at the start and not {RATED_POWER:g} MW, so that it is "
+                     "not the norm's study; check whether it is connected, its rating, and what the binding makes of "
+                     "its current")  # fmt: skip
     for name, values in having.signals.items():
         if not np.isfinite(values).all():
             at = having.times[int(np.argmax(~np.isfinite(values)))]
@@ -192,16 +188,11 @@ def _idle(having: PointResult, pod: str, letter: str) -> str | None:
     moved = float(np.ptp(values))
     moves, named = moved > _LEAST_MOVEMENT, letter in pod.removeprefix("none")
     if named and not moves:
-        return f"POD-{letter.upper()} is said to be active, and {name} {_small(moved, values)}: it does nothing"
+        little = f"moves by {moved:.2g} pu, less than {_LEAST_MOVEMENT:g} pu" if moved else f"stays at {values[0]:g}"
+        return f"POD-{letter.upper()} is said to be active, and {name} {little}: it does nothing"
     if moves and not named:
         return f"POD-{letter.upper()} is said to be off, and {name} moves: it is active"
     return None
-
-
-def _small(moved: float, values: Numbers) -> str:
-    if moved == 0:
-        return f"stays at {values[0]:g}"
-    return f"moves by {moved:.2g} pu, less than {_LEAST_MOVEMENT:g} pu"
 
 
 def judge_response(point: PointResult, signal: str, event_time: float) -> TimeVerdict | None:
@@ -209,9 +200,8 @@ def judge_response(point: PointResult, signal: str, event_time: float) -> TimeVe
         return None
     times, y = point.times, slow_part(point.times, point.signals[signal])
     with_first = swing_test(times, y, event_time, drop_first=False)
-    return TimeVerdict(
-        signal, swing_test(times, y, event_time), with_first, modal_test(times, y, event_time + SETTLING)
-    )
+    modal = modal_test(times, y, event_time + SETTLING)
+    return TimeVerdict(signal, swing_test(times, y, event_time), with_first, modal)
 
 
 LARGEST_DEVIATION = 2.5
@@ -224,19 +214,17 @@ A mode of 0.1 Hz with 5 % of damping, the slowest and least damped that the norm
 """
 
 
-def motion_faults(
-    times: Numbers, signals: Mapping[str, Numbers], event_time: float, findings: Sequence[Mapping[str, Any]] = ()
-) -> Iterator[str]:
+def motion_faults(times: Numbers, signals: Mapping[str, Numbers], event_time: float,
+                  findings: Sequence[Mapping[str, Any]] = ()) -> Iterator[str]:  # fmt: skip
     """Loss of synchronism, or no rest: a converter that slips or never stops swinging is not accepted."""
     yield from (str(finding["message"]) for finding in findings if finding["kind"] in UNSTABLE)
     frequency = signals.get(FREQUENCY)
     if frequency is not None and len(times) > 1:
         far = np.abs(frequency - frequency[0]) > LARGEST_DEVIATION
         if far.any():
-            yield (
-                f"{FREQUENCY} goes from {frequency.min():.4g} to {frequency.max():.4g} Hz, first more than "
-                f"{LARGEST_DEVIATION:g} Hz from its start at t = {times[int(np.argmax(far))]:g} s: synchronism is lost"
-            )
+            yield (f"{FREQUENCY} goes from {frequency.min():.4g} to {frequency.max():.4g} Hz, first more than "
+                   f"{LARGEST_DEVIATION:g} Hz from its start at t = {times[int(np.argmax(far))]:g} s: synchronism is "
+                   "lost")  # fmt: skip
     for name in (POWER, FREQUENCY):
         if name in signals and len(times) > 1:
             yield from _late_swing(times, name, signals[name], event_time)
@@ -256,8 +244,6 @@ def _late_swing(times: Numbers, name: str, signal: Numbers, event_time: float) -
     drift = np.polyval(np.polyfit(times[last] - begin, signal[last], 1), times[last] - begin)
     late, early = float(np.ptp(signal[last] - drift)), float(np.ptp(signal[first]))
     if late > LATE_SWING * early:
-        yield (
-            f"{name} still swings by {late:.3g} from peak to peak from t = {begin:.3g} s to the end, and by "
-            f"{early:.3g} in the first {SLOWEST_PERIOD:g} s after the event: more than {LATE_SWING:g} of it, so that "
-            "it does not come to rest"
-        )
+        yield (f"{name} still swings by {late:.3g} from peak to peak from t = {begin:.3g} s to the end, and by "
+               f"{early:.3g} in the first {SLOWEST_PERIOD:g} s after the event: more than {LATE_SWING:g} of it, so "
+               "that it does not come to rest")  # fmt: skip

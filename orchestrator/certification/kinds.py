@@ -42,6 +42,7 @@ class Parts:
     # the module that judges them again: ``rebuilt``, ``faults``, ``choose``, ``tasks`` and ``compare``
     again: Any
     compute: Callable[[Any], Any]
+    later: Callable[[Content], tuple[str, ...]] = lambda _: ()  # those that the version that issued a record had not
 
     def chosen(self, folder: Path, content: Content, wanted: Sequence[Any], *, every: bool) -> list[Any]:
         """Line reactances, or names of rows; ``wanted``: those that were asked for."""
@@ -49,14 +50,12 @@ class Parts:
         if wanted and named != (self is ROWS):
             kind = "a grid code" if self is ROWS else "a damping test"
             given = "--rows" if named else "--points"
-            raise InputError(
-                f"{given}: {folder} is the certificate of {kind}, which has {self.one}s; give {self.option}"
-            )
+            raise InputError(f"{given}: {folder} is the certificate of {kind}, which has {self.one}s; give "
+                             f"{self.option}")  # fmt: skip
         return list(self.again.choose(content, wanted, every=every))
 
-    def verify(
-        self, folder: Path, content: Content, chosen: Sequence[Any], executor: Executor, report: CountReport = nobody
-    ) -> Verification:
+    def verify(self, folder: Path, content: Content, chosen: Sequence[Any], executor: Executor,
+               report: CountReport = nobody) -> Verification:  # fmt: skip
         found = Verification()
         tasks = self.again.tasks(folder, content, chosen, found)
         with xr.open_dataset(folder / RESPONSES, engine="scipy") as data:
@@ -67,7 +66,7 @@ class Parts:
 
 
 POINTS = Parts("point", CertificatePointTask, "--points, with line reactances", points_again, compute_point)
-ROWS = Parts("row", BenchTask, "--rows, with their names", rows_again, compute_row)
+ROWS = Parts("row", BenchTask, "--rows, with their names", rows_again, compute_row, rows_again.later)
 
 
 def parts_of(content: Content) -> Parts:
@@ -132,16 +131,17 @@ class CertifyRequest:
         option=None,
     )  # fmt: skip
     pod: str | None = asked(
-        one_of(PODS), None, "damping controllers that are to be active: set in the FMU where it has pod_p.enabled and "
-        "pod_q.enabled, else declared by the applicant (default: as the FMU shows them)", f"{{{','.join(PODS)}}}",
+        one_of(PODS), None, "of nts631: damping controllers that are to be active: set in the FMU where it has "
+        "pod_p.enabled and pod_q.enabled, else declared by the applicant (default: as the FMU shows them)",
+        f"{{{','.join(PODS)}}}",
         python=f"active damping controllers, one of {', '.join(PODS)}; as the FMU shows them by default",
     )  # fmt: skip
     reactances: Sequence[float] | None = asked(
-        FieldKind("X,X,…", read_reactances, _reactances), None, "line reactances X_L [pu] (default: the norm's 13, "
-        "0.01 and 0.05 to 0.60; less is incomplete)", python="line reactances of the damping test [pu]; the norm's 13 "
-        "by default, less is incomplete",
+        FieldKind("X,X,…", read_reactances, _reactances), None, "of nts631: line reactances X_L [pu] (default: "
+        "the norm's 13, 0.01 and 0.05 to 0.60; less is incomplete)",
+        python="line reactances of the damping test [pu]; the norm's 13 by default, less is incomplete",
     )  # fmt: skip
-    black_box: bool = asked(FLAG, False, "do not use the converter's states for the modes, even if it shows them")
+    black_box: bool = asked(FLAG, False, "of nts631: do not use the converter's states for the modes")
     check: bool = asked(FLAG, True, "whether the acceptance tests of the FMU are run", option=None)
     folder: str | Path | None = asked(
         FILE, None, "for the certificate; ``results/certify_<file>[_<code>]`` by default. Points that are there are "

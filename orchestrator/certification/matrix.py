@@ -15,6 +15,7 @@ from orchestrator.certification.codes.needs_record import NEEDS_HTML, NEEDS_JSON
 from orchestrator.certification.environment import environment
 from orchestrator.certification.files import HTML, JSON
 from orchestrator.certification.margins import CriterionMargin, margin_text, narrowest
+from orchestrator.certification.texts import TEXTS
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, NOT_TRUSTED, PASSES, exit_code
 from orchestrator.errors import InputError
 from orchestrator.fmi.values import as_text
@@ -106,10 +107,7 @@ WORST_FIRST = (exit_code(FAILS, refused=False), InputError.exit_code, exit_code(
 FORMAT = "matrix-1"  # form of the JSON
 MATRIX_HTML, MATRIX_JSON = "matrix.html", "matrix.json"
 
-READING = (
-    "A margin is the distance from a criterion's limit in parts of that limit, negative on the bad side. Criteria ask "
-    "for different things: margins order the criteria of one device, and compare devices at one criterion."
-)
+READING = TEXTS["matrix"]
 
 
 def save_matrix(matrix: CertificateMatrix, devices: Sequence[Device], folder: Path) -> list[Path]:

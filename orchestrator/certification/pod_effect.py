@@ -39,9 +39,8 @@ def kept_off(stated: Mapping[str, Any]) -> dict[str, Any]:
     return {"off": np.array([complex(*x) for x in stated["modes_off"]]), "swings": np.array(named, dtype=complex)}
 
 
-def with_pod(
-    verdicts: Sequence[PointVerdict], points: Mapping[Any, PointResult], controllers: DampingControllers, event: float
-) -> list[PointVerdict]:
+def with_pod(verdicts: Sequence[PointVerdict], points: Mapping[Any, PointResult], controllers: DampingControllers,
+             event: float) -> list[PointVerdict]:  # fmt: skip
     """The verdicts with what the active controllers change.
 
     They have to damp where the mode needs it most, and in the response as at the eigenvalues."""

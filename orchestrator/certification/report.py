@@ -1,10 +1,8 @@
 """The report on a damping test as one HTML page, with every figure that a person needs to check it by hand."""
 
-import tomllib
 from collections.abc import Mapping
 from datetime import datetime
 from html import escape
-from pathlib import Path
 
 from orchestrator.binding.binding import read_table
 from orchestrator.certification.case_file import BINDING, FMU, WITH
@@ -14,14 +12,12 @@ from orchestrator.certification.environment import environment
 from orchestrator.certification.figures import commands, parameter_rows
 from orchestrator.certification.point import FREQUENCY
 from orchestrator.certification.report_criteria import damping_chapters, damping_findings, told_of_damping
+from orchestrator.certification.texts import TEXTS
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES
 from orchestrator.fmi.archive import read_origin
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.fmi.values import Scalar, as_text
 from orchestrator.report.html.elements import Figures, document, listed, table
-
-_TEXTS: dict[str, str] = tomllib.loads(Path(__file__).with_name("texts.toml").read_text(encoding="utf-8"))
-
 
 _LINE = '<span class="blank"></span>'  # A line to be filled in by hand
 
@@ -120,7 +116,7 @@ def provenance(c: Certificate, hashes: Hashes) -> str:
     return (
         f"{machine}{files}<p>{worst}Any {'row' if c.damping is None else 'point'} can be computed again in the folder "
         f"of this page; the case file holds every value that was set. For {escape(first.name)}:</p>"
-        f"<ul>{named}</ul>{_TEXTS['integrity']}"
+        f"<ul>{named}</ul>{TEXTS['integrity']}"
         f"<details data-print><summary>Case file</summary><pre>{text}</pre></details>"
     )
 
@@ -129,10 +125,10 @@ def page(c: Certificate, hashes: Hashes, made: datetime) -> str:
     figures, test = Figures(), c.damping
     own = row_chapters(c, figures) if test is None else damping_chapters(c, test, figures)
     watched = "by_frequency" if test and test.signal == FREQUENCY else "by_power"
-    readings = [text.replace("{watched}", _TEXTS[watched]) for text in c.code.readings]
+    readings = [text.replace("{watched}", TEXTS[watched]) for text in c.code.readings]
     content = [
         ("For whom and by whom", details(c)),
-        ("What was tested", converter(c, hashes) + (_TEXTS["study"] if test else "")),
+        ("What was tested", converter(c, hashes) + (TEXTS["study"] if test else "")),
         *own,
         ("Acceptance tests of the FMU", acceptance(c)),
         ("Parameters of the FMU", parameters(c)),

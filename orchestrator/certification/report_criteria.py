@@ -67,14 +67,20 @@ def converter_model(points: Iterable[PointResult]) -> str:
     if boxes:
         orders = ", ".join(dict.fromkeys(str(p.identified) for p in boxes))
         error = max(p.fit_errors.get(CONVERTER, 0.0) for p in boxes)
-        return (
-            f"Black box: a model identified at its port, of order {orders}; largest relative fitting error {error:.1e}"
-        )
+        return (f"Black box: a model identified at its port, of order {orders}; largest relative fitting error "
+                f"{error:.1e}")  # fmt: skip
     if any(p.linearised.get(CONVERTER) == PACKED for p in known):
-        return (
-            "The model packed in the FMU stands for the converter in the modes; it was compared with its own response"
-        )
+        return ("The model packed in the FMU stands for the converter in the modes; it was compared with its own "
+                "response")  # fmt: skip
     return "White box: the FMU's own states were perturbed" if known else "Modes of the converter are not known"
+
+
+_MODE = ("λ [rad/s]", "f [Hz]", "Damping [%]")
+
+
+def _mode(value: complex) -> list[str]:
+    hz = f"{value.imag / (2 * np.pi):.4f}"
+    return [eigenvalue(value.real, value.imag), hz, damping(100 * damping_ratio(value))]
 
 
 def before(value: complex | None) -> str:
@@ -107,12 +113,10 @@ def eigenvalues(c: Certificate, figures: Figures) -> str:
     parts = [f"<p>{link} shows the modes; the tables below hold them all.</p>{picture}"]
     for v in c.verdicts:
         rows = [
-            [eigenvalue(m.eigenvalue.real, m.eigenvalue.imag), f"{m.frequency_hz:.4f}", damping(m.damping_percent),
-             f"{before(m.before)} {escape(m.doubt)}", f"{m.similarity:.2f}", escape(m.components), verdict(m.accepted)]
-            for m in v.modes
+            [*_mode(m.eigenvalue), f"{before(m.before)} {escape(m.doubt)}", f"{m.similarity:.2f}",
+             escape(m.components), verdict(m.accepted)] for m in v.modes
         ]  # fmt: skip
-        columns = ["λ [rad/s]", "f [Hz]", "Damping [%]", "Same mode without the converter", "Likeness"]
-        columns += ["Who takes part", "Verdict"]
+        columns = [*_MODE, "Same mode without the converter", "Likeness", "Who takes part", "Verdict"]
         summary = f"X_L = {v.X_L:g} pu: {len(rows)} modes from 0.1 to 1.5 Hz"
         modes = table(f"Modes at X_L = {v.X_L:g} pu", columns, rows)
         content = f"{modes}{_modes_beside(v)}{_base_modes(c, v)}"
@@ -121,11 +125,8 @@ def eigenvalues(c: Certificate, figures: Figures) -> str:
 
 
 def _modes_beside(v: PointVerdict) -> str:
-    rows = [
-        [eigenvalue(m.eigenvalue.real, m.eigenvalue.imag), f"{m.frequency_hz:.4f}", damping(m.damping_percent),
-         before(m.before), escape(m.components)] for m in v.neighbours
-    ]  # fmt: skip
-    columns = ["λ [rad/s]", "f [Hz]", "Damping [%]", "Same mode without the converter", "Who takes part"]
+    rows = [[*_mode(m.eigenvalue), before(m.before), escape(m.components)] for m in v.neighbours]
+    columns = [*_MODE, "Same mode without the converter", "Who takes part"]
     caption = f"Just outside, from {COMPUTED[0]:g} to 0.1 Hz and from 1.5 to {COMPUTED[1]:g} Hz: not judged"
     return table(caption, columns, rows) if rows else f'<p class="soft">{caption}: none.</p>'
 
@@ -135,15 +136,11 @@ def _base_modes(c: Certificate, v: PointVerdict) -> str:
     if point.modes is None:
         return ""
     entries = zip(point.modes.eigenvalues.tolist(), point.components, strict=True)
-    rows = [
-        [eigenvalue(x.real, x.imag), f"{x.imag / (2 * np.pi):.4f}", damping(100 * damping_ratio(x)), escape(words)]
-        for x, words in entries
-        if is_near(x.imag / (2 * np.pi))
-    ]
+    rows = [[*_mode(x), escape(words)] for x, words in entries if is_near(x.imag / (2 * np.pi))]
     caption = f"Without the converter, from {PAIRED[0]:g} to {PAIRED[1]:g} Hz"
     said = v.of_base_critical()
     note = f"<p>{escape(said[0].upper() + said[1:])}.</p>" if said else ""
-    return table(caption, ["λ [rad/s]", "f [Hz]", "Damping [%]", "Who takes part"], rows) + note
+    return table(caption, [*_MODE, "Who takes part"], rows) + note
 
 
 def _response(c: Certificate, v: PointVerdict, test: DampingTest, figures: Figures) -> Iterator[str]:
@@ -209,12 +206,9 @@ def _swing_table(time: TimeVerdict, unit: str) -> str:
 
 
 def _modal_table(time: TimeVerdict) -> str:
-    rows = [
-        [eigenvalue(m.eigenvalue.real, m.eigenvalue.imag), f"{m.frequency_hz:.4f}", damping(m.damping_percent),
-         f"{m.amplitude:.3g}"] for m in time.modal.modes
-    ]  # fmt: skip
-    columns = ["λ [rad/s]", "f [Hz]", "Damping [%]", "Amplitude"]
-    return table("Modes in the signal from 0.1 to 1.5 Hz (matrix pencil)", columns, rows) if rows else ""
+    rows = [[*_mode(m.eigenvalue), f"{m.amplitude:.3g}"] for m in time.modal.modes]
+    caption = "Modes in the signal from 0.1 to 1.5 Hz (matrix pencil)"
+    return table(caption, [*_MODE, "Amplitude"], rows) if rows else ""
 
 
 def _overview(c: Certificate) -> str:
@@ -255,10 +249,8 @@ def _remark(c: Certificate) -> Iterator[str]:
         worst, X_L = min(lowered, key=lambda entry: entry[0].damping_percent)
         places = ", ".join(f"{X:g}" for X in dict.fromkeys(X for _, X in lowered))
         change = f"from {number(worst.before_percent or 0.0, 2)} to {damping(worst.damping_percent)} %"
-        yield (
-            f"<b>Remark: the converter lowers a damping by more than {LOWERED:g} points at X_L = {places} pu</b>; the "
-            f"lowest of them at {X_L:g} pu and {worst.frequency_hz:.3f} Hz, {change}"
-        )
+        yield (f"<b>Remark: the converter lowers a damping by more than {LOWERED:g} points at X_L = {places} pu</b>; "
+               f"the lowest of them at {X_L:g} pu and {worst.frequency_hz:.3f} Hz, {change}")  # fmt: skip
 
 
 def _where(bad: list[PointVerdict]) -> str:

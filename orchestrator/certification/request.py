@@ -37,9 +37,8 @@ class CertificationRequest:
         """Check that the files exist, and that no value is set which the norm itself varies."""
         for file in (self.fmu, *([self.binding] if self.binding else [])):
             if not file.is_file():
-                raise InputError(
-                    f"{file}: there is no such file; give the path of an .fmu, and with --binding of a .toml"
-                )
+                raise InputError(f"{file}: there is no such file; give the path of an .fmu, and with --binding of a "
+                                 ".toml")  # fmt: skip
             if not file.name.isascii() and file.name != file.name.encode(errors="replace").decode():
                 raise InputError(f"{str(file)!a}: its name is not UTF-8, so that no report can state it; rename it")
         if "grid.X_L" in self.study_values:

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.certification.case_file import BINDING, FMU
-from orchestrator.certification.compared import Content, Verification, faults_of
+from orchestrator.certification.compared import THIS, Content, Verification, faults_of, issued_by
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, figures_of, read_record, seal_of
 from orchestrator.certification.form import case_files, check_form
 from orchestrator.certification.kinds import Parts, parts_of, rebuilt
+from orchestrator.certification.verdict import INCOMPLETE, PASSES
 from orchestrator.errors import InputError
 from orchestrator.late import xr
 from orchestrator.points.executor import Executor
@@ -27,9 +28,8 @@ def read_certificate(path: Path) -> tuple[Path, dict[str, Any]]:
     try:
         content = read_record(file)
     except OSError as error:
-        raise InputError(
-            f"{file}: the certificate cannot be read: {error.strerror}; give the folder that `gfor certify` wrote"
-        ) from error
+        raise InputError(f"{file}: the certificate cannot be read: {error.strerror}; give the folder that `gfor "
+                         "certify` wrote") from error  # fmt: skip
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file}: it is not JSON: {error}; give the certificate.json of `gfor certify`") from error
     check_form(file, content)
@@ -95,6 +95,13 @@ class Verified(Verification):
     parts: Parts
     chosen: list[Any]
     computed: list[Any]
+    later: tuple[str, ...]  # rows that the table had not in the version that issued the certificate
+
+    @property
+    def verdict(self) -> str:
+        """The record's; what passed is incomplete where the table has more rows by now."""
+        stated = str(self.content["verdict"])
+        return INCOMPLETE if self.later and stated == PASSES else stated
 
 
 def verified(
@@ -110,8 +117,12 @@ def verified(
     files = verify_files(folder, content)
     found = Verified(
         faults=files.faults, agreed=files.agreed, content=content, parts=parts, chosen=chosen,
-        computed=chosen if files.holds else [],
+        computed=chosen if files.holds else [], later=parts.later(content),
     )  # fmt: skip
+    if found.later:
+        found.agreed.append(f"issued by gfor-cosim {issued_by(content)}, whose table had not "
+                            f"{', '.join(found.later)}: this version, {THIS}, judges {len(found.later)} more; "
+                            "certify anew to have that judged")  # fmt: skip
     if found.computed:
         with closing(executor([parts.task.__module__])) as workers:
             again = parts.verify(folder, content, chosen, workers, report)

@@ -17,7 +17,7 @@ from orchestrator.certification.acceptance import read_checks, run_checks
 from orchestrator.certification.certificate import Certificate, DampingTest
 from orchestrator.certification.codes import frequency_domain
 from orchestrator.certification.codes.all_codes import NTS631
-from orchestrator.certification.codes.row import checked
+from orchestrator.certification.codes.row import checked, in_words, like
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
 from orchestrator.certification.details import Details, read_details
 from orchestrator.certification.files import JSON, save
@@ -128,7 +128,16 @@ def _figures(v: PointVerdict) -> Iterator[str]:
 
 
 GB, ALL = "gb", "all"
-CODE_NAMES = (*WITH_VERDICT, GB, ALL)  # what ``--code`` takes
+_CODES = (*WITH_VERDICT, GB)
+LISTED = ", ".join(map(in_words, _CODES))  # as the help of ``--code`` names them
+
+
+def read_code(text: str) -> str:
+    """What ``--code`` takes: a code's name, or all of them."""
+    if text in (*_CODES, ALL):
+        return text
+    near = " or ".join(like(text, _CODES))
+    raise ValueError(f"{text!r} is no code; {f'did you mean {near}?' if near else f'give one of {LISTED}, or {ALL}'}")
 
 
 def codes_of(asked: str) -> tuple[str, ...]:
@@ -160,9 +169,8 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
 def check_code_options(options: argparse.Namespace, devices: Sequence[Device]) -> None:
     asked = {"--pod": options.pod, "--black-box": options.black_box, "--reactances": options.reactances}
     if other := [name for name, value in asked.items() if value]:
-        raise InputError(
-            f"{', '.join(other)}: only --code {NTS631} has it; leave it out, and set a damping controller by --set"
-        )
+        raise InputError(f"{', '.join(other)}: only --code {NTS631} has it; leave it out, and set a damping "
+                         "controller by --set")  # fmt: skip
     if study := [name for device in devices for name in device.values if name.split(".")[0] in STUDY]:
         raise InputError(f"--set {study[0]}: the test bench has no such component; give values of the converter only")
 

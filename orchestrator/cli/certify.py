@@ -7,14 +7,14 @@ from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.details import TEMPLATE
 from orchestrator.certification.kinds import CertifyRequest
 from orchestrator.cli.arguments import add_executor_arguments, add_options, add_request_arguments
-from orchestrator.cli.certificate import ALL, CODE_NAMES, GB, codes_of, run_one, run_stiffness
+from orchestrator.cli.certificate import ALL, GB, LISTED, codes_of, read_code, run_one, run_stiffness
 from orchestrator.cli.certify_matrix import run_matrix
 from orchestrator.cli.certify_sensitivities import add_sensitivity_arguments, check_sensitivity_options
 from orchestrator.errors import INTERRUPTED, InputError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "certify", codes=CODE_NAMES, INTERRUPTED=INTERRUPTED)
+    add_options(parser, "certify", code=read_code, listed=LISTED, INTERRUPTED=INTERRUPTED)
     add_options(parser.add_mutually_exclusive_group(), "certify checks")
     add_request_arguments(parser, CertifyRequest)
     add_executor_arguments(parser)
@@ -22,13 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the tests, write their reports and print the verdicts.
-
-    Returns
-    -------
-    0 where the converter passes, 1 where it fails, 3 where the test is incomplete, 4 where it passes and an acceptance
-    test of the FMU failed; of several certificates as `CertificateMatrix.exit_code`.
-    """
+    """Run the tests, write their reports and print the verdicts; returns the exit code that the help tells."""
     if options.details_template:
         print(TEMPLATE, end="")
         return 0

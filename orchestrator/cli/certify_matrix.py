@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
@@ -28,7 +27,7 @@ from orchestrator.cli.certificate import ALL, GB, certified, check_code_options,
 from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.terminal import make_console, make_errors, print_json
 from orchestrator.errors import InputError
-from orchestrator.points.failure import Failure, failure_kept
+from orchestrator.points.failure import failure_kept
 from orchestrator.report.tables import PlainTable, make_table
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
@@ -46,10 +45,8 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     if set(codes) - {NTS631}:
         check_code_options(options, devices)
     if several and options.check:
-        raise InputError(
-            f"--check {options.check}: a report of `gfor fmu check` is of one FMU, and there are {len(devices)}; leave "
-            "it out to have the tests run, or give --no-check"
-        )
+        raise InputError(f"--check {options.check}: a report of `gfor fmu check` is of one FMU, and there are "
+                         f"{len(devices)}; leave it out to have the tests run, or give --no-check")  # fmt: skip
     folder = options.out or Path("results") / f"certify_{'matrix' if several else devices[0].name}"
     made_folder(folder, "--out")
     console = make_console(stderr=options.json)
@@ -77,9 +74,8 @@ def run_matrix(options: argparse.Namespace, devices: Sequence[Device]) -> int:
     return matrix.exit_code
 
 
-def _tested(
-    options: argparse.Namespace, device: Device, key: str, folder: Path, place: str, console: Console, *, several: bool
-) -> MatrixCell:
+def _tested(options: argparse.Namespace, device: Device, key: str, folder: Path, place: str, console: Console, *,
+            several: bool) -> MatrixCell:  # fmt: skip
     """One device under one code; what cannot be tested says why, and the others go on.
 
     The acceptance tests of a device are run for its first certificate; ``options`` of the device remember them."""
@@ -112,16 +108,11 @@ def _take_needs(
     """Find the needs of failed criteria; where that fails, the certificate stands."""
     if not options.json:
         console.print(escape(f"{cell.device}, {cell.code}:"), highlight=False)
-    note = _Note()
+    note = MatrixCell(cell.device, cell.code, cell.folder)
     with failure_kept(note):
         cell.has_needs = find_needs(options, found, folder, console) is not None
     if note.failure is not None:
         make_errors().print(f"[yellow]no sensitivities:[/] {escape(f'{cell.device}, {cell.code}: {note.failure}')}")
-
-
-@dataclass
-class _Note:
-    failure: Failure | None = None
 
 
 def _check_any(matrix: CertificateMatrix) -> None:

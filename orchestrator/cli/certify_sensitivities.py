@@ -43,12 +43,7 @@ def check_sensitivity_options(options: argparse.Namespace, codes: Sequence[str],
 def find_needs(
     options: argparse.Namespace, certificate: Certificate, folder: Path, console: Console
 ) -> dict[str, Any] | None:
-    """Run what failed rows would take, and write and print it.
-
-    Returns
-    -------
-    All figures; None where no row fails.
-    """
+    """Run what failed rows would take, and write and print it; returns all figures, None where no row fails."""
     change = CHANGE if options.change is None else options.change
     plan = plan_changes(certificate, folder, options.parameter, fixed=options.fixed, change=change)
     if not plan.rows:

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from orchestrator.certification.codes.all_codes import NTS631
-from orchestrator.certification.compared import TOLERANCE, TOLERANCE_IDENTIFIED
+from orchestrator.certification.compared import THIS, TOLERANCE, TOLERANCE_IDENTIFIED, issued_by
 from orchestrator.certification.inside import laid_out
 from orchestrator.certification.kinds import POINTS
 from orchestrator.certification.request import read_reactances
@@ -30,12 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Verify and print.
-
-    Returns
-    -------
-    The exit code of the certificate's verdict where it holds, else 5.
-    """
+    """Verify and print; returns the exit code of the certificate's verdict where it holds, else 5."""
     with laid_out(options.certificate) as places:
         found = [_verified(options, place) for place in places]
     if options.json:
@@ -56,13 +51,13 @@ def _verified(options: argparse.Namespace, place: Path) -> tuple[dict[str, Any],
         )  # fmt: skip
     content, norm = found.content, found.parts is POINTS
     said = {"holds": found.holds, "verdict": content["verdict"], **({"points": content["judged"]} if norm else {}),
-            "passes": found.holds and content["verdict"] == PASSES, "faults": found.faults,
-            "agreed": found.agreed, "computed": found.computed}  # fmt: skip
+            "passes": found.holds and found.verdict == PASSES, "faults": found.faults,
+            "agreed": found.agreed, "computed": found.computed, "later_rows": list(found.later)}  # fmt: skip
     if not options.json:
         if place != options.certificate:
             console.print(escape(f"{content['title']}:"), highlight=False)
         _show(found, console, norm=norm)
-    code = exit_code(content["verdict"], refused=_refused(content)) if found.holds else DOES_NOT_HOLD
+    code = exit_code(found.verdict, refused=_refused(content)) if found.holds else DOES_NOT_HOLD
     return said | ({"code": content.get("code", NTS631)} if place != options.certificate else {}), code
 
 
@@ -82,18 +77,23 @@ def _show(found: Verified, console: Console, *, norm: bool) -> None:
         console.print(f"{len(found.computed)} of {len(every)} {one}s were computed anew; --all takes every one.")
     if found.holds:
         console.print("The certificate holds. That is no proof of who made it: hashes guard against accidents only.")
-        console.print(_verdict(found.content, norm=norm), soft_wrap=True, highlight=False)
+        console.print(_verdict(found, norm=norm), soft_wrap=True, highlight=False)
     else:
         count = f"{len(found.faults)} disagreement{'' if len(found.faults) == 1 else 's'}"
         console.print(f"[bold red]The certificate does not hold: {count}.[/]")
+        if (issued := issued_by(found.content)) not in ("", THIS):
+            console.print(f"gfor-cosim {issued} issued it, and this is {THIS}, whose tables may ask for something "
+                          "else.")  # fmt: skip
 
 
 def _refused(content: Mapping[str, Any]) -> bool:
     return content["acceptance"] is not None and not content["acceptance"]["trusted"]
 
 
-def _verdict(content: Mapping[str, Any], *, norm: bool) -> str:
-    colour = "green" if content["verdict"] == PASSES and not _refused(content) else "red"
+def _verdict(found: Verified, *, norm: bool) -> str:
+    content = found.content
+    colour = "green" if found.verdict == PASSES and not _refused(content) else "red"
     judged = f", {escape(content['judged'])} line reactances of the norm judged" if norm else ""
     tail = "; acceptance tests of the FMU failed" if _refused(content) else ""
-    return f"Its verdict: [bold {colour}]{escape(content['verdict'])}[/]{judged}{tail}."
+    tail += f"; {', '.join(found.later)} was not in its table" if found.later else ""
+    return f"Its verdict: [bold {colour}]{escape(found.verdict)}[/]{judged}{tail}."

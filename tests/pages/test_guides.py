@@ -12,7 +12,7 @@ import pytest
 from tests.pages.markdown import ROOT, blocks
 
 DOCS = ROOT / ".docs"
-IN_A_CHECKOUT = ("how-to/add-an-exciter", "how-to/add-an-acceptance-check", "how-to/add-a-study")
+IN_A_CHECKOUT = ("how-to/add-an-exciter", "how-to/add-an-acceptance-check", "how-to/add-a-study", "how-to/add-a-code")
 HEAVY = ("how-to/use-your-own-fmu", "how-to/black-box", "how-to/write-a-controller-dll", "how-to/several-vendors")
 """Executed by night."""
 

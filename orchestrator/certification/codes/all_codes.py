@@ -10,6 +10,7 @@ from orchestrator.certification.codes import rte
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps, voltage, weakening
 from orchestrator.certification.codes.row import CodeRow, Declaration, GridCode, Judge, Row, checked
 from orchestrator.certification.request import REACTANCES, row_of
+from orchestrator.errors import InputError
 
 RATIOS = (10.0, 3.0, 2.0, 1.5, 1.25)
 """Short-circuit ratios, down from 20: MISO BPM-015 r32 appendix H, AEMO's test framework of January 2024."""
@@ -49,9 +50,8 @@ NONE, BACK, PARTS = 0.15, 1.5, 9  # TR 3.3.1: time at no voltage and of the prof
 AREAS = {"dk1": 0.85, "dk2": 0.9}  # voltage at that end, in the west and in the east [pu]
 
 
-def _jumps(
-    name: str, title: str, clause: str, scr: float, degrees: tuple[float, ...], *more: Judge, shown_only: bool = False
-) -> CodeRow:
+def _jumps(name: str, title: str, clause: str, scr: float, degrees: tuple[float, ...], *more: Judge,
+           shown_only: bool = False) -> CodeRow:  # fmt: skip
     """Jumps of the source's angle, after which all codes ask for the same; ``more``: what one asks besides."""
     criteria = (c.holds_together(), *more, c.settles(), c.returns())
     return CodeRow(name, title, clause, lambda f: jumps(scr, 0.5, degrees), criteria, shown_only=shown_only)
@@ -217,8 +217,8 @@ BY_DECLARATION: dict[str, tuple[Sequence[Declaration], Callable[[Mapping[str, fl
 
 
 def code_for(key: str, given: Mapping[str, object]) -> GridCode[CodeRow]:
-    if key in CODES:
-        checked((), given, key)
-        return CODES[key]
-    wanted, made = BY_DECLARATION[key]
-    return made(checked(wanted, given, key))
+    wanted, made = BY_DECLARATION.get(key) or ((), lambda _: CODES[key])
+    code = made(checked(wanted, given, key))
+    if code.fault:
+        raise InputError(code.fault)
+    return code

@@ -69,10 +69,8 @@ def write_row(
     return path
 
 
-def _plant(
-    request: CertificationRequest, description: FmuDescription, own: Mapping[str, Value], rating: float,
-    power: float, f_n: float,
-) -> dict[str, Any]:  # fmt: skip
+def _plant(request: CertificationRequest, description: FmuDescription, own: Mapping[str, Value], rating: float,
+           power: float, f_n: float) -> dict[str, Any]:  # fmt: skip
     values: dict[str, Any] = {"S_n": rating, "P_0": power, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
     bound = description.port.start if isinstance(description, BoundDescription) else {}
     known = {name: value for name, value in values.items() if name in description.variables or name in bound}

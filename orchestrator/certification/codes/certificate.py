@@ -10,7 +10,7 @@ from orchestrator.certification.case_file import lay_files
 from orchestrator.certification.certificate import Certificate, refusing
 from orchestrator.certification.codes.bench_point import BenchTask, compute_row, write_row
 from orchestrator.certification.codes.row import CodeRow, GridCode
-from orchestrator.certification.codes.row_verdict import judge_row
+from orchestrator.certification.codes.row_verdict import judge_row, try_criteria
 from orchestrator.certification.request import CertificationRequest, rated_frequency
 from orchestrator.points.executor import Executor
 from orchestrator.points.points import CountReport, Work, nobody
@@ -23,6 +23,7 @@ def certify_code(
 ) -> Certificate:  # fmt: skip
     request.check()
     f_n = rated_frequency(request, code.f_n)
+    try_criteria(code, f_n)
     chosen = [row for row in code.rows if not rows or row.name in rows]
     with refusing(request, folder, "on the test bench of `gfor certify --code`") as trial:
         _laid(request, chosen[:1], f_n, trial)

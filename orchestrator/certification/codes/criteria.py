@@ -75,7 +75,7 @@ def carries() -> Judge:
         if told := told_of(row.findings, PLANT):
             return _finding(CURRENT, rule, READING, told["mean"], ABOVE * told["declared"], str(told["message"]))
         size = np.hypot(row.p, row.signals["q"]) / np.maximum(row.signals["v"], 1e-3)
-        mean = over_a_period(size, row.times, row.f_n)[row.within(row.events[0], np.inf)]
+        mean = over_a_period(size, row.times, row.f_n)[row.within(row.event(0), np.inf)]
         lasts = min(len(mean), round(LASTS / float(row.times[1] - row.times[0])))
         held = float(np.lib.stride_tricks.sliding_window_view(mean, lasts).min(axis=1).max())
         return _finding(CURRENT, rule, READING, held, NO_LIMIT, f"{held:.3g} pu of its rating")
@@ -111,7 +111,7 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
     ``events``: Numbers of the events; all of them where empty."""
 
     def judge(row: MeasuredRow) -> RowFinding:
-        asked, worst, at = row.before(row.events[0]), 0.0, row.times[0]
+        asked, worst, at = row.before(row.event(0)), 0.0, row.times[0]
         for time in _chosen(row, events):
             end = row.until(time)
             begin = end - LOOK if within is None else time + within
@@ -125,7 +125,7 @@ def returns(name: str = "returns", within: float | None = None, tolerance: float
         return _finding(name, rule, CODE if of_code else READING, worst, tolerance, text)
 
     def bands(row: MeasuredRow) -> list[Band]:
-        asked = row.before(row.events[0])
+        asked = row.before(row.event(0))
         ends = [(time, row.until(time)) for time in _chosen(row, events)]
         spans = [(end - LOOK if within is None else time + within, end) for time, end in ends]
         return [_power_band(name, *span, asked - tolerance, asked + tolerance) for span in spans if span[0] < span[1]]
@@ -139,7 +139,7 @@ def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -
     ``sign``: +1 where the power has to rise: the source's angle falls."""
 
     def judge(row: MeasuredRow) -> RowFinding:
-        time = row.events[event]
+        time = row.event(event)
         change = sign * (row.mean_p[row.within(time, time + FIRST_SWING)] - row.before(time))
         peak = float(change.max(initial=-np.inf))
         rule = f"the power {'rises' if sign > 0 else 'falls'} by at least {least:g} pu (mean over a period)"
@@ -147,10 +147,9 @@ def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -
         return _finding(f"opposes the jump at {time:g} s", rule, origin, peak, least, f"{peak:.3f} pu", at_most=False)
 
     def bands(row: MeasuredRow) -> list[Band]:
-        time = row.events[event]
-        level = row.before(time) + sign * least
-        low, high = (level, None) if sign > 0 else (None, level)
-        return [_power_band("reached in the first swing after each jump", time, time + FIRST_SWING, low, high)]
+        time = row.event(event)
+        name = "reached in the first swing after each jump"
+        return [_beyond(name, time, time + FIRST_SWING, row.before(time) + sign * least, sign)]
 
     return Bounded(judge, bands)
 
@@ -167,7 +166,7 @@ def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -
     ``share``: Of the largest change in the first swing."""
 
     def judge(row: MeasuredRow) -> RowFinding:
-        time = row.events[event]
+        time = row.event(event)
         part = row.within(time, time + FIRST_SWING)
         change = sign * (_without_spikes(row)[part] - row.before(time))
         peak = float(change.max(initial=-np.inf))
@@ -184,17 +183,15 @@ def follows_droop(event: int, sign: int) -> Judge:
     """The settled power after a ramp lies on the side that a droop asks for."""
 
     def judge(row: MeasuredRow) -> RowFinding:
-        time = row.events[event]
+        time = row.event(event)
         end = row.until(time)
-        change = sign * (float(np.mean(row.mean_p[row.within(end - LOOK, end)])) - row.before(row.events[0]))
+        change = sign * (float(np.mean(row.mean_p[row.within(end - LOOK, end)])) - row.before(row.event(0)))
         rule = f"the settled power is {'higher' if sign > 0 else 'lower'} than at the start by {MOVED:g} pu or more"
         return _finding(f"droop after {time:g} s", rule, READING, change, MOVED, f"{change:.3f} pu", at_most=False)
 
     def bands(row: MeasuredRow) -> list[Band]:
-        end = row.until(row.events[event])
-        level = row.before(row.events[0]) + sign * MOVED
-        low, high = (level, None) if sign > 0 else (None, level)
-        return [_power_band("the droop's side at the end of each hold", end - LOOK, end, low, high)]
+        end, level = row.until(row.event(event)), row.before(row.event(0)) + sign * MOVED
+        return [_beyond("the droop's side at the end of each hold", end - LOOK, end, level, sign)]
 
     return Bounded(judge, bands)
 
@@ -237,7 +234,7 @@ def frequency_against_power() -> Judge:
     def judge(row: MeasuredRow) -> RowFinding:
         end = float(row.times[-1])
         last = row.within(end - LOOK, end - 0.05)
-        more = float(np.mean(row.mean_p[last])) - row.before(row.events[0])
+        more = float(np.mean(row.mean_p[last])) - row.before(row.event(0))
         away = float(np.mean(row.frequency[last])) - row.f_n
         rule = f"the final frequency lies by at most {SIDE:g} Hz on the side to which the power moved"
         return _finding("frequency against power", rule, READING, float(np.sign(more)) * away, SIDE,
@@ -250,7 +247,7 @@ def meets_load() -> Judge:
     """After the loss of the last machine both plants together feed what the source fed before them, in one second."""
 
     def judge(row: MeasuredRow) -> RowFinding:
-        time = row.events[0]
+        time = row.event(0)
         both = row.signals["p"] + row.signals["duplicate.p"]
         wanted = float(np.mean((both + row.signals["source.p"])[row.within(time - 0.5, time)]))
         part = row.within(float(row.times[-1]) - LOOK, float(row.times[-1]))
@@ -271,7 +268,7 @@ def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
     ``least``: Least inertia constant [s]."""
 
     def judge(row: MeasuredRow) -> RowFinding:
-        time = row.events[event]
+        time = row.event(event)
         part = row.within(time, time + lasts + 1e-6)
         change = (row.p[part] - row.before(time)) * (-np.sign(rate))
         energy = float(np.sum(0.5 * (change[1:] + change[:-1])) * (row.times[1] - row.times[0]))
@@ -282,13 +279,18 @@ def inertia(event: int, rate: float, lasts: float, least: float) -> Judge:
     return judge
 
 
+def _beyond(name: str, begin: float, end: float, level: float, sign: int) -> Band:
+    """Where the power has to be above a level, or below it where the sign is −1."""
+    return _power_band(name, begin, end, level if sign > 0 else None, None if sign > 0 else level)
+
+
 def _power_band(name: str, begin: float, end: float, low: float | None, high: float | None) -> Band:
     lowest, highest = (None if level is None else np.full(2, level) for level in (low, high))
     return Band(name, POWER_SHOWN, lambda row: row.mean_p, np.array([begin, end]), lowest, highest)
 
 
 def _chosen(row: MeasuredRow, events: tuple[int, ...]) -> tuple[float, ...]:
-    return tuple(row.events[k] for k in events) if events else row.events
+    return tuple(row.event(k) for k in events) if events else row.events
 
 
 def _without_spikes(row: MeasuredRow) -> Numbers:

@@ -9,6 +9,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.certification.frequency import bus_frequency
+from orchestrator.errors import InputError
 from orchestrator.watch.finding import NOT_JUDGED, UNSTABLE
 
 NOTHING, ALIVE, GONE = 5e-3, 0.1, 0.1
@@ -75,6 +76,14 @@ class MeasuredRow:
     def before(self, time: float) -> float:
         """Active power just before an event [pu]: the mean over half a second, or what there is."""
         return float(np.mean(self.p[self.within(max(0.0, time - 0.5), time)]))
+
+    def event(self, number: int) -> float:
+        """When the event of that number happens [s]; the last one is −1.
+
+        Raises an `InputError` if there is none."""
+        if not -len(self.events) <= number < len(self.events):
+            raise InputError(f"a criterion asks for event {number}, and there are {len(self.events)}, numbered from 0")
+        return self.events[number]
 
     def until(self, time: float) -> float:
         """When the next change after a time comes, or the end of the run [s]."""

@@ -10,6 +10,7 @@ from typing import Any
 from orchestrator.certification.codes.sensitivity import MarginSensitivity
 from orchestrator.certification.codes.what_it_takes import ChangePlan, ConfirmedChange, CriterionNeeds
 from orchestrator.certification.margins import margin_text
+from orchestrator.certification.texts import TEXTS
 from orchestrator.report.html.elements import document, table
 from orchestrator.report.tables import PlainTable, make_table
 from orchestrator.results.storage import save_json
@@ -20,12 +21,6 @@ FORMAT = "margin-sensitivities-1"  # form of the JSON
 NEEDS_HTML, NEEDS_JSON = "sensitivities.html", "sensitivities.json"
 
 _COLUMNS = ("Parameter", "Value", "Margin below", "Margin above", "Points per %")
-
-_READING = (
-    "Points are percent of the criterion's limit; of a criterion without a figure, percent of the run until the first "
-    "fault. A slope holds at the present values; it does not say what a larger "
-    "change gives, nor what becomes of other rows."
-)
 
 
 def save_needs(plan: ChangePlan, needs: Sequence[CriterionNeeds], folder: Path) -> list[Path]:
@@ -100,10 +95,8 @@ def confirmed_text(need: CriterionNeeds) -> str:
 def plan_text(plan: ChangePlan) -> str:
     rows = ", ".join(v.row.name for v in plan.rows)
     long = f"{plan.seconds / 60:.1f} minutes" if plan.seconds >= 90 else f"{plan.seconds:.0f} s"
-    return (
-        f"{len(plan.tasks)} runs of {rows}: {len(plan.parameters)} parameters by ±{100 * plan.change:g} %, about "
-        f"{long} of one processor by what the rows took; runs that are kept are not repeated."
-    )
+    return (f"{len(plan.tasks)} runs of {rows}: {len(plan.parameters)} parameters by ±{100 * plan.change:g} %, about "
+            f"{long} of one processor by what the rows took; runs that are kept are not repeated.")  # fmt: skip
 
 
 def left_out_text(plan: ChangePlan) -> str:
@@ -146,6 +139,8 @@ def _page(plan: ChangePlan, needs: Sequence[CriterionNeeds], made: datetime) -> 
     left = [[escape(name), escape(why)] for name, why in plan.left_out.items()]
     sections.append(("Parameters that were not changed", table("Left out", ["Parameter", "Why"], left, left=2)))
     model = plan.certificate.description.model_name
-    findings = f"<p>Each parameter was changed by ±{100 * plan.change:g} % of itself. {escape(_READING)}</p>"
+    findings = (
+        f"<p>Each parameter was changed by ±{100 * plan.change:g} % of itself. {escape(TEXTS['sensitivities'])}</p>"
+    )
     title = f"What {model!r} lacks for {plan.certificate.code.key.upper()}"
     return document(title, plan.certificate.code.title, findings, sections, made)

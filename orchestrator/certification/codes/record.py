@@ -56,9 +56,9 @@ def _row(v: RowVerdict, c: Certificate) -> dict[str, Any]:
 def row_chapters(c: Certificate, figures: Figures) -> list[tuple[str, str]]:
     """What the page of a certificate says of its rows."""
     rows = [
-        [escape(v.name), escape(v.row.clause), escape(v.row.title), escape(f.criterion), escape(f.rule),
-         "the code's" if f.origin == "code" else "reading", escape(f.text), margin_of(f), _word(v, f)]
-        for v in c.verdicts for f in v.findings
+        [escape(v.name), *([escape(v.row.clause), escape(v.row.title)] if f is v.findings[0] else ["", ""]),
+         escape(f.criterion), escape(f.rule), "the code's" if f.origin == "code" else "reading", escape(f.text),
+         margin_of(f), _word(v, f)] for v in c.verdicts for f in v.findings
     ]  # fmt: skip
     rows += [[escape(v.name), escape(v.row.clause), escape(v.row.title), "", "", "", escape(v.unknown), "–",
               NOT_JUDGED] for v in c.verdicts if v.unknown]  # fmt: skip

@@ -1,9 +1,10 @@
 """What a code is: rows with a stimulus and criteria, sources, and what is left out by name."""
 
-import math
+import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
@@ -38,16 +39,13 @@ def checked(wanted: Sequence[Declaration], given: Mapping[str, object], code: st
     values = {}
     for declaration in wanted:
         value = given[declaration.name]
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not (math.isfinite(value) and declaration.least <= value <= declaration.most)
-        ):
+        number = value if isinstance(value, int | float) and not isinstance(value, bool) else float("nan")
+        if not declaration.least <= number <= declaration.most:
             raise InputError(
                 f"--declare {declaration.name}={value}: the {declaration.meaning} is a number from "
                 f"{declaration.least:g} to {declaration.most:g} [{declaration.unit}]; give it so"
             )
-        values[declaration.name] = float(value)
+        values[declaration.name] = float(number)
     return values
 
 
@@ -103,12 +101,16 @@ class Bounded:
 
 @dataclass(frozen=True)
 class Row:
-    """One row of a code's table. ``shown_only``: whether the code gives no verdict on it."""
+    """One row of a code's table.
+
+    ``shown_only``: whether the code gives no verdict on it; ``since``: the version of this program whose table has it
+    first, of a row that was added to a code that had been released."""
 
     name: str
     title: str
     clause: str
     shown_only: bool = field(default=False, kw_only=True)
+    since: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -124,35 +126,99 @@ class CodeRow(Row):
 
 AnyRow = TypeVar("AnyRow", bound=Row)
 
-_WORDS = tomllib.loads(Path(__file__).with_name("codes.toml").read_text(encoding="utf-8"))
+_FILE = "codes.toml"
+_WORDS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name(_FILE).read_text(encoding="utf-8"))
+_TEXT, _TEXTS = (str, "a text"), (list, "a list of texts")
+_KINDS: dict[str, tuple[Any, str]] = {
+    "title": _TEXT, "source": _TEXT, "date": _TEXT, "where": _TEXT, "f_n": (float, "the rated frequency [Hz], as 50.0"),
+    "left_out": _TEXTS, "readings": _TEXTS,
+}  # fmt: skip
+"""Words of a code, each with what it is."""
+
+
+def in_words(key: str) -> str:
+    """A code with where it applies, as help names it; its key alone where its words are not as they should be."""
+    where, f_n = (_WORDS.get(key, {}).get(name) for name in ("where", "f_n"))
+    return f"{key} ({where}, {f_n:g} Hz)" if where and isinstance(f_n, float) else key
+
+
+def like(text: str, keys: Iterable[str]) -> list[str]:
+    """Codes that may be meant: by another spelling of the key, or a part of the place or of the title."""
+    known, wanted = list(keys), _plain(text)
+    near = [key for key in known if wanted and (wanted in key or key in wanted)]
+    for name in ("where", "title") if len(wanted) > 3 else ():
+        near = near or [key for key in known if wanted in _plain(str(_WORDS.get(key, {}).get(name)))]
+    return near or get_close_matches(wanted, known, 3)
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"\W|_", "", text.lower())
+
+
+def _fault_of_words(key: str) -> str:
+    place, words = f"{_FILE}, [{key}]", _WORDS.get(key)
+    if words is None:
+        return f"{_FILE} has no section [{key}]; a code has its words there: {', '.join(_KINDS)}"
+    if strange := [name for name in words if name not in _KINDS]:
+        return f"{place}: {strange[0]!r} is no word of a code; its words are {', '.join(_KINDS)}"
+    for name, (kind, rule) in _KINDS.items():
+        if not isinstance(words.get(name), kind):
+            return f"{place}: {name} {f'= {words[name]!r}' if name in words else 'is missing'}; give {rule}"
+    return ""
+
+
+def _fault_of_rows(key: str, rows: Sequence[Row]) -> str:
+    names = [row.name for row in rows]
+    if not rows:
+        return f"all_codes.py: code {key!r} has no row; give it one at least"
+    if twice := [name for name in names if names.count(name) > 1]:
+        return f"all_codes.py, code {key!r}: two rows are named {twice[0]!r}, and would be judged as one; rename one"
+    for row in (row for row in rows if isinstance(row, CodeRow)):
+        if not re.fullmatch(r"\w+", row.name, re.ASCII):
+            return f"all_codes.py, code {key!r}, row {row.name!r}: a file is named so; take letters, digits and _"
+        if not row.criteria:
+            return f"all_codes.py, code {key!r}, row {row.name!r} asks for nothing; give it a criterion"
+    return ""
 
 
 @dataclass(frozen=True)
 class GridCode(Generic[AnyRow]):
     """A code as a table; its words stand in ``codes.toml``.
 
-    ``title``, ``source``, ``date``: what it is, where its numbers were read, and of when it is; ``f_n``: rated
-    frequency of the system [Hz]; ``left_out``: what the code asks and this table does not test, with the reason;
-    ``readings``: where the code leaves something open, how it was read; ``declared``: what the applicant declares of
-    the converter, where the rows depend on it."""
+    ``title``, ``source``, ``date``: what it is, where its numbers were read, and of when it is; ``where`` it applies;
+    ``f_n``: rated frequency of the system [Hz]; ``left_out``: what the code asks and this table does not test, with
+    the reason; ``readings``: where the code leaves something open, how it was read; ``declared``: what the applicant
+    declares of the converter, where the rows depend on it; ``fault``: why it cannot be used."""
 
     key: str
-    title: str
-    source: str
-    date: str
-    f_n: float
     rows: tuple[AnyRow, ...]
+    title: str = ""
+    source: str = ""
+    date: str = ""
+    where: str = ""
+    f_n: float = 50.0
     left_out: tuple[str, ...] = ()
     readings: tuple[str, ...] = ()
     declared: Mapping[str, float] = field(default_factory=dict)
+    fault: str = ""
 
     @classmethod
     def of(
         cls, key: str, rows: tuple[AnyRow, ...], declared: Mapping[str, float] = MappingProxyType({})
     ) -> "GridCode[AnyRow]":
-        texts: dict[str, Any] = {
-            name: tuple(text) if isinstance(text, list) else text for name, text in _WORDS[key].items()
-        }
-        if len({row.name for row in rows}) < len(rows):
-            raise ValueError(f"code {key!r}: two rows have one name, and one response would be judged as both")
-        return cls(key, rows=rows, declared=dict(declared), **texts)
+        if fault := _fault_of_words(key) or _fault_of_rows(key, rows):
+            return cls(key, rows, fault=fault)
+        texts: dict[str, Any] = {n: tuple(text) if isinstance(text, list) else text for n, text in _WORDS[key].items()}
+        return cls(key, rows, declared=dict(declared), **texts)
+
+    def later(self, version: str) -> tuple[str, ...]:
+        """Rows that the table of that version of this program had not."""
+        return tuple(row.name for row in self.rows if version and _number(row.since) > _number(version))
+
+    def of_version(self, version: str) -> "GridCode[AnyRow]":
+        later = self.later(version)
+        return replace(self, rows=tuple(row for row in self.rows if row.name not in later))
+
+
+def _number(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in re.findall(r"\d+", version)[:3])

@@ -4,11 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from orchestrator.certification.codes.bench_point import BenchResult
+import numpy as np
+
+from orchestrator.certification.codes.bench_point import INTERVAL, RECORDED, BenchResult
 from orchestrator.certification.codes.criteria import CURRENT, carries, holds_together
 from orchestrator.certification.codes.measured import MeasuredRow
-from orchestrator.certification.codes.row import CodeRow, RowFinding
+from orchestrator.certification.codes.row import CodeRow, GridCode, RowFinding
 from orchestrator.certification.margins import CriterionMargin
+from orchestrator.errors import InputError
 
 NO_VERDICT, NOT_JUDGED = "no verdict", "not judged"
 """In place of a verdict: where the code gives none, and where the response allows none."""
@@ -38,16 +41,24 @@ class RowVerdict:
         return [finding for finding in self.findings if finding.accepted is False]
 
     def margins(self) -> list[CriterionMargin]:
-        return [
-            CriterionMargin(self.row.name, f.criterion, f.margin, f.accepted, f.text)
-            for f in self.findings
-            if f.accepted is not None
-        ]
+        known = [(f, f.accepted) for f in self.findings if f.accepted is not None]
+        return [CriterionMargin(self.name, f.criterion, f.margin, accepted, f.text) for f, accepted in known]
 
     def word(self, finding: RowFinding) -> str:
         if self.row.shown_only:
             return NO_VERDICT
         return {True: "accepted", False: "not accepted", None: NOT_JUDGED}[finding.accepted]
+
+
+def try_criteria(code: GridCode[CodeRow], f_n: float) -> None:
+    """Judge a response that never moves in every row, so that what cannot be judged is told before the run."""
+    for row in code.rows:
+        times = np.arange(0, row.programme(f_n).stop + INTERVAL, INTERVAL)
+        try:
+            with np.errstate(all="ignore"):
+                judge_row(row, BenchResult(row.name, times, dict.fromkeys(RECORDED, np.ones(times.shape))), f_n)
+        except InputError as error:
+            raise InputError(f"all_codes.py, code {code.key!r}, row {row.name!r}: {error}") from error
 
 
 def judge_row(

@@ -16,7 +16,7 @@ from orchestrator.certification.codes.all_codes import CODES, code_for
 from orchestrator.certification.codes.bench_point import BenchResult, BenchTask, case_name, write_row
 from orchestrator.certification.codes.row import CodeRow, GridCode
 from orchestrator.certification.codes.row_verdict import judge_row
-from orchestrator.certification.compared import Compared, Content, Verification, differ_signal, request_of
+from orchestrator.certification.compared import Compared, Content, Verification, differ_signal, issued_by, request_of
 from orchestrator.certification.files import RESPONSES
 from orchestrator.errors import ErrorKind, InputError
 from orchestrator.late import xr
@@ -27,8 +27,17 @@ from orchestrator.watch.finding import UNSTABLE
 DRAWN = 1  # so many rows are drawn by chance beside the one with the narrowest margin
 
 
+def later(content: Content) -> tuple[str, ...]:
+    """Rows that the code's table has, and had not in the version of this program that issued the record."""
+    return code_for(content["code"], content["declared"]).later(issued_by(content))
+
+
+def _table(content: Content) -> GridCode[CodeRow]:
+    return code_for(content["code"], content["declared"]).of_version(issued_by(content))
+
+
 def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Certificate:
-    code, request = code_for(content["code"], content["declared"]), request_of(folder, content)
+    code, request = _table(content), request_of(folder, content)
     stated = {row["row"]: row for row in content["rows"]}
     rows = [row for row in code.rows if row.name in stated or f"time_{row.name}" in responses.coords]
     results = {row.name: _response(row.name, stated.get(row.name), responses) for row in rows}
@@ -56,7 +65,7 @@ def faults(folder: Path, content: dict[str, Any], data: xr.Dataset) -> list[str]
 
     Row files of another code may lie in the folder, from an earlier certificate; those of the record's files may not.
     """
-    codes = [*CODES.values(), code := code_for(content["code"], content["declared"])]
+    codes = [*CODES.values(), code := _table(content)]
     recorded, table = [row["row"] for row in content["rows"]], [row.name for row in code.rows]
     own = {*content["files"], *(case_name(row.name) for code in codes for row in code.rows)}
     files = [name.removeprefix("row_").removesuffix(".toml") for name in content["files"] if name.startswith("row_")]
@@ -106,9 +115,8 @@ def _as_the_table(folder: Path, content: Content, code: GridCode[CodeRow], row: 
         made = write_row(request, row.name, row.title, row.programme(content["f_n"]), content["f_n"], Path(place))
         same = made.read_text(encoding="utf-8") == (folder / case_name(row.name)).read_text(encoding="utf-8")
     if not same:
-        found.faults.append(
-            f"{case_name(row.name)}: it is not what the table of {code.key} and the certified values give"
-        )
+        found.faults.append(f"{case_name(row.name)}: it is not what the table of {code.key} and the certified values "
+                            "give")  # fmt: skip
     return same
 
 

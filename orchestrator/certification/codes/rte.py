@@ -90,7 +90,7 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
     ``skipped``: How many events later its time ends: 2 for a ramp, whose own end is an event."""
 
     def bounds(row: MeasuredRow, values: Numbers) -> tuple[slice, Numbers, Numbers]:
-        begin = row.events[event]
+        begin = row.event(event)
         later = row.events[event + skipped] if event + skipped < len(row.events) else float(row.times[-1])
         before = values[row.within(begin - 0.5, begin)]
         part = row.within(begin, min(later, begin + HORIZON))
@@ -99,7 +99,7 @@ def stays_inside(event: int, made: Callable[[float], Envelope], name: str,
     def judge(row: MeasuredRow) -> RowFinding:
         values = quantity(row)
         part, low, high = bounds(row, values)
-        t, value = row.times[part] - row.events[event], values[part]
+        t, value = row.times[part] - row.event(event), values[part]
         outside = np.maximum(low - value, value - high)
         outside = np.where(np.isfinite(outside), outside, np.inf)
         at = int(np.argmax(outside))
@@ -144,6 +144,10 @@ def _named(test: str, scr: float, power: float, more: str = "") -> str:
     return f"{test}_scr{scr:g}_p{percent}{more}"
 
 
+def _row(name: str, title: str, programme: Callable[[float], BenchProgramme], *judges: Judge) -> CodeRow:
+    return CodeRow(name, title, name[:5].upper(), programme, (c.holds_together(), *judges))
+
+
 def _grid(declared: Mapping[str, float], scr: float, f_n: float) -> Swinging:
     return Swinging(declared["D"], declared["H"], declared["X_eff"] + 1 / scr, 2 * pi * f_n)
 
@@ -158,11 +162,9 @@ def _jumps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
     def envelope(sign: int, f_n: float) -> Envelope:
         return Envelope(jump_bounds(_grid(declared, scr, f_n), angle), sign)
 
-    return CodeRow(
-        _named("igfm1", scr, power), f"∓{np.degrees(angle):.2g}° at SCR {scr:g}, {power:.0%}", "IGFM1", programme,
-        (c.holds_together(), stays_inside(0, partial(envelope, -1), "power after the jump ahead"),
-         stays_inside(1, partial(envelope, 1), "power after the jump back")),
-    )  # fmt: skip
+    return _row(_named("igfm1", scr, power), f"∓{np.degrees(angle):.2g}° at SCR {scr:g}, {power:.0%}", programme,
+                stays_inside(0, partial(envelope, -1), "power after the jump ahead"),
+                stays_inside(1, partial(envelope, 1), "power after the jump back"))  # fmt: skip
 
 
 def _steps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
@@ -178,12 +180,9 @@ def _steps(declared: Mapping[str, float], scr: float, power: float) -> CodeRow:
     def envelope(sign: int, f_n: float) -> Envelope:
         return Envelope(amplitude_bounds(CURRENT), sign, limited=False)
 
-    return CodeRow(
-        _named("igfm2", scr, power), f"Source ∓{100 * CURRENT * X:.2g} % at SCR {scr:g}, {power:.0%}", "IGFM2",
-        programme,
-        (c.holds_together(), stays_inside(0, partial(envelope, -1), "current after the rise", reactive_current),
-         stays_inside(2, partial(envelope, 1), "current after the fall", reactive_current)),
-    )  # fmt: skip
+    return _row(_named("igfm2", scr, power), f"Source ∓{100 * CURRENT * X:.2g} % at SCR {scr:g}, {power:.0%}",
+                programme, stays_inside(0, partial(envelope, -1), "current after the rise", reactive_current),
+                stays_inside(2, partial(envelope, 1), "current after the fall", reactive_current))  # fmt: skip
 
 
 def _strength(declared: Mapping[str, float], start: float, end: float, power: float) -> CodeRow:
@@ -198,10 +197,8 @@ def _strength(declared: Mapping[str, float], start: float, end: float, power: fl
         change = abs(power * difference) / plant.X
         return Envelope(strength_bounds(plant, change), -int(np.sign(difference * power)), True, SLACK)
 
-    return CodeRow(
-        _named("igfm3", start, power, f"_scr{end:g}"), f"SCR {start:g} → {end:g}, {power:.0%}", "IGFM3", programme,
-        (c.holds_together(), stays_inside(0, envelope, "power after the step")),
-    )  # fmt: skip
+    return _row(_named("igfm3", start, power, f"_scr{end:g}"), f"SCR {start:g} → {end:g}, {power:.0%}", programme,
+                stays_inside(0, envelope, "power after the step"))  # fmt: skip
 
 
 def _ramping(declared: Mapping[str, float], scr: float, power: float, rate: float, lasts: float) -> CodeRow:
@@ -213,9 +210,7 @@ def _ramping(declared: Mapping[str, float], scr: float, power: float, rate: floa
         plant = _grid(declared, scr, f_n)
         return Envelope(ramp_bounds(plant, -sign * rate / f_n, lasts), sign)
 
-    return CodeRow(
-        _named("igfm4", scr, power, f"_{rate:g}".replace(".", "_")),
-        f"±{rate:g} Hz/s for {lasts:g} s at SCR {scr:g}, {power:.0%}", "IGFM4", programme,
-        (c.holds_together(), stays_inside(2, partial(envelope, -1), "power while the frequency rises", skipped=2),
-         stays_inside(4, partial(envelope, 1), "power while the frequency falls", skipped=2)),
-    )  # fmt: skip
+    name = _named("igfm4", scr, power, f"_{rate:g}".replace(".", "_"))
+    return _row(name, f"±{rate:g} Hz/s for {lasts:g} s at SCR {scr:g}, {power:.0%}", programme,
+                stays_inside(2, partial(envelope, -1), "power while the frequency rises", skipped=2),
+                stays_inside(4, partial(envelope, 1), "power while the frequency falls", skipped=2))  # fmt: skip

@@ -60,9 +60,8 @@ class MarginSensitivity:
         return wanted
 
 
-def sensitivity_of(
-    parameter: Parameter, criterion: ChangedCriterion, mark: str, sides: Mapping[int, ChangeResult], change: float
-) -> MarginSensitivity:
+def sensitivity_of(parameter: Parameter, criterion: ChangedCriterion, mark: str, sides: Mapping[int, ChangeResult],
+                   change: float) -> MarginSensitivity:  # fmt: skip
     """The effect of one parameter, from the row as it is and as it is on either side.
 
     ``sides``: The changed rows by −1 and +1; a side that the declared bounds do not allow is missing.
@@ -92,9 +91,7 @@ def sensitivity_of(
     idle = len(sides) == 2 and all(result.mark == mark for result in sides.values())
     if criterion.margin is None or not margins:
         reason = "the criterion has no figure" if criterion.margin is None else "; ".join(doubts)
-        return MarginSensitivity(
-            parameter, criterion.margin, met=sides_met, reason=reason, idle=idle, values=values
-        )  # fmt: skip
+        return MarginSensitivity(parameter, criterion.margin, met=sides_met, reason=reason, idle=idle, values=values)
     slopes = {sign: sign * (margin - criterion.margin) / change for sign, margin in margins.items()}
     doubts += _of_slopes(slopes, _ROUNDING / change)
     if not any(slopes.values()):

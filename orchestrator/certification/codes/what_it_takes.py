@@ -74,10 +74,8 @@ class ChangePlan:
         return float(sum(self.certificate.results[row].seconds for row, *_ in self.tasks))
 
 
-def plan_changes(
-    certificate: Certificate, folder: Path, patterns: Sequence[str] = (), *, fixed: bool = False,
-    change: float = CHANGE,
-) -> ChangePlan:  # fmt: skip
+def plan_changes(certificate: Certificate, folder: Path, patterns: Sequence[str] = (), *, fixed: bool = False,
+                 change: float = CHANGE) -> ChangePlan:  # fmt: skip
     """Find what is to be run; nothing is run yet.
 
     ``patterns``: Names of the converter's parameters, also with ``*``; fixed ones that fit are taken too. Without
@@ -96,10 +94,9 @@ def plan_changes(
     unknown = [p.variable for p in asked if plan.value(p.variable) is None]
     chosen = [p for p in asked if p.variable not in (*given, *unknown)]
     if not chosen:
-        raise InputError(
-            f"--sensitivities: {certificate.request.fmu} has no {'such' if patterns else 'tunable'} parameter that the "
-            "rows do not give it themselves; name one by --parameter, or take the fixed ones too by --fixed"
-        )
+        raise InputError(f"--sensitivities: {certificate.request.fmu} has no {'such' if patterns else 'tunable'} "
+                         "parameter that the rows do not give it themselves; name one by --parameter, or take the "
+                         "fixed ones too by --fixed")  # fmt: skip
     every = [info for info in plan.description.variables.values() if info.causality == "parameter"]
     names = {p.variable for p in chosen}
     left_out = {info.name: _why_not(info, unknown, bool(patterns))
@@ -138,10 +135,8 @@ def run_changes(plan: ChangePlan, executor: Executor, report: CountReport = nobo
     return found
 
 
-def confirm_changes(
-    plan: ChangePlan, needs: Sequence[CriterionNeeds], executor: Executor,
-    report: CountReport = nobody,
-) -> None:  # fmt: skip
+def confirm_changes(plan: ChangePlan, needs: Sequence[CriterionNeeds], executor: Executor,
+                    report: CountReport = nobody) -> None:  # fmt: skip
     """Run for each failed criterion the change of one parameter that the straight line asks for.
 
     Taken is the parameter whose line reaches the limit, or comes nearest to it, and of several the one that has to

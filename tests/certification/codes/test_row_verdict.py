@@ -9,7 +9,7 @@ from orchestrator.certification.codes.all_codes import CODES
 from orchestrator.certification.codes.bench_point import BenchResult
 from orchestrator.certification.codes.measured import MeasuredRow
 from orchestrator.certification.codes.programme import jumps, last_machine, ramps
-from orchestrator.certification.codes.row import GridCode, RowFinding
+from orchestrator.certification.codes.row import RowFinding
 from orchestrator.certification.codes.row_verdict import RowVerdict, judge_row
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -32,12 +32,6 @@ def judged(p, name="jump_30", kind="", **given):
     signals = {"p": p, "q": np.full(TIMES.shape, 0.1), "v": np.ones(TIMES.shape)} | given
     findings = [{"kind": kind, "time": 1.3, "message": "found"}] if kind else []
     return judge_row(row, BenchResult(name, TIMES, signals, findings), 50.0)
-
-
-def test_two_rows_of_one_name_are_refused():
-    """One response would be judged as both."""
-    with pytest.raises(ValueError, match="two rows have one name"):
-        GridCode.of("aemo", (*CODES["aemo"].rows, CODES["aemo"].rows[0]))
 
 
 @pytest.mark.parametrize("kind", ["loss_of_synchronism", "run_away", "growth"])
