@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 import itertools
 import json
+import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,6 +27,7 @@ _ATTRIBUTES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encodi
 """Unit and long name by the variable's name."""
 
 _IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}  # xarray's own attributes have the short names
+_FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 _SEPARATOR = "; "  # between the warnings of one point
 _BEGINNINGS = "start followed refined entered broken"
 
@@ -151,8 +153,29 @@ def _attributes(samples: Samples) -> dict[str, Any]:
     low, high = result.plan.frequency_range
     return {k: v for k, v in origin.items() if k not in ("scenario", "events")} | own | {
         "overrides": json.dumps(result.plan.overrides),
+        "warned": json.dumps([*_asked(samples), *warned(samples)]),
         "frequency_range_hz": [low, high],
     }  # fmt: skip
+
+
+def _asked(samples: Samples) -> dict[str, None]:
+    """What was questioned before the sweep."""
+    return {str(question): None for sweep in samples.result.scenarios for question in sweep.prepared.questions}
+
+
+def warned(samples: Samples) -> list[str]:
+    """Each kind of warning once, with the number of points that have it. Two warnings that differ only in their figures
+    are of one kind."""
+    asked = _asked(samples)
+    kinds: dict[str, tuple[str, set[tuple[str, GridPlace]]]] = {}
+    for sweep in samples.result.scenarios:
+        for place, record in sweep.points.items():
+            for text in record.warnings:
+                if text not in asked:  # said already, before the sweep
+                    _, points = kinds.setdefault(_FIGURE.sub("#", text), (text, set()))
+                    points.add((sweep.prepared.name, place))
+    total = sum(len(sweep.points) for sweep in samples.result.scenarios)
+    return [f"at {len(points)} of {total} points: {text}" for text, points in kinds.values()]
 
 
 def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
@@ -209,32 +232,19 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
         "parameters": [{"name": a.key, "unit": a.unit, "values": list(a.values)} for a in samples.axes],
         "step_size_s": result.plan.scenarios[0].step_size,
         "points": {"computed": result.computed, "stored": result.stored, "refining": result.refined},
-        "scenarios": [
-            {
-                "name": sweep.prepared.name,
-                "title": sweep.prepared.title,
-                "stable": sweep.stable,
-                "unstable": [
-                    {"values": samples.setting(place)} | sweep.points[place].stability
-                    for place in sweep.unstable(samples.axes)
-                ],
-                "trajectories": [
-                    {
-                        "name": trajectory.name,
-                        "points": [_point_json(samples.setting(p), f) for p, f in samples.of(sweep, trajectory)],
-                    }
-                    for trajectory in sweep.trajectories
-                ],
-                "failed": failed[sweep.prepared.name],
-                "warnings": [
-                    {"values": samples.setting(place), "warnings": list(sweep.points[place].warnings)}
-                    for place in grid_places(samples.axes)
-                    if sweep.points[place].warnings
-                ],
-            }
-            for sweep in result.scenarios
-        ],
-    }
+        "scenarios": [{
+            "name": sweep.prepared.name, "title": sweep.prepared.title, "stable": sweep.stable,
+            "unstable": [{"values": samples.setting(place)} | sweep.points[place].stability
+                         for place in sweep.unstable(samples.axes)],
+            "trajectories": [{
+                "name": trajectory.name,
+                "points": [_point_json(samples.setting(p), f) for p, f in samples.of(sweep, trajectory)],
+            } for trajectory in sweep.trajectories],
+            "failed": failed[sweep.prepared.name],
+            "warnings": [{"values": samples.setting(place), "warnings": list(said)}
+                         for place in grid_places(samples.axes) if (said := sweep.points[place].warnings)],
+        } for sweep in result.scenarios],
+    }  # fmt: skip
 
 
 def _point_json(setting: dict[str, float | bool], sample: dict[str, Any]) -> dict[str, Any]:

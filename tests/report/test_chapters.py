@@ -34,11 +34,11 @@ CERTIFICATE = {"sentence": "It passes at all.", "verdict": "passes", "passed": T
 COMPARISON = [{"expression": "sg1.omega", "unit": "pu", "deviations": [1, 2], "largest": 0.5, "at": 1.2, "rms": 0.1}]
 
 IDENTIFIED = [{"real": -0.3, "imag": 5.8, "frequency_hz": 0.923, "damping_percent": 5.2, "amplitude": 0.1,
-               "doubts": []}]  # fmt: skip
+               "doubts": ["it is at the window's edge"]}]  # fmt: skip
 
 SENSITIVITIES = [{
-    "derivative": "total", "scenario": "pod", "stable": True, "mode": {"frequency_hz": 0.9, "damping_percent": 4.2,
-                                                                       "name": None},
+    "derivative": "total", "scenario": "pod", "stable": True, "warnings": ["beyond its rating: gfor"],
+    "mode": {"frequency_hz": 0.9, "damping_percent": 4.2, "name": None},
     "sensitivities": [
         {"parameter": f"gfor.{name}", "value": 1.0, "unit": "pu", "damping_points_per_percent": points,
          "frequency_hz_per_percent": 0.0, "doubts": "", "reason": "" if points else "it holds no steady state"}
@@ -89,6 +89,7 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
         "vendor.fmu: wrong rated frequency", "anything after it", "It passes at all.", "judged: 9 of 9",
         "sg1.omega differs most, by 0.5 pu at 1.200 s", "two modes are close", "strongest: 0.923 Hz, 5.20 %",
         "0.900 Hz, 4.20 %: most by gfor.b (-0.2), gfor.a (+0.01) points for 1 % more", "it holds no steady state",
+        "0.923 Hz: it is at the window's edge".replace("'", "&#x27;"), "beyond its rating: gfor",
         "0.800 Hz: forced, from sg2; 1.100 Hz: not known", "1.100 Hz: too short", "a gap",
         "base, pod: weakest is bus_2 with 400 MVA, SCR 3.00 at bus_1",
     ):  # fmt: skip
