@@ -214,15 +214,10 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
     assert refinement is not None
     return {
         "designed": filters(d.filters) | placed(d.designed),
-        "sweeps": [
-            {
-                "lead_lag": s.why,
-                **filters(s.filters),
-                "points": [with_least(p, least) for p, least in zip_longest(s.points, s.least)],
-                "chosen": with_least(s.chosen, s.chosen_least),
-                "unstable_gains": list(s.unstable),
-            }
-            for s in refinement.sweeps
-        ],
+        "sweeps": [{
+            "lead_lag": s.why, **filters(s.filters),
+            "points": [with_least(p, least) for p, least in zip_longest(s.points, s.least)],
+            "chosen": with_least(s.chosen, s.chosen_least), "unstable_gains": list(s.unstable),
+        } for s in refinement.sweeps],
         "notes": refinement.notes,
-    }
+    }  # fmt: skip

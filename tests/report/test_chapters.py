@@ -30,7 +30,9 @@ CHECK = {
                 "figures": {"not_judged": "anything after it"}}],
 }  # fmt: skip
 CERTIFICATE = {"sentence": "It passes at all.", "verdict": "passes", "passed": True, "files": {}, "seal": "0",
-               "judged": "9 of 9", "missing": [], "departures": []}  # fmt: skip
+               "judged": "9 of 9", "missing": [], "departures": [], "acceptance": {"checks": [
+                   {"figures": {"not_judged": "what dips leave behind"}}]},
+               "points": [{"X_L": 0.1, "warnings": {"pod": ["1.2 pu at X_L = 0.1"]}}]}  # fmt: skip
 COMPARISON = [{"expression": "sg1.omega", "unit": "pu", "deviations": [1, 2], "largest": 0.5, "at": 1.2, "rms": 0.1}]
 
 IDENTIFIED = [{"real": -0.3, "imag": 5.8, "frequency_hz": 0.923, "damping_percent": 5.2, "amplitude": 0.1,
@@ -87,6 +89,7 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
         "mon, sg3: no power flow: sg5 would need 129 %",
         "growth outside of the range was counted at some points only",
         "vendor.fmu: wrong rated frequency", "anything after it", "It passes at all.", "judged: 9 of 9",
+        "what dips leave behind", "1.2 pu at X_L = 0.1",
         "sg1.omega differs most, by 0.5 pu at 1.200 s", "two modes are close", "strongest: 0.923 Hz, 5.20 %",
         "0.900 Hz, 4.20 %: most by gfor.b (-0.2), gfor.a (+0.01) points for 1 % more", "it holds no steady state",
         "0.923 Hz: it is at the window's edge".replace("'", "&#x27;"), "beyond its rating: gfor",

@@ -7,6 +7,7 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
+from itertools import chain
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -187,7 +188,10 @@ def _coordinated(file: Path, c: Content) -> Chapter:
 
 def _certificate(file: Path, c: Content) -> Chapter:
     open_ = [text if isinstance(text, str) else f"X_L = {text:g} pu" for text in (*c["departures"], *c["missing"])]
-    trusted = (c.get("acceptance") or {}).get("trusted") is not False
+    warned = [texts for point in c.get("points", []) for texts in point.get("warnings", {}).values()]
+    check: Content = c.get("acceptance") or {}
+    open_ += dict.fromkeys([*chain(*warned), *_unjudged(check.get("checks", []))])
+    trusted = check.get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
     sure = f"judged: {c['judged']}" if c.get("judged") else f"{len(c['rows'])} tests" if "rows" in c else ""
     question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
@@ -201,9 +205,12 @@ def _matrix(file: Path, c: Content) -> Chapter:
                    f"{len(c['cells'])} pairs of a device and a code", lost, page="matrix.html")  # fmt: skip
 
 
+def _unjudged(checks: Sequence[Content]) -> list[str]:
+    return [str(x["figures"]["not_judged"]) for x in checks if "not_judged" in x["figures"]]
+
+
 def _check(file: Path, c: Content) -> Chapter:
     bad = [check for check in c["checks"] if check["verdict"] == "fail"]
-    open_ = [str(check["figures"]["not_judged"]) for check in c["checks"] if "not_judged" in check["figures"]]
     remarks = sum(check["verdict"] == "remark" for check in c["checks"])
     name = Path(c["fmu"]).name
     answer = f"{name}: " + ("no check failed" if c["trusted"] else ", ".join(c["faults"]) or "not to be judged here")
@@ -213,7 +220,7 @@ def _check(file: Path, c: Content) -> Chapter:
     good = True if c["trusted"] else False if bad else None
     return Chapter(
         file, "Can this FMU be trusted in a co-simulation?", answer, good,
-        f"{len(c['checks'])} checks, {remarks} with a remark", [*c["not_supported"], *open_],
+        f"{len(c['checks'])} checks, {remarks} with a remark", [*c["not_supported"], *_unjudged(c["checks"])],
         table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
     )  # fmt: skip
 
