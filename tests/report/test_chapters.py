@@ -130,6 +130,9 @@ def test_what_changed_since_an_older_page(folders, tmp_path):
     written(folders, tmp_path)
     old = shutil.copy(tmp_path / "page.html", tmp_path / "old.html")
     assert "No answer differs from old.html" in written(folders, tmp_path, against=tmp_path / "old.html")
+    (folders[0] / "pod_p.json").write_text(json.dumps(SHEET | {"warnings": ["gfor is beyond its rating"]}))
+    text = written(folders, tmp_path, against=old)
+    assert "not judged: gfor is beyond its rating" in text[text.index("Answers that differ") : text.index("</section>")]
     (folders[0] / "pod_p.json").write_text(json.dumps(SHEET | {"met": True, "K": 300.0}), encoding="utf-8")
     text = written(folders[:4], tmp_path, against=old)
     changed = text[text.index("Answers that differ") : text.index("</section>")]
