@@ -5,7 +5,6 @@ from __future__ import annotations
 import fnmatch
 import itertools
 import json
-import re
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.late import xr
+from orchestrator.report.tables import kinds_of
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.storage import provenance, save_netcdf, save_table
 from orchestrator.sweep.axes import grid_places
@@ -27,7 +27,6 @@ _ATTRIBUTES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encodi
 """Unit and long name by the variable's name."""
 
 _IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}  # xarray's own attributes have the short names
-_FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 _SEPARATOR = "; "  # between the warnings of one point
 _BEGINNINGS = "start followed refined entered broken"
 
@@ -164,18 +163,11 @@ def _asked(samples: Samples) -> dict[str, None]:
 
 
 def warned(samples: Samples) -> list[str]:
-    """Each kind of warning once, with the number of points that have it. Two warnings that differ only in their figures
-    are of one kind."""
-    asked = _asked(samples)
-    kinds: dict[str, tuple[str, set[tuple[str, GridPlace]]]] = {}
-    for sweep in samples.result.scenarios:
-        for place, record in sweep.points.items():
-            for text in record.warnings:
-                if text not in asked:  # said already, before the sweep
-                    _, points = kinds.setdefault(_FIGURE.sub("#", text), (text, set()))
-                    points.add((sweep.prepared.name, place))
-    total = sum(len(sweep.points) for sweep in samples.result.scenarios)
-    return [f"at {len(points)} of {total} points: {text}" for text, points in kinds.values()]
+    """Each kind of warning once, with the number of points that have it."""
+    asked = _asked(samples)  # said already, before the sweep
+    points = [record for sweep in samples.result.scenarios for record in sweep.points.values()]
+    kinds = kinds_of((record, (text for text in record.warnings if text not in asked)) for record in points)
+    return [f"at {len(having)} of {len(points)} points: {text}" for text, having in kinds]
 
 
 def sweep_rows(samples: Samples) -> list[dict[str, Any]]:

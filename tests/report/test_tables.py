@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.report.table import Column, ColumnTable
+from orchestrator.report.tables import kinds_of
 from tests.support.printed import eigenvalue, in_markdown, on_page, on_terminal, value
 
 SCENARIOS = ["--scenario", "base", "--scenario", "pod_p"]
@@ -291,3 +292,8 @@ def test_names_of_points_that_are_no_numbers_and_no_times_stay(names):
     times = ["2026-01-01 00:00:00", "2026-01-01 01:00:00"]
     assert [*map(str, ColumnTable("", columns, times).frame()["point"])] == times
     assert ColumnTable("", columns, times).frame()["point"].dt.hour.tolist() == [0, 1]
+
+
+def test_texts_that_differ_in_figures_only_are_one_kind_and_names_are_not_figures():
+    said = [("a", ["bus_1 feeds 70 Mvar", "bus_2 feeds 1 Mvar"]), ("b", ["bus_1 feeds -7.5e1 Mvar"])]
+    assert kinds_of(said) == [("bus_1 feeds 70 Mvar", ["a", "b"]), ("bus_2 feeds 1 Mvar", ["a"])]
