@@ -10,8 +10,10 @@ Examples
 """
 
 import re
+import sys
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _HOMES = {
@@ -32,3 +34,22 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_HOMES})
+
+
+class _Package(ModuleType):
+    """A package that is called as if it were the study of its name."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if type(value) is ModuleType:
+            value.__class__ = _Package
+        super().__setattr__(name, value)
+
+    def __call__(self, *_: object, **__: object) -> None:
+        name = self.__name__.rpartition(".")[2]
+        raise AttributeError(
+            f"{name} is no function: it may be a case's method, as in load('two_area').{name}(…), or for the terminal "
+            f"alone, `gfor {name}`; functions: {', '.join(_HOMES)}"
+        )
+
+
+sys.modules[__name__].__class__ = _Package

@@ -177,6 +177,9 @@ class Case:
 
             return MethodType(of_study(name, study_in(room)), self)
 
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *rooms()})
+
     def __repr__(self) -> str:
         return f"<Case {self.name}: {', '.join(self.scenarios)}>"
 

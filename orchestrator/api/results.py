@@ -97,6 +97,21 @@ class Modes:
         table = pd.DataFrame(columns, index=list(self.result.model.names))
         return table.rename_axis(index="state", columns="mode")
 
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The modes in the range over mode (as in `table`) and state; ``shape`` is the right eigenvector, complex."""
+        table, share, of_both = self.table(), self.participation(), ["mode", "state"]
+        shape = [[mode.shape.get(state, 0j) for state in share.index] for mode in self]
+        return xr.Dataset(
+            {
+                "eigenvalue": ("mode", [mode.eigenvalue for mode in self], {"units": "rad/s"}),
+                "frequency": ("mode", [mode.frequency_hz for mode in self], {"units": "Hz"}),
+                "damping": ("mode", [mode.damping_percent for mode in self], {"units": "%"}),
+                "participation": (of_both, share.to_numpy().T), "shape": (of_both, np.reshape(shape, share.T.shape)),
+            },
+            {"mode": table.index, "name": ("mode", table["name"].to_numpy()), "state": share.index},
+        )  # fmt: skip
+
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor modes --json`` prints of this scenario, as JSON's types."""
         from orchestrator.study.modes import modes_json  # noqa: PLC0415 - imports the reading of cases

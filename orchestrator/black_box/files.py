@@ -33,25 +33,16 @@ def save_identification(
 def identification_json(response: FrequencyResponse, model: IdentifiedModel, passive: Passivity) -> dict[str, Any]:
     slowest_first = sorted(model.poles.tolist(), key=abs)
     return {
-        "method": response.method,
-        "linearised": IDENTIFIED,
-        "step_size_s": response.step_size,
-        "simulated_s": response.seconds,
-        "lines": len(response.frequencies),
+        "method": response.method, "linearised": IDENTIFIED, "step_size_s": response.step_size,
+        "simulated_s": response.seconds, "lines": len(response.frequencies),
         "range_hz": [float(response.frequencies[0]), float(response.frequencies[-1])],
         "operating_point": dict(zip(response.outputs, response.operating_point.tolist(), strict=True)),
-        "feedthrough": response.feedthrough.tolist(),
-        "largest_relative_bound": response.largest_bound,
-        "model": {
-            "order": len(model.A),
-            "error": model.error,
-            "poles": [{"real": p.real, "imag": p.imag} for p in slowest_first if p.imag >= 0],
-        },
-        "passivity": {
-            "least_relative_index": float(passive.relative.min()),
-            "active_hz": [list(pair) for pair in passive.ranges()],
-        },
-    }
+        "feedthrough": response.feedthrough.tolist(), "largest_relative_bound": response.largest_bound,
+        "model": {"order": len(model.A), "error": model.error,
+                  "poles": [{"real": p.real, "imag": p.imag} for p in slowest_first if p.imag >= 0]},
+        "passivity": {"least_relative_index": float(passive.relative.min()),
+                      "active_hz": [list(pair) for pair in passive.ranges()]},
+    }  # fmt: skip
 
 
 def _rows(response: FrequencyResponse, passive: Passivity) -> list[dict[str, float]]:

@@ -158,7 +158,9 @@ def _from_cgmes(path: Path, table: NetworkTable) -> _Source:
     imported = import_network(model.tables)
     ratings = {bus_of(label): rating for label, rating in model.ratings.items()}
     generation = {bus: replace(g, rating_mva=ratings.get(bus, g.rating_mva)) for bus, g in imported.generation.items()}
-    return _Source(replace(imported, generation=generation), model.changes)
+    slack = imported.slack or max(generation, key=lambda bus: generation[bus].p_mw)  # balances SV's losses
+    misfit = misfit_of(replace(imported, slack=slack), model.tables.bus, model.tables.labels)
+    return _Source(replace(imported, generation=generation), model.changes, misfit=misfit)
 
 
 def _lines_of_file(path: Path) -> list[tuple[Line, str]]:
@@ -196,6 +198,7 @@ def _impedance(row: Row) -> list[float]:
 
 _VM, _VA = 7, 8  # columns of MATPOWER's table
 _SMALL = 1e-3  # part of the file's load that may be out of balance at a bus
+_ROUNDS = 20  # to voltages that the file lacks
 _SHOWN = 3  # buses that are named; the others are counted
 
 NOT_SOLVED = (
@@ -225,7 +228,9 @@ def misfit_of(network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str], 
     voltages = np.array([*(stated[place] for place in places), *[1 + 0j] * (len(buses) - known)])
     if known < len(buses):
         inside = matrix[known:]
-        voltages[known:] = np.atleast_1d(spsolve(inside[:, known:].tocsc(), -inside[:, :known] @ voltages[:known]))
+        for _ in range(_ROUNDS if equations.fed[known:].any() else 1):  # boundaries have loads
+            drawn = (equations.fed / voltages).conj()[known:] - inside[:, :known] @ voltages[:known]
+            voltages[known:] = np.atleast_1d(spsolve(inside[:, known:].tocsc(), drawn))
     left = SYSTEM_BASE_MVA * (equations.fed - equations.powers(voltages))
     units = [k for k, place in enumerate(places) if place in network.generation]
     left[units], left[[equations.slack, *range(known, len(buses))]] = left[units].real, 0

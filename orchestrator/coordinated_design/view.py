@@ -11,7 +11,7 @@ from orchestrator.cases.parameter_files import parameter_file_text
 from orchestrator.coordinated_design.search import RankedConverter
 from orchestrator.coordinated_design.study import PointsDesign, values_of
 from orchestrator.coordinated_design.verdict import JudgedPoint, PlacedMode, PointsVerdict
-from orchestrator.coordinated_design.words import verdict_sentence, what_it_rests_on
+from orchestrator.coordinated_design.words import remarks, verdict_sentence, what_it_rests_on
 from orchestrator.late import pd
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.view import parameter_file_path
@@ -115,6 +115,7 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "harmed": [_where(point) | {"mode": _mode(point.other)} for point in verdict.harmed],
         "astray": [_where(point) | {"difference": point.astray} for point in verdict.astray],
         "unforeseen": [_where(point) for point in verdict.unforeseen],
+        "warnings": remarks(verdict),
         "settings": [
             {
                 "controller": group.controller, "components": list(group.components), "K": setting.gain,

@@ -5,7 +5,7 @@ from collections import Counter
 from orchestrator.analysis.stability import zeros_in_words
 from orchestrator.coordinated_design.study import PointsDesign
 from orchestrator.coordinated_design.verdict import PointsVerdict
-from orchestrator.report.tables import VerdictSentence
+from orchestrator.report.tables import VerdictSentence, kinds_of
 
 _SHOWN = 4
 
@@ -109,7 +109,5 @@ def remarks(verdict: PointsVerdict) -> list[str]:
             f"at {len(unnamed)} of {total}, first at {unnamed[0].where}: a name that is asked for is borne by no mode, "
             "or its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count there"
         )
-    warned = [(text, point) for point in verdict.known for text in point.after.warnings]
-    kinds, first = Counter(text for text, _ in warned), dict(reversed(warned))
-    texts += [f"at {n} of {total}, first at {first[text].where}: {text}" for text, n in kinds.most_common(_SHOWN)]
-    return texts
+    kinds = kinds_of((point, point.after.warnings) for point in verdict.known)
+    return [*texts, *(f"at {len(x)} of {total}, first at {x[0].where}: {text}" for text, x in kinds[:_SHOWN])]

@@ -53,7 +53,9 @@ class ComponentPlan:
 
     def value(self, name: str) -> Scalar | None:
         """The value of a parameter or an input, else its start value; None without both."""
-        info = self.description.variables[name]
+        info = self.description.variables.get(name)
+        if info is None:
+            raise InputError(f"{self.description.model_name} has no variable {name!r}; `gfor fmu info` lists them")
         return self.parameters.get(name, self.inputs.get(name, info.start))
 
     def number(self, name: str) -> float:

@@ -221,25 +221,18 @@ def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
     plan, worst, swap = judgement.result.plan, judgement.worst_pair, judgement.worst_assignment
     groups = plan.groups
     found: dict[str, Any] = {
-        "case": plan.case.name,
-        "scenario": plan.prepared.name,
-        "stand_in": plan.stand_in,
-        "threshold_percent": 100 * plan.request.threshold,
-        "range_hz": list(plan.request.frequencies),
-        "vendors": list(plan.vendors),
-        "places": {name: place.vendor for name, place in plan.places.items()},
-        "groups": groups,
-        "as_in_the_case": _system(judgement.whole, groups),
+        "case": plan.case.name, "scenario": plan.prepared.name, "stand_in": plan.stand_in,
+        "threshold_percent": 100 * plan.request.threshold, "range_hz": list(plan.request.frequencies),
+        "vendors": list(plan.vendors), "places": {name: place.vendor for name, place in plan.places.items()},
+        "groups": groups, "as_in_the_case": _system(judgement.whole, groups),
         "interaction_modes": [_shared(judged) for judged in judgement.interaction_modes],
         "no_vendor": _system(judgement.none, groups),
         "alone": {vendor: _system(system, groups) for vendor, system in judgement.alone.items()},
-        "pairs": [
-            _pair(pair) | {"vendors": list(pair.vendors), "sentence": pair.sentence()} | _system(pair.joint, groups)
-            for pair in judgement.pairs
-        ],
+        "pairs": [_pair(pair) | {"vendors": list(pair.vendors), "sentence": pair.sentence()}
+                  | _system(pair.joint, groups) for pair in judgement.pairs],
         "worst_pair": None if worst is None else list(worst.vendors),
         "unknown_pairs": [list(pair.vendors) for pair in judgement.unknown_pairs],
-    }
+    }  # fmt: skip
     if plan.swapped:
         found["assignments"] = [
             {"at": dict(zip(plan.swapped, system.name.names, strict=True))} | _system(system, groups, modes=False)

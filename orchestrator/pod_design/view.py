@@ -122,50 +122,29 @@ def parameter_file_path(given: str | Path, argument: str = "path") -> Path:
 
 def design_json(d: PodDesign) -> dict[str, Any]:
     S, setting = d.sensitivities, d.final.setting
-    content = {
-        "controller": d.request.controller,
-        "target_mode": _complex(d.initial),
-        "sensitivity": _polar(S.value),
-        "T_S1": setting.filters.T_S1,
-        "T_S2": setting.filters.T_S2,
-        "N_S": d.target.stages,
-        "K": setting.gain,
-        "K_unbounded": d.unbounded_gain,
-        "predicted_mode": _complex(d.predicted),
+    before, after = d.stability_before, d.stability
+    return {
+        "controller": d.request.controller, "target_mode": _complex(d.initial), "sensitivity": _polar(S.value),
+        "T_S1": setting.filters.T_S1, "T_S2": setting.filters.T_S2, "N_S": d.target.stages, "K": setting.gain,
+        "K_unbounded": d.unbounded_gain, "predicted_mode": _complex(d.predicted),
         "achieved_mode": _complex(d.achieved),
         "requirement": {
-            "damping_ratio": d.required_damping,
-            "increment": d.required_damping - damping_ratio(d.initial),
-            "gain_bounds": list(d.request.gain_bounds),
-            "delta_gain": d.request.delta_gain,
+            "damping_ratio": d.required_damping, "increment": d.required_damping - damping_ratio(d.initial),
+            "gain_bounds": list(d.request.gain_bounds), "delta_gain": d.request.delta_gain,
             "least_damping_of_others": d.request.least_damping,
         },
-        "met": d.met,
-        "verdict": verdict(d),
-        "target_damping_ratio": damping_ratio(d.initial),
-        "achieved_damping_ratio": d.achieved_damping,
-        "followed_mode": _complex(d.final.eigenvalue),
-        "compensated_sensitivity": _polar(S.compensated),
-        "K_non_compensated": d.gain_non_compensated,
-        "K_compensated": d.gain_compensated,
-        "active_bound": d.active_bound,
+        "met": d.met, "verdict": verdict(d), "target_damping_ratio": damping_ratio(d.initial),
+        "achieved_damping_ratio": d.achieved_damping, "followed_mode": _complex(d.final.eigenvalue),
+        "compensated_sensitivity": _polar(S.compensated), "K_non_compensated": d.gain_non_compensated,
+        "K_compensated": d.gain_compensated, "active_bound": d.active_bound,
         "worst_other_mode": {"before": _other_json(d.before.worst), "after": _other_json(d.worst_other)},
-        "stable": d.stability.stable,
-        "largest_growth_rate": d.stability.largest_growth_rate,
-        "stability": {"before": d.stability_before.as_json(), "after": d.stability.as_json()},
-        "warnings": list(d.warnings),
-        "largest_real_part": {
-            "before": d.stability_before.largest_growth_rate,
-            "after": d.stability.largest_growth_rate,
-        },
+        "stable": after.stable, "largest_growth_rate": after.largest_growth_rate,
+        "stability": {"before": before.as_json(), "after": after.as_json()}, "warnings": list(d.warnings),
+        "largest_real_part": {"before": before.largest_growth_rate, "after": after.largest_growth_rate},
         "margins": _margins_json(d.margins) if d.margins else None,
-        "refinement": _refinement_json(d) if d.refinement else None,
-        "case": d.case,
-        "scenario": d.target.scenario,
-        "mode": d.mode_name,
-        "components": list(d.target.components),
-    }
-    return content
+        "refinement": _refinement_json(d) if d.refinement else None, "case": d.case, "scenario": d.target.scenario,
+        "mode": d.mode_name, "components": list(d.target.components),
+    }  # fmt: skip
 
 
 def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
@@ -235,15 +214,10 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
     assert refinement is not None
     return {
         "designed": filters(d.filters) | placed(d.designed),
-        "sweeps": [
-            {
-                "lead_lag": s.why,
-                **filters(s.filters),
-                "points": [with_least(p, least) for p, least in zip_longest(s.points, s.least)],
-                "chosen": with_least(s.chosen, s.chosen_least),
-                "unstable_gains": list(s.unstable),
-            }
-            for s in refinement.sweeps
-        ],
+        "sweeps": [{
+            "lead_lag": s.why, **filters(s.filters),
+            "points": [with_least(p, least) for p, least in zip_longest(s.points, s.least)],
+            "chosen": with_least(s.chosen, s.chosen_least), "unstable_gains": list(s.unstable),
+        } for s in refinement.sweeps],
         "notes": refinement.notes,
-    }
+    }  # fmt: skip

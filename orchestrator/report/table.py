@@ -18,6 +18,7 @@ from orchestrator.results.storage import save_table
 
 Row = TypeVar("Row")
 
+_DATE = r"\d{4}-\d\d-\d\d( \d\d:\d\d:\d\d)?"
 _MINUS = re.compile(r"^-(?=\d)")
 _ON_TERMINALS = {"good": "bold green", "bad": "bold red", "soft": "bold yellow"}
 LEAST_DAMPING = 5.0  # [%]; less is marked
@@ -81,7 +82,15 @@ class ColumnTable(Generic[Row]):
         return [{column.name: column.get(row) for column in self.columns if column.name} for row in self.rows]
 
     def frame(self) -> pd.DataFrame:
-        return pd.DataFrame(self.records(), columns=[column.name for column in self.columns if column.name])
+        """Whole numbers and times as names of points are such again, as tables of points have them."""
+        found = pd.DataFrame(self.records(), columns=[column.name for column in self.columns if column.name])
+        names = found.get("point")
+        if names is None or not len(names):
+            return found
+        if names.str.fullmatch(r"0|-?[1-9]\d{0,17}").all():
+            return found.assign(point=names.astype("int64"))
+        times = pd.to_datetime(names.where(names.str.fullmatch(_DATE)), errors="coerce")
+        return found.assign(point=times) if times.notna().all() else found
 
     def save(self, path: Path) -> None:
         """Write a CSV file; truth values are in lower case, as in JSON."""

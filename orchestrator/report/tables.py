@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rich.markup import escape
 from rich.table import Table
@@ -15,6 +16,7 @@ from orchestrator.fmi.values import as_text
 if TYPE_CHECKING:
     from orchestrator.fmi.description import FmuDescription, VariableInfo
 
+Told = TypeVar("Told")
 COLOURS = {True: "green", False: "red", None: "yellow"}  # of a verdict that is good, bad or not known
 
 
@@ -35,6 +37,7 @@ class VerdictSentence:
         return f"[bold {COLOURS[self.good]}]{self.word}[/]:{of} {escape(self.text)}"
 
 
+_FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 _ITEMS_SHOWN = 5  # how many of a long list are shown, largest first
 
 
@@ -66,6 +69,15 @@ def first_few(items: Iterable[Any], text: Callable[[Any], str]) -> str:
     items = list(items)
     shown = ", ".join(text(item) for item in items[:_ITEMS_SHOWN])
     return shown + (f" … {len(items)} in all" if len(items) > _ITEMS_SHOWN else "")
+
+
+def kinds_of(said: Iterable[tuple[Told, Iterable[str]]]) -> list[tuple[str, list[Told]]]:
+    """Texts with all that tell them, the most told first; those that differ only in their figures are one."""
+    found: dict[str, tuple[str, list[Told]]] = {}
+    for teller, texts in said:
+        for kind, text in {_FIGURE.sub("#", text): text for text in texts}.items():
+            found.setdefault(kind, (text, []))[1].append(teller)
+    return sorted(found.values(), key=lambda kind: -len(kind[1]))
 
 
 def counted(number: int, what: str) -> str:

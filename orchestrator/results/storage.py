@@ -32,21 +32,15 @@ def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
     fmus = {name: plan.description for name, plan in prepared.system.components.items()}
     tolerance = prepared.schedule.tolerance
     return {
-        "case": prepared.case.name,
-        "scenario": prepared.name,
-        "title": prepared.title,
-        "case_file": prepared.case.text,
-        "values": json.dumps(prepared.values),
-        "events": "; ".join(map(str, prepared.events)),
-        "step_size_s": prepared.step_size,
+        "case": prepared.case.name, "scenario": prepared.name, "title": prepared.title,
+        "case_file": prepared.case.text, "values": json.dumps(prepared.values),
+        "events": "; ".join(map(str, prepared.events)), "step_size_s": prepared.step_size,
         "schedule": f"{prepared.schedule.name}: {' | '.join(', '.join(g) for g in prepared.schedule.groups)}",
         **({} if tolerance is None else {"tolerance": tolerance}),
-        "fmus": json.dumps(
-            {n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool} for n, d in fmus.items()}
-        ),
-        "versions": json.dumps(versions_of(packages)),
-        "Conventions": "CF-1.10",
-    }
+        "fmus": json.dumps({n: {"model": d.model_name, "guid": d.guid, "tool": d.generation_tool}
+                            for n, d in fmus.items()}),
+        "versions": json.dumps(versions_of(packages)), "Conventions": "CF-1.10",
+    }  # fmt: skip
 
 
 def origin_of_rows(prepared: PreparedScenario) -> dict[str, str | float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from orchestrator.report.html.charts import ChartCurve, Mark, complex_plane, leg
 from orchestrator.report.html.elements import Figures, colour, document, paragraphs
 from orchestrator.report.notebook import page
 from orchestrator.report.table import Column, ColumnTable, Marked, damping
-from orchestrator.report.tables import eigenvalue_text
+from orchestrator.report.tables import eigenvalue_text, kinds_of
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json
@@ -233,12 +232,9 @@ def remarks(summary: Summary) -> list[str]:
         texts.append(f"{status}: {number} of {len(summary.result.items)}:")
         texts += [f"  {where(item)}: {item.record.text}" for item in named[:_SHOWN]]
         texts += [f"  … and {number - _SHOWN} more, in items.csv"] if number > _SHOWN else []
-    warned = [(text, item) for item in summary.result.items for text in item.record.warnings]
-    kinds, first = Counter(text for text, _ in warned), dict(reversed(warned))
-    texts += [
-        f"at {number} of {len(summary.result.items)}, first at {where(first[text])}: {text}"
-        for text, number in kinds.most_common(_SHOWN)
-    ]
+    every = summary.result.items
+    kinds = kinds_of((item, item.record.warnings) for item in every)
+    texts += [f"at {len(x)} of {len(every)}, first at {where(x[0])}: {text}" for text, x in kinds[:_SHOWN]]
     if len(kinds) > _SHOWN:
         texts.append(f"… and {len(kinds) - _SHOWN} more warnings, in items.csv")
     return texts

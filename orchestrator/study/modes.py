@@ -337,23 +337,14 @@ def _is_swing(mode: spectra.Mode, speeds: Sequence[str]) -> bool:
 
 def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesResult:
     """The result for a system that can be simulated but not linearised: no modes, and a warning with the reasons."""
+    why = "; ".join(reasons)
+    said = *map(str, prepared.questions), f"no steady state was looked for and there are no modes: {why}"
     return ModesResult(
-        prepared=prepared,
-        operating_point=OperatingPoint(math.nan, math.nan, math.nan, 0, {}),
-        model=LinearModel.from_matrix(np.zeros((0, 0)), (), prepared.step_size),
-        modes=[],
-        named={},
-        references={},
-        warnings=(
-            *map(str, prepared.questions),
-            f"no steady state was looked for and there are no modes: {'; '.join(reasons)}",
-        ),
-        swing=(),
-        areas={},
-        stability=Stability(None, reason=f"the system cannot be linearised: {'; '.join(reasons)}"),
-        hidden=None,
-        system=None,
-    )
+        prepared=prepared, operating_point=OperatingPoint(math.nan, math.nan, math.nan, 0, {}),
+        model=LinearModel.from_matrix(np.zeros((0, 0)), (), prepared.step_size), modes=[], named={}, references={},
+        warnings=said, swing=(), areas={}, hidden=None, system=None,
+        stability=Stability(None, reason=f"the system cannot be linearised: {why}"),
+    )  # fmt: skip
 
 
 def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) -> Mapping[str, Any]:
@@ -366,40 +357,24 @@ def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) ->
         "step_size_s": first.step_size,
         "facts": None if facts is None else facts.sentence(),
         "questions": list(dict.fromkeys([*asked, *questions])),
-        "scenarios": [
-            {
-                "name": r.prepared.name,
-                "residual": r.operating_point.residual,
-                "states": r.model.number_of_states,
-                "stable": r.stability.stable,
-                "largest_growth_rate": r.stability.largest_growth_rate,
-                "stability": r.stability.as_json(),
-                "outside_range": None if r.hidden is None else r.hidden.as_json(),
-                "power_flow": power_flow_json(r.prepared),
-                "linearised": r.linearised,
-                "fit_errors": r.fit_errors,
-                "warnings": list(r.warnings),
-                "named": {
-                    table.name: None
-                    if (mode := r.named.get(table.name)) is None
-                    else eigenvalue_json(mode.eigenvalue, mode.damping_percent)
-                    for table in r.prepared.case.table.analysis.modes
-                },
-                "modes": [
-                    {
-                        **eigenvalue_json(m.eigenvalue, m.damping_percent),
-                        "name": r.name_of(m),
-                        "participation": [{"state": s, "factor": f} for s, f in m.participation if f >= 1e-4],
-                        "components": {c: f for c, f in m.by_component.items() if f >= 1e-4},
-                        "areas": r.by_area(m),
-                        "shape": [
-                            {"state": s, "magnitude": abs(m.shape[s]), "angle_deg": math.degrees(phase(m.shape[s]))}
-                            for s in r.swing
-                        ],
-                    }
-                    for m in r.modes
-                ],
-            }
-            for r in results
-        ],
+        "scenarios": [_scenario_json(r) for r in results],
     }
+
+
+def _scenario_json(r: ModesResult) -> dict[str, Any]:
+    named = {table.name: r.named.get(table.name) for table in r.prepared.case.table.analysis.modes}
+    return {
+        "name": r.prepared.name, "residual": r.operating_point.residual, "states": r.model.number_of_states,
+        "stable": r.stability.stable, "largest_growth_rate": r.stability.largest_growth_rate,
+        "stability": r.stability.as_json(), "outside_range": None if r.hidden is None else r.hidden.as_json(),
+        "power_flow": power_flow_json(r.prepared), "linearised": r.linearised, "fit_errors": r.fit_errors,
+        "warnings": list(r.warnings),
+        "named": {name: m and eigenvalue_json(m.eigenvalue, m.damping_percent) for name, m in named.items()},
+        "modes": [{
+            **eigenvalue_json(m.eigenvalue, m.damping_percent), "name": r.name_of(m),
+            "participation": [{"state": s, "factor": f} for s, f in m.participation if f >= 1e-4],
+            "components": {c: f for c, f in m.by_component.items() if f >= 1e-4}, "areas": r.by_area(m),
+            "shape": [{"state": s, "magnitude": abs(m.shape[s]), "angle_deg": math.degrees(phase(m.shape[s]))}
+                      for s in r.swing],
+        } for m in r.modes],
+    }  # fmt: skip

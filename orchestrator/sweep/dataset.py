@@ -14,6 +14,7 @@ import numpy as np
 
 from orchestrator.analysis.modes import damping_percent
 from orchestrator.late import xr
+from orchestrator.report.tables import kinds_of
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.storage import provenance, save_netcdf, save_table
 from orchestrator.sweep.axes import grid_places
@@ -151,8 +152,22 @@ def _attributes(samples: Samples) -> dict[str, Any]:
     low, high = result.plan.frequency_range
     return {k: v for k, v in origin.items() if k not in ("scenario", "events")} | own | {
         "overrides": json.dumps(result.plan.overrides),
+        "warned": json.dumps([*_asked(samples), *warned(samples)]),
         "frequency_range_hz": [low, high],
     }  # fmt: skip
+
+
+def _asked(samples: Samples) -> dict[str, None]:
+    """What was questioned before the sweep."""
+    return {str(question): None for sweep in samples.result.scenarios for question in sweep.prepared.questions}
+
+
+def warned(samples: Samples) -> list[str]:
+    """Each kind of warning once, with the number of points that have it."""
+    asked = _asked(samples)  # said already, before the sweep
+    points = [record for sweep in samples.result.scenarios for record in sweep.points.values()]
+    kinds = kinds_of((record, (text for text in record.warnings if text not in asked)) for record in points)
+    return [f"at {len(having)} of {len(points)} points: {text}" for text, having in kinds]
 
 
 def sweep_rows(samples: Samples) -> list[dict[str, Any]]:
@@ -209,32 +224,19 @@ def sweep_json(samples: Samples) -> dict[str, Any]:
         "parameters": [{"name": a.key, "unit": a.unit, "values": list(a.values)} for a in samples.axes],
         "step_size_s": result.plan.scenarios[0].step_size,
         "points": {"computed": result.computed, "stored": result.stored, "refining": result.refined},
-        "scenarios": [
-            {
-                "name": sweep.prepared.name,
-                "title": sweep.prepared.title,
-                "stable": sweep.stable,
-                "unstable": [
-                    {"values": samples.setting(place)} | sweep.points[place].stability
-                    for place in sweep.unstable(samples.axes)
-                ],
-                "trajectories": [
-                    {
-                        "name": trajectory.name,
-                        "points": [_point_json(samples.setting(p), f) for p, f in samples.of(sweep, trajectory)],
-                    }
-                    for trajectory in sweep.trajectories
-                ],
-                "failed": failed[sweep.prepared.name],
-                "warnings": [
-                    {"values": samples.setting(place), "warnings": list(sweep.points[place].warnings)}
-                    for place in grid_places(samples.axes)
-                    if sweep.points[place].warnings
-                ],
-            }
-            for sweep in result.scenarios
-        ],
-    }
+        "scenarios": [{
+            "name": sweep.prepared.name, "title": sweep.prepared.title, "stable": sweep.stable,
+            "unstable": [{"values": samples.setting(place)} | sweep.points[place].stability
+                         for place in sweep.unstable(samples.axes)],
+            "trajectories": [{
+                "name": trajectory.name,
+                "points": [_point_json(samples.setting(p), f) for p, f in samples.of(sweep, trajectory)],
+            } for trajectory in sweep.trajectories],
+            "failed": failed[sweep.prepared.name],
+            "warnings": [{"values": samples.setting(place), "warnings": list(said)}
+                         for place in grid_places(samples.axes) if (said := sweep.points[place].warnings)],
+        } for sweep in result.scenarios],
+    }  # fmt: skip
 
 
 def _point_json(setting: dict[str, float | bool], sample: dict[str, Any]) -> dict[str, Any]:

@@ -1,21 +1,19 @@
 """A sweep on a terminal."""
 
 import math
-import re
 
 from rich.markup import escape
 from rich.table import Table
 
 from orchestrator.report.tables import counted, make_table
 from orchestrator.sweep.axes import grid_places
-from orchestrator.sweep.dataset import Samples
+from orchestrator.sweep.dataset import Samples, warned
 from orchestrator.sweep.limit import Ending
 from orchestrator.sweep.plots import axis_label
 from orchestrator.sweep.sweep import ScenarioSweep
 from orchestrator.sweep.trajectories import GridPlace
 
 _FAILURES_SHOWN, _TURNS = 5, 3
-_FIGURE = re.compile(r"[-+]?\b\d[\d.,]*(?:e[-+]?\d+)?")
 
 
 def trajectories(samples: Samples) -> Table:
@@ -130,22 +128,7 @@ def remarks(samples: Samples) -> list[str]:
             f"{counted(result.refined, 'point')} between those of the grid served to recognise modes "
             "(where, is marked 'refined' in sweep.csv)"
         )
-    return [*texts, *_warnings(samples)]
-
-
-def _warnings(samples: Samples) -> list[str]:
-    """Each kind of warning once, with the number of points that have it. Two warnings that differ only in their figures
-    are of one kind."""
-    asked = {str(question) for sweep in samples.result.scenarios for question in sweep.prepared.questions}
-    kinds: dict[str, tuple[str, set[tuple[str, GridPlace]]]] = {}
-    for sweep in samples.result.scenarios:
-        for place, record in sweep.points.items():
-            for text in record.warnings:
-                if text not in asked:  # said already, before the sweep
-                    _, points = kinds.setdefault(_FIGURE.sub("#", text), (text, set()))
-                    points.add((sweep.prepared.name, place))
-    total = sum(len(sweep.points) for sweep in samples.result.scenarios)
-    return [f"at {len(points)} of {total} points: {text}" for text, points in kinds.values()]
+    return [*texts, *warned(samples)]
 
 
 def place_text(samples: Samples, place: GridPlace) -> str:

@@ -40,6 +40,14 @@ def test_a_name_that_does_not_exist_is_refused_with_those_that_do():
         _ = orchestrator.laod
 
 
+def test_a_study_that_is_called_without_a_case_is_told_where_it_is():
+    import orchestrator.sweep  # noqa: PLC0415 - the package, which hides that there is no such name
+
+    with pytest.raises(AttributeError, match=r"load\('two_area'\).sweep\(…\), or .*`gfor sweep`; functions: .*load"):
+        orchestrator.sweep("two_area")
+    assert {"sweep", "screen"} <= {*dir(orchestrator.load("two_area"))}
+
+
 def test_every_line_of_the_stub_is_a_name():
     tree = ast.parse((ROOT / "orchestrator" / "__init__.pyi").read_text(encoding="utf-8"))
     homes = {alias.asname: node.module for node in tree.body for alias in node.names}

@@ -333,6 +333,9 @@ def test_participation_is_that_of_the_modes(modes):
     factors = modes.participation()
     for number, mode in enumerate(modes, start=1):
         assert factors[number].to_dict() == dict(mode.participation)
+    shape = modes.dataset["shape"].sel(mode=1)
+    assert {str(k): v for k, v in zip(shape.state.values, shape.values, strict=True) if v} == modes[0].shape
+    assert modes.dataset["damping"].values.tolist() == modes.table()["damping_percent"].tolist()
 
 
 def test_progress_is_reported():

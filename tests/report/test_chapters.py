@@ -30,15 +30,17 @@ CHECK = {
                 "figures": {"not_judged": "anything after it"}}],
 }  # fmt: skip
 CERTIFICATE = {"sentence": "It passes at all.", "verdict": "passes", "passed": True, "files": {}, "seal": "0",
-               "judged": "9 of 9", "missing": [], "departures": []}  # fmt: skip
+               "judged": "9 of 9", "missing": [], "departures": [], "acceptance": {"checks": [
+                   {"figures": {"not_judged": "what dips leave behind"}}]},
+               "points": [{"X_L": 0.1, "warnings": {"pod": ["1.2 pu at X_L = 0.1"]}}]}  # fmt: skip
 COMPARISON = [{"expression": "sg1.omega", "unit": "pu", "deviations": [1, 2], "largest": 0.5, "at": 1.2, "rms": 0.1}]
 
 IDENTIFIED = [{"real": -0.3, "imag": 5.8, "frequency_hz": 0.923, "damping_percent": 5.2, "amplitude": 0.1,
-               "doubts": []}]  # fmt: skip
+               "doubts": ["it is at the window's edge"]}]  # fmt: skip
 
 SENSITIVITIES = [{
-    "derivative": "total", "scenario": "pod", "stable": True, "mode": {"frequency_hz": 0.9, "damping_percent": 4.2,
-                                                                       "name": None},
+    "derivative": "total", "scenario": "pod", "stable": True, "warnings": ["beyond its rating: gfor"],
+    "mode": {"frequency_hz": 0.9, "damping_percent": 4.2, "name": None},
     "sensitivities": [
         {"parameter": f"gfor.{name}", "value": 1.0, "unit": "pu", "damping_points_per_percent": points,
          "frequency_hz_per_percent": 0.0, "doubts": "", "reason": "" if points else "it holds no steady state"}
@@ -87,8 +89,10 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
         "mon, sg3: no power flow: sg5 would need 129 %",
         "growth outside of the range was counted at some points only",
         "vendor.fmu: wrong rated frequency", "anything after it", "It passes at all.", "judged: 9 of 9",
+        "what dips leave behind", "1.2 pu at X_L = 0.1",
         "sg1.omega differs most, by 0.5 pu at 1.200 s", "two modes are close", "strongest: 0.923 Hz, 5.20 %",
         "0.900 Hz, 4.20 %: most by gfor.b (-0.2), gfor.a (+0.01) points for 1 % more", "it holds no steady state",
+        "0.923 Hz: it is at the window's edge".replace("'", "&#x27;"), "beyond its rating: gfor",
         "0.800 Hz: forced, from sg2; 1.100 Hz: not known", "1.100 Hz: too short", "a gap",
         "base, pod: weakest is bus_2 with 400 MVA, SCR 3.00 at bus_1",
     ):  # fmt: skip
@@ -126,6 +130,9 @@ def test_what_changed_since_an_older_page(folders, tmp_path):
     written(folders, tmp_path)
     old = shutil.copy(tmp_path / "page.html", tmp_path / "old.html")
     assert "No answer differs from old.html" in written(folders, tmp_path, against=tmp_path / "old.html")
+    (folders[0] / "pod_p.json").write_text(json.dumps(SHEET | {"warnings": ["gfor is beyond its rating"]}))
+    text = written(folders, tmp_path, against=old)
+    assert "not judged: gfor is beyond its rating" in text[text.index("Answers that differ") : text.index("</section>")]
     (folders[0] / "pod_p.json").write_text(json.dumps(SHEET | {"met": True, "K": 300.0}), encoding="utf-8")
     text = written(folders[:4], tmp_path, against=old)
     changed = text[text.index("Answers that differ") : text.index("</section>")]

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import main
+from orchestrator.report.table import Column, ColumnTable
+from orchestrator.report.tables import kinds_of
 from tests.support.printed import eigenvalue, in_markdown, on_page, on_terminal, value
 
 SCENARIOS = ["--scenario", "base", "--scenario", "pod_p"]
@@ -281,3 +283,17 @@ def test_the_table_of_designs(gfor, label, tmp_path):
     found = json.loads(gfor("design", "two_area", *arguments)[1])
     for heading, key in {"T_S1 [s]": "T_S1", "T_S2 [s]": "T_S2", "K before its bounds": "K_unbounded"}.items():
         agrees(dict(zip(rows[0], row, strict=True)), heading, found[key])
+
+
+@pytest.mark.parametrize("names", [["01", "2"], ["2026-02-30 00:00:00"], ["usual", "1"]])
+def test_names_of_points_that_are_no_numbers_and_no_times_stay(names):
+    columns = (Column("Point", lambda name: name, name="point"),)
+    assert ColumnTable("", columns, names).frame()["point"].tolist() == names
+    times = ["2026-01-01 00:00:00", "2026-01-01 01:00:00"]
+    assert [*map(str, ColumnTable("", columns, times).frame()["point"])] == times
+    assert ColumnTable("", columns, times).frame()["point"].dt.hour.tolist() == [0, 1]
+
+
+def test_texts_that_differ_in_figures_only_are_one_kind_and_names_are_not_figures():
+    said = [("a", ["bus_1 feeds 70 Mvar", "bus_2 feeds 1 Mvar"]), ("b", ["bus_1 feeds -7.5e1 Mvar"])]
+    assert kinds_of(said) == [("bus_1 feeds 70 Mvar", ["a", "b"]), ("bus_2 feeds 1 Mvar", ["a"])]

@@ -19,6 +19,7 @@ from orchestrator.points.failure import Failure
 from orchestrator.points.points import Work
 from orchestrator.points.processes import Processes
 from orchestrator.points.store import PointStore
+from orchestrator.report.html.chapters import of_sweep
 from orchestrator.sweep import sweep as sweep_module
 from orchestrator.sweep.axes import _axis, parse_vary, resolve
 from orchestrator.sweep.point import PointRecord, compute_point
@@ -386,6 +387,7 @@ def test_points_without_a_verdict_are_counted_and_warnings_are_said(gfor, case, 
     assert scenario["warnings"] == [{"values": {"a1.gain": 2.0}, "warnings": ["the step hides 2 %"]}]
     with xr.open_dataset(out / "sweep.nc") as data:
         assert data["warnings"].values[0].tolist() == ["", "the step hides 2 %"]
+        assert "at 1 of 2 points: the step hides 2 %" in of_sweep(out, data).not_judged
         hertz = data["largest_growth_frequency"].values[0]
     with (out / "sweep.csv").open(encoding="utf-8") as file:
         beside = {float(row["frequency of largest growth rate [Hz]"]) for row in csv.DictReader(file)}

@@ -150,6 +150,8 @@ class _Reading:
             self._nominal[row.Index] = nominal
             self._volts[row.Index] = float(row.v_mag) / nominal
             self._add_bus(row.Index, named[row.Index])
+            if math.isfinite(row.v_mag) and math.isfinite(row.v_angle):
+                self._rows[-1][7:] = self._volts[row.Index], float(row.v_angle)
         slack = {*self._source.get_extensions("slackTerminal").bus_id} & kept
         for bus in slack:
             self._rows[self._numbers[bus]][1] = 3

@@ -7,6 +7,7 @@ from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
+from itertools import chain
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -65,7 +66,7 @@ def chapters_of(place: Path) -> list[Chapter]:
             if wanted <= keys:
                 each = content if isinstance(content, list) and make is _sensitivities else [content]
                 try:
-                    found += [make(file, one) for one in each]
+                    found += [_warned(make(file, one), one) for one in each]
                 except (KeyError, TypeError, IndexError, AttributeError, ValueError) as error:
                     raise InputError(
                         f"{file}: it is not as its study writes it ({error!r}); run the study again"
@@ -95,6 +96,7 @@ def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", kind: 
         open_ += [f"{title}: {stability.get('reason') or 'stability'}"] if stable is None else []
         if ring := s.get("ring_down"):
             sure.append(f"{title} rings with {ring['frequency_hz']:.3f} Hz, {ring['damping_percent']:.2f} % in time")
+    open_ += dict.fromkeys(text for s in scenarios for text in s.get("warnings", []))
     verdicts = [stable for stable, _ in said]
     good = False if False in verdicts else None if None in verdicts else True
     basis = f"{kind} models; " if kind else ""
@@ -132,6 +134,13 @@ def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
     return legend(shades.items()) + complex_plane(name, marks) if marks else ""
 
 
+def _warned(chapter: Chapter, content: Any) -> Chapter:
+    """With the study's warnings among what was not judged."""
+    told = content.get("warnings") if isinstance(content, dict) else None
+    more = told if isinstance(told, list) else []
+    return replace(chapter, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])))
+
+
 def _screening(file: Path, c: Content) -> Chapter:
     where = "somewhere" if c["stable"] is False else "everywhere"
     answer = f"{_STABLE[c['stable']]} {where}: {c['points']} operating points, {c['outages']} outages"
@@ -166,7 +175,7 @@ def _design(file: Path, c: Content) -> Chapter:
     modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
     content = _map("The mode that was designed for", modes) + studies.design(dict(c))
     return Chapter(file, f"Does {c['controller']} damp the {c['mode']} mode?", answer, bool(c["met"]), sure,
-                   c.get("warnings", []), content, title=f"Design of {c['controller']}")  # fmt: skip
+                   content=content, title=f"Design of {c['controller']}")  # fmt: skip
 
 
 def _coordinated(file: Path, c: Content) -> Chapter:
@@ -179,7 +188,10 @@ def _coordinated(file: Path, c: Content) -> Chapter:
 
 def _certificate(file: Path, c: Content) -> Chapter:
     open_ = [text if isinstance(text, str) else f"X_L = {text:g} pu" for text in (*c["departures"], *c["missing"])]
-    trusted = (c.get("acceptance") or {}).get("trusted") is not False
+    warned = [texts for point in c.get("points", []) for texts in point.get("warnings", {}).values()]
+    check: Content = c.get("acceptance") or {}
+    open_ += dict.fromkeys([*chain(*warned), *_unjudged(check.get("checks", []))])
+    trusted = check.get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
     sure = f"judged: {c['judged']}" if c.get("judged") else f"{len(c['rows'])} tests" if "rows" in c else ""
     question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
@@ -187,14 +199,18 @@ def _certificate(file: Path, c: Content) -> Chapter:
 
 
 def _matrix(file: Path, c: Content) -> Chapter:
-    lost = [f"{x['device']}, {x['code']}: {x['failure']}" for x in c["cells"] if x["failure"]]
+    open_ = ((x, x["failure"] or (x["missing"] and f"{x['missing']} not tested")) for x in c["cells"])
+    lost = [f"{x['device']}, {x['code']}: {text}" for x, text in open_ if text]
     return Chapter(file, "Which converter passes which grid code?", c["sentence"], c["exit_code"] == 0,
                    f"{len(c['cells'])} pairs of a device and a code", lost, page="matrix.html")  # fmt: skip
 
 
+def _unjudged(checks: Sequence[Content]) -> list[str]:
+    return [str(x["figures"]["not_judged"]) for x in checks if "not_judged" in x["figures"]]
+
+
 def _check(file: Path, c: Content) -> Chapter:
     bad = [check for check in c["checks"] if check["verdict"] == "fail"]
-    open_ = [str(check["figures"]["not_judged"]) for check in c["checks"] if "not_judged" in check["figures"]]
     remarks = sum(check["verdict"] == "remark" for check in c["checks"])
     name = Path(c["fmu"]).name
     answer = f"{name}: " + ("no check failed" if c["trusted"] else ", ".join(c["faults"]) or "not to be judged here")
@@ -204,7 +220,7 @@ def _check(file: Path, c: Content) -> Chapter:
     good = True if c["trusted"] else False if bad else None
     return Chapter(
         file, "Can this FMU be trusted in a co-simulation?", answer, good,
-        f"{len(c['checks'])} checks, {remarks} with a remark", [*c["not_supported"], *open_],
+        f"{len(c['checks'])} checks, {remarks} with a remark", [*c["not_supported"], *_unjudged(c["checks"])],
         table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
     )  # fmt: skip
 
@@ -231,7 +247,8 @@ def _identified(file: Path, modes: Any) -> Chapter:
     swing = next((m for m in modes if m["frequency_hz"]), None)
     figures = f"{swing['frequency_hz']:.3f} Hz, {swing['damping_percent']:.2f} %" if swing else "no oscillation"
     sure = f"{sum(not m['doubts'] for m in modes)} of {len(modes)} modes without a doubt"
-    return Chapter(file, "With which modes does a record ring?", f"strongest: {figures}", None, sure, (),
+    doubts = [f"{m['frequency_hz']:.3f} Hz: {text}" for m in modes for text in m["doubts"]]
+    return Chapter(file, "With which modes does a record ring?", f"strongest: {figures}", None, sure, doubts,
                    _map("Modes", {"record": modes})
                    + table("Modes", ["f [Hz]", "Damping [%]", "Amplitude", "Doubts"], rows, left=0))  # fmt: skip
 
@@ -245,8 +262,7 @@ def _interactions(file: Path, c: Content) -> Chapter:
     answer += f"; {worst['sentence']}" if worst else ""
     sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
     lost = [f"pair {' and '.join(pair)}" for pair in c["unknown_pairs"]]
-    return Chapter(file, "Do several vendors' converters agree?", answer, good, sure, [*lost, *c["warnings"]],
-                   page="interactions.html")  # fmt: skip
+    return Chapter(file, "Do several vendors' converters agree?", answer, good, sure, lost, page="interactions.html")
 
 
 def _sensitivities(file: Path, c: Content) -> Chapter:
@@ -360,17 +376,18 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     stable = sweep.get("stable")
     lost = 0 if stable is None else int((stable == 0).sum())
     unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
+    open_ = [f"stability at {unknown} points"] if unknown else []
+    open_ += json.loads(sweep.attrs.get("warned", "[]"))
     if limits := limits_of(place):
         said = "; ".join(f"{one['scenario']}: {one['sentence']}" for one in limits)
         holds = all(one["ends_with"] == "holds" for one in limits)
         return Chapter(
             place, f"How far may {limits[0]['parameter']} go?", said, holds or None,
             "coarse values, then bisection; each is of the coupled FMUs at an operating point of its own",
-            ["narrow pieces between the values that were tried"],
+            [*open_, "narrow pieces between the values that were tried"],
         )  # fmt: skip
     answer = f"least damping {float(least.min()):.2f} % at {where}" + (f"; UNSTABLE at {lost} points" if lost else "")
     return Chapter(
         place, f"How do the modes move along {studies.axis_of(sweep)}?", answer, False if lost else None,
-        "each point is a linear model of the coupled FMUs there",
-        [f"stability at {unknown} points"] if unknown else (),
+        "each point is a linear model of the coupled FMUs there", open_,
     )  # fmt: skip

@@ -210,7 +210,8 @@ def _kept(page: Path) -> list[dict[str, str]]:
 
 def _answers(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
     return [
-        {"question": one.question, "source": "" if one.source.is_dir() else one.source.name, "answer": one.answer,
+        {"question": one.question, "source": "" if one.source.is_dir() else one.source.name,
+         "answer": one.answer + "".join(f"; not judged: {text}" for text in one.not_judged),
          "folder": (one.source if one.source.is_dir() else one.source.absolute().parent).name}
         for one in chapters
     ]  # fmt: skip
