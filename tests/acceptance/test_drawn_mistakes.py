@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.acceptance.checks import ride_through
+from orchestrator.acceptance.checks import aftermath, ride_through
+from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.acceptance.process import HostedComponent
 from orchestrator.fmi import limits
 
@@ -46,3 +47,27 @@ def test_on_a_crowded_machine_an_answer_is_waited_for_up_to_eight_times_as_long(
     monkeypatch.setattr(limits.os, "getloadavg", lambda: (load, 0.0, 0.0), raising=False)
     monkeypatch.setattr(limits.os, "cpu_count", lambda: 2)
     assert limits.crowded() == wanted
+
+
+def test_after_a_dip_that_it_does_not_survive_a_third_of_it_for_half_as_long_is_tried(monkeypatch):
+    tried = []
+
+    def after(segments, soon):
+        tried.append(segments)
+        return SimpleNamespace(end=aftermath._End.NOTHING)
+
+    monkeypatch.setattr(aftermath, "_Look", lambda subject: SimpleNamespace(after=after))
+    monkeypatch.setattr(aftermath, "_drawn", lambda subject: iter([[(0.4, 0.3), (1.3, 0.2)]]))
+    monkeypatch.setattr(aftermath, "_wrong", lambda found: None)
+    monkeypatch.setattr(aftermath, "_judged", len)
+    assert aftermath.after_dips(SimpleNamespace(port=True, memory={})) == 2
+    (_, milder) = tried
+    assert np.ravel(milder) == pytest.approx([0.8, 0.15, 1.1, 0.1])
+
+
+def test_an_input_that_starts_at_its_limit_is_moved_all_the_same():
+    info = SimpleNamespace(start_number=1.0, minimum=1.0, maximum=1.2)
+    fake = SimpleNamespace(inputs=["u"], port=None, description=SimpleNamespace(variables={"u": info}))
+    assert Subject.amplitudes.fget(fake) == pytest.approx([0.05])
+    info.maximum = 1.06
+    assert Subject.amplitudes.fget(fake) == pytest.approx([0.03])

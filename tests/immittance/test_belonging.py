@@ -7,6 +7,7 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.immittance.belonging import check_size
+from orchestrator.immittance.sides import Known
 
 
 @pytest.mark.parametrize(("size", "refused"), [(0.002, True), (0.004, False), (25.0, False), (40.0, True)])
@@ -19,3 +20,9 @@ def test_a_loop_that_is_far_too_weak_or_strong_asks_for_units(size, refused):
             check_size(loop, 1.0, 100.0)
     else:
         check_size(loop, 1.0, 100.0)
+
+
+def test_a_side_that_is_known_is_looked_at_at_its_poles():
+    side = Known()
+    side.poles = 2 * np.pi * np.array([-1 + 50j, -1 - 50j, -3, -0.1 + 2j, -0.1 - 2j])
+    assert side.frequencies == pytest.approx([0, 2, 2, 50, 50])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from orchestrator.oscillations.detection import find_oscillations, signals_of
+from orchestrator.oscillations.detection import Signals, _described, _multiple, find_oscillations, signals_of
 from orchestrator.oscillations.location import dynamic_mode
 from orchestrator.oscillations.measurements import Site, made_ready
 
@@ -21,3 +21,18 @@ def test_the_mode_at_the_frequency_that_was_found_is_taken(frequency, place):
     lines = find_oscillations(signals_of(made_ready("two", t, sites)))
     found = min(lines, key=lambda line: abs(line.frequency - frequency))
     assert dynamic_mode(sites, t, found).ranking[0][0] == place
+
+
+def test_an_oscillation_that_begins_later_is_measured_from_its_begin_on():
+    t = np.arange(0, 60, 0.05)
+    values = np.where(t >= 20, np.sin(2 * np.pi * 0.5 * t), 0.0)[:, None]
+    found = _described(Signals(t, ("x",), values), 0.5)
+    assert found.begin == pytest.approx(20, abs=3)
+    assert t[found.first] == found.begin
+
+
+@pytest.mark.parametrize(
+    ("hertz", "multiple"), [(1.0, True), (1.51, True), (0.5, False), (0.51, False), (1.25, False), (1.04, False)]
+)
+def test_a_multiple_is_at_least_twice_the_frequency_and_as_close_as_can_be_told(hertz, multiple):
+    assert _multiple(hertz, 0.5, 60.0) is multiple

@@ -88,3 +88,9 @@ def test_the_legend_shows_a_limit_in_the_colour_in_which_it_is_drawn():
     assert both in page
     assert f'stroke="{colour(1)}"' in page
     assert f'stroke="{LIMIT}"' in page
+
+
+@pytest.mark.parametrize(("until", "pictures"), [(0.0, 0), (1e-3, 1)])
+def test_two_samples_are_a_picture_and_one_is_none(until, pictures):
+    page = drawn(RTE, "igfm1_scr10_p50", lambda t: np.full(t.shape, 0.5), until)
+    assert bool(page.count("<figure")) == bool(pictures)
