@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.acceptance.checks import aftermath, ride_through
+from orchestrator.acceptance.checks import aftermath, port, ride_through
 from orchestrator.acceptance.checks.subject import Subject
 from orchestrator.acceptance.process import HostedComponent
 from orchestrator.fmi import limits
@@ -71,3 +71,15 @@ def test_an_input_that_starts_at_its_limit_is_moved_all_the_same():
     assert Subject.amplitudes.fget(fake) == pytest.approx([0.05])
     info.maximum = 1.06
     assert Subject.amplitudes.fget(fake) == pytest.approx([0.03])
+
+
+def test_a_current_is_that_of_the_rating_with_which_it_runs(monkeypatch):
+    """0.6 + 0.3j of 100 MVA are half as much of 200 MVA."""
+    monkeypatch.setattr(port, "RealBatch", lambda component, names: SimpleNamespace(read=lambda: (0.6, 0.3)))
+    running = SimpleNamespace(
+        parameters={"S_n": 200.0},
+        component=SimpleNamespace(description=SimpleNamespace(variables={})),
+        subject=SimpleNamespace(outputs=["p", "i_re", "i_im"], use=SimpleNamespace(values={})),
+    )
+    assert port.present_current(running) == pytest.approx(0.3 + 0.15j)
+    assert port.of_current(running, np.array([[9.0, 0.6, 0.3]])) == pytest.approx([0.3 + 0.15j])
