@@ -6,7 +6,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from orchestrator.analysis import critical_modes
-from orchestrator.analysis.critical_modes import find_critical_modes, nearest_eigenvalue
+from orchestrator.analysis.critical_modes import _Cell, find_critical_modes, nearest_eigenvalue
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import eigenvalues, find_modes
 from orchestrator.errors import AnalysisError
@@ -115,3 +115,12 @@ def test_equal_modes_of_equal_units_are_all_found():
     T = np.linalg.qr(RNG.standard_normal((len(A), len(A))))[0]
     system = LinearModel.from_matrix(T @ A @ T.T, tuple(f"x{k}" for k in range(len(A))), None)
     assert [m.frequency_hz for m in find_critical_modes(system)] == pytest.approx(3 * [0.8 * np.sqrt(1 - 0.05**2)])
+
+
+@pytest.mark.parametrize("cell", [_Cell(1.0, 40.0, 0.02, 0.05), _Cell(1.0, 1.1, -0.3, 0.4), _Cell(2.0, 2.1, 0.5, 0.9)])
+def test_two_halves_of_a_cell_are_the_cell(cell):
+    rng = np.random.default_rng(1)
+    for omega, ratio in zip(rng.uniform(0.5, 50, 200), rng.uniform(-0.5, 0.95, 200), strict=True):
+        point = complex(-ratio / np.sqrt(1 - ratio**2) * omega, omega)
+        assert sum(half.holds(point) for half in cell.halves()) == cell.holds(point)
+    assert all(half.radius < 0.9 * cell.radius for half in cell.halves())

@@ -98,3 +98,13 @@ def test_what_is_too_fast_for_the_samples_used_is_no_slower_mode(hum):
     assert found[0].frequency_hz == pytest.approx(0.6, abs=1e-4)
     assert found[0].amplitude == pytest.approx(0.5, rel=1e-3)
     assert all(mode.amplitude < 1e-3 for mode in found[1:])
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_modes_do_not_depend_on_the_unit_of_the_signal(unit):
+    t = np.arange(0, 10, 0.02)
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(len(t))
+    signal = np.exp(-0.3 * t) * np.cos(7 * t) + 0.4 * np.exp(-0.5 * t) * np.cos(3 * t) + noise
+    one, other = identify_modes(t, signal), identify_modes(t, unit * signal)
+    assert [m.eigenvalue for m in other] == pytest.approx([m.eigenvalue for m in one], rel=1e-6)
+    assert [m.amplitude for m in other] == pytest.approx([unit * m.amplitude for m in one], rel=1e-6)

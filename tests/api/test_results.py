@@ -115,6 +115,7 @@ def test_a_sweep_is_that_of_the_command(gfor, tmp_path, two_area):
     assert sweep.failures().empty
     assert isinstance(sweep.plot(), Axes)
     assert "stable at all points" in sweep._repr_html_()
+    assert f"<b>{repr(sweep)[1:].partition(':')[0]}" in sweep._repr_html_()
 
 
 def test_a_comparison_and_its_modes_are_those_of_the_commands(gfor, tmp_path, run):
@@ -320,7 +321,9 @@ def test_results_show_themselves(modes, run, two_area):
         assert repr(shown).startswith("<")
     assert "stable: the largest real part" in modes._repr_html_()
     assert "electromechanical" in modes._repr_html_()
-    assert scenario.linearize()._repr_html_().count("<tr>") > 10
+    linear = scenario.linearize()
+    assert linear._repr_html_().count("<tr>") > 10
+    assert f"<b>{repr(linear)[1:-1]}" in linear._repr_html_()
 
 
 def test_what_is_shown_cannot_be_read_as_html(two_area):

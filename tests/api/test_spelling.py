@@ -68,6 +68,13 @@ def test_an_option_is_spelt_for_who_reads_it(text, python):
         assert spelled(text) == str(InputError(text)) == text
 
 
+def test_what_was_given_as_tables_is_named_as_it_was_given():
+    kept = "/tmp/x/given/0123456789abcdef"
+    assert spelled(f"{kept}/case.toml: no table") == "case: no table"
+    assert spelled(f"{kept}/points.csv, line 1: no head") == "points: no head"
+    assert spelled(f"{kept}/points.csv, line 4: hour = 'x'") == "points, row 3: hour = 'x'"
+
+
 def test_what_is_kept_of_a_point_is_the_same_for_everybody():
     for error in (InputError("use --workers"), CaseError("x.toml", [Problem("--set a.b", "wrong")])):
         with as_options():

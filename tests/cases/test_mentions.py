@@ -1,8 +1,11 @@
 """A name in the analysis or the plots that nothing has in any scenario is an error with its line."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from orchestrator.cases.case import load_case
+from orchestrator.cases.mentions import _of_foreign
 from orchestrator.errors import CaseError
 
 
@@ -54,3 +57,10 @@ def test_a_component_may_be_absent_from_some_scenarios(tmp_path, text):
     """The base scenario has no converter, whose signals are plotted."""
     assert problems(tmp_path, text, "base") == []
     assert problems(tmp_path, text.replace('area_2 = ["sg2"]', 'area_2 = ["sg2", "bus_3"]'), "gfor") == []
+
+
+def test_states_of_a_component_whose_file_does_not_name_them_may_be_asked_for():
+    named = SimpleNamespace(foreign={"vendor_1", "plant"})
+    assert [_of_foreign(named, pattern) for pattern in ("vendor_?.x", "plant.a.b", "sg1.x", "x", "vendor_1")] == [
+        True, True, False, False, False,
+    ]  # fmt: skip

@@ -17,6 +17,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import RATED
 from fmus.toolchain.variables import Usual
 from gfor_fmu.usual import FORMING
+from orchestrator.cases import plausibility
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.plausibility import RULES, question
 from orchestrator.cases.plausible_values import UnusualValue
@@ -441,3 +442,25 @@ def test_a_droop_of_a_tenth_of_a_percent_is_usual_and_less_is_asked_about(name, 
     wanted = FORMING[name]
     assert all(wanted.fits(value) for value in (0.0, 0.001, 0.05, largest))
     assert not any(wanted.fits(value) for value in (0.0009, 1.01 * largest))
+
+
+@pytest.mark.parametrize(
+    ("R", "X", "asked"),
+    [
+        (0.02, 0.01, True),
+        (2.0, 1.5, True),
+        (0.0104, 0.01, False),
+        (0.01, 0.02, False),
+        (0.1, 0.0, False),
+        (0.1, -0.1, False),
+    ],
+)
+def test_a_resistance_above_its_reactance_is_asked_about(R, X, asked, monkeypatch):
+    plan = SimpleNamespace(kind="", description=SimpleNamespace(parameters=()))
+    monkeypatch.setattr(plausibility, "RESISTANCES", (("R", "X"),))
+    monkeypatch.setattr(plausibility, "value_of", lambda plan, name: {"R": R, "X": X}.get(name))
+    monkeypatch.setattr(plausibility, "place_of", lambda *_: "here")
+    for name in ("_small_units", "network_doubts", "source_doubts", "_ratings"):
+        monkeypatch.setattr(plausibility, name, lambda draft: ())
+    draft = SimpleNamespace(system=SimpleNamespace(components={"a": plan}))
+    assert [doubt.name for doubt in plausibility._doubts(draft)] == ["a.R"] * asked

@@ -272,3 +272,17 @@ def trip(kind, element, time="0.1 s"):
 def test_loads_without_any_unit_are_asked_about(prepared, events, asked):
     texts = [q.text for q in prepared(events).questions if "no unit is connected" in q.text]
     assert (len(texts) == 1 and asked in texts[0]) if asked else not texts
+
+
+def test_a_load_that_is_lost_with_a_unit_is_not_shared_by_the_others(tmp_path):
+    """Of 500 MW of town three fifths are lost."""
+    (tmp_path / "case.toml").write_text(RING, encoding="utf-8")
+    case, shared = load_case(tmp_path / "case.toml"), {}
+    for scale in (1.0, 0.4):
+        lost, dispatch = case._switched_off(
+            next(iter(case.scenarios)), {"vsc.connected": False, "grid.town.scale": scale}, ()
+        )
+        assert lost == ["vsc"]
+        shared[scale] = dispatch.change
+    assert shared[1.0] == pytest.approx(300, abs=1e-6)
+    assert shared[0.4] == pytest.approx(300 - 0.6 * 500, abs=1e-6)

@@ -1,7 +1,10 @@
 """Units of a case: from a file, from the network's source or both, with shares and parameters of their own."""
 
+from dataclasses import replace
+
 import pytest
 
+from orchestrator.cases import unit_tables
 from orchestrator.cases.case import load_case
 from orchestrator.cases.parameter_files import read_parameter_file
 from orchestrator.errors import CaseError
@@ -245,3 +248,11 @@ def test_units_without_a_file_need_a_source(case):
     assert any(
         "the key 'file' is missing; without it the units" in problem for problem in problems(case(text), ["plain"])
     )
+
+
+def test_a_share_of_a_unit_has_its_share_of_the_limits_of_power(case, monkeypatch):
+    rows = unit_tables.unit_rows
+    limits = {"p_min_mw": 40.0, "p_max_mw": 280.0}
+    monkeypatch.setattr(unit_tables, "unit_rows", lambda *a: [replace(row, **limits) for row in rows(*a)])
+    found = case()._preparer("plain", None, ()).draft.active_limits
+    assert (found["sg7"], found["gfor7"]) == (pytest.approx((36, 252)), pytest.approx((4, 28)))

@@ -7,10 +7,13 @@ import pytest
 from scipy.linalg import eig
 
 from orchestrator.coordinated_design import view
-from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, RatedPoint, Worth, band_of, floors_of
-from orchestrator.coordinated_design.search import SettingSearch, Tried
+from orchestrator.coordinated_design.objective import ALLOWED, BANDS_HZ, RatedPoint, Watched, Worth, band_of, floors_of
+from orchestrator.coordinated_design.point import PointModes
+from orchestrator.coordinated_design.search import SettingSearch, Tried, _Program
 from orchestrator.coordinated_design.settings import PodGroup
 from orchestrator.coordinated_design.study import values_of
+from orchestrator.coordinated_design.verdict import least_of
+from orchestrator.operating_points.item import Status
 
 
 @pytest.mark.parametrize("place", range(len(BANDS_HZ)))
@@ -66,3 +69,28 @@ def test_the_table_of_points_says_what_is_allowed_and_why_not():
     table = view.points_table(SimpleNamespace(points=[point]))
     assert {c.name: c.cell(point) for c in table.columns if c.name in ("outage", "allowed", "why", "stable")} == {
         "outage": "tie", "allowed": "false", "why": "n; w", "stable": "true"}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("others", "wanted"),
+    [
+        ((), 0.1),
+        ((PointModes(Status.COMPUTED, values=np.array([-0.5 + 5j, -0.5 - 5j])),), 0.1),
+        ((PointModes(Status.COMPUTED, values=np.array([0.5 + 5j, 0.5 - 5j])),), None),
+        ((PointModes(Status.POWER_FLOW),), None),
+    ],
+)
+def test_the_least_damping_needs_modes_at_every_point_and_no_growth(others, wanted):
+    damped = 5 * complex(-0.1, np.sqrt(1 - 0.1**2))
+    points = [PointModes(Status.COMPUTED, values=np.array([damped, damped.conjugate()])), *others]
+    aim = SimpleNamespace(names=(), least=0.05)
+    found = least_of(points, aim)
+    assert found == (None if wanted is None else pytest.approx(wanted, rel=0.01))
+
+
+@pytest.mark.parametrize("slope", [0.3, -0.3])
+def test_a_step_goes_where_the_damping_rises_and_no_further_than_trusted(slope):
+    mode = Watched(5 * complex(-0.1, 1.0), 0, None)
+    program = _Program([(mode, np.array([slope]))], np.array([-1.0]), np.array([0.2]))
+    assert program.change(0.1) == pytest.approx([np.copysign(0.1, slope)])
+    assert program.change(0.5) == pytest.approx([0.2 if slope > 0 else -0.5])

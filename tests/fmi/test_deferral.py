@@ -217,3 +217,15 @@ def test_it_is_delivered_at_a_line_while_it_waits(waits, event, count, monkeypat
         frame.f_trace = None
     waiting._at_line(sys._getframe(), event, None)
     assert len(delivered) == count
+
+
+@pytest.mark.parametrize(("waits", "asked", "comes"), [(True, 3, True), (True, 2, False), (False, 3, False)])
+def test_a_signal_comes_a_second_time_only_while_the_same_one_waits(waits, asked, comes, monkeypatch):
+    sent = []
+    monkeypatch.setattr(deferral.time, "sleep", lambda seconds: None)
+    monkeypatch.setattr(deferral.sys, "platform", "linux")
+    monkeypatch.setattr(deferral.signal, "pthread_kill", lambda *what: sent.append(what), raising=False)
+    one = deferral.Deferral(lambda: None)
+    one._frame, one._number = (object() if waits else None), 3
+    one._ask_again(asked)
+    assert bool(sent) is one._repeats is comes

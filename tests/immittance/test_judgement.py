@@ -56,6 +56,20 @@ def test_the_gain_and_delay_margins_are_those_at_which_an_eigenvalue_reaches_the
     assert w / (2 * np.pi) == pytest.approx(margin.frequency_hz, rel=2e-3)
 
 
+@pytest.mark.parametrize("line", [STRONG, Line(0.05, 0.5 / OMEGA)])
+def test_the_phase_and_delay_margins_are_those_of_a_dense_scan(line):
+    plant = constant_power(g=1.2, h=0.6, T=0.003, G=0.2)
+    dense = np.geomspace(0.1, 1000, 20_000)
+    loci = np.linalg.eigvals(line.impedance(dense, capacitor=False) @ plant.admittance(dense))
+    at = np.abs(np.diff(np.sort(np.log(np.abs(loci)), axis=1) > 0, axis=0))
+    k, j = np.nonzero(at)
+    order = np.argsort(np.abs(loci), axis=1)
+    angles = np.angle(-loci[k, order[k, j]])
+    found = judged(plant, line).margins
+    assert found.phase_deg.value == pytest.approx(np.rad2deg(np.abs(angles).min()), abs=0.2)
+    assert found.delay_s.value == pytest.approx((angles % (2 * np.pi) / (2 * np.pi * dense[k])).min(), rel=0.01)
+
+
 def test_compensation_destabilises_where_the_eigenvalues_say():
     plant = constant_power(g=1.2, h=0.6, T=0.01, G=0.05)
     verdicts = {}

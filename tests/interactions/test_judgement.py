@@ -1,11 +1,12 @@
 """What systems come to: ranks, falls and doubts, on figures that are made up."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from orchestrator.errors import ErrorKind
-from orchestrator.interactions.judgement import JudgedSystem
+from orchestrator.interactions.judgement import JudgedSystem, doubts_of
 from orchestrator.interactions.point import SharedMode, SystemRecord
 from orchestrator.interactions.systems import NONE, WHOLE, Kind, SystemName
 from orchestrator.interactions.view import Interactions
@@ -134,6 +135,25 @@ def test_different_settings_of_one_vendor_are_named():
     path = written("same.toml", ('vendor = "B"', 'vendor = "A"'))
     found = studied(path, swap=True, places=("north", "east"))
     assert any("A's converters have other settings at west than at east" in text for text in found.warnings)
+
+
+def test_settings_of_a_vendor_that_differ_are_told_and_equal_ones_are_not():
+    def place(name, vendor, **values):
+        return SimpleNamespace(name=name, vendor=vendor, plan=SimpleNamespace(parameters=values))
+
+    places = [
+        place("west", "A", k=1.0),
+        place("east", "A", k=2.0),
+        place("north", "A", k=1.0),
+        place("south", "B", k=3.0),
+    ]
+    plan = SimpleNamespace(
+        swapped=tuple(p.name for p in places), places={p.name: p for p in places}, stand_in="gfor",
+        request=SimpleNamespace(black_box=False),
+    )  # fmt: skip
+    result, none = SimpleNamespace(plan=plan, records={}), SimpleNamespace(stable=True)
+    (told,) = doubts_of(SimpleNamespace(result=result, none=none))
+    assert told.startswith("A's converters have other settings at east than at west")
 
 
 def test_a_record_survives_its_file():

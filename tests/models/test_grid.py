@@ -1,6 +1,7 @@
 """The grid model with ratios, shunts and switches, against the nodal admittance matrix of the literature."""
 
 import cmath
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -236,3 +237,10 @@ def test_what_a_network_cannot_be(change, words):
     parts = {"lines": (Line("ab", "a", "b", X=0.1),), "loads": (Load("d", "b", 10),), "shunts": (Shunt("s", "a", 1),)}
     with pytest.raises(ValueError, match=words):
         Network("wrong", ("a", "b"), **(parts | {"ports": ()} | change))
+
+
+def test_of_many_floating_buses_the_first_ten_are_named():
+    names = tuple(f"b{k:02}" for k in range(13))
+    lines = tuple(Line(f"l{k}", a, b, X=0.1) for k, (a, b) in enumerate(pairwise(names)))
+    with pytest.raises(ValueError, match=r"buses 'b01', .*'b10', … have neither"):
+        Network("wide", names, lines, (Load("d", "b00", 10),), ())

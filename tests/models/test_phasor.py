@@ -189,6 +189,19 @@ def test_the_emf_is_given_for_the_middle_of_the_coming_step(name, time):
     assert abs(predicted - moving[1]) < 0.05 * moved
 
 
+@pytest.mark.parametrize("name", ["gfor", "gfl", "gfl_l2ep", "regfm_a1", "static_generation", GENERATORS[0]])
+def test_the_current_is_that_of_the_middle_of_the_last_step(name):
+    """An emf that is asked for one step early is that of the last step."""
+    device = Evaluated(f"{name}_phasor", communication_step=5e-3, P_0=0.7, Q_0=0.1)
+    x, v = device.x + 1e-3 * np.arange(1, len(device.x) + 1), 0.97 - 0.02j
+    seen = device.outputs([v.real, v.imag], x)
+    early = [p.name for p in device.model.parameters].index("steps_late")
+    device.p[early] = -1
+    e, y = source(device.outputs([v.real, v.imag], x))
+    assert complex(seen["i_re"], seen["i_im"]) == pytest.approx((e - v) * y, rel=1e-10)
+    assert abs(e - source(seen)[0]) > 1e-4  # it moves
+
+
 # -- the network --------------------------------------------------------------------------------
 
 NETWORK = Network(

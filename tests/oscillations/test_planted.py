@@ -283,6 +283,14 @@ def test_what_decays_or_grows_is_a_mode(rate):
     assert found.evidence.damping_percent == pytest.approx(-100 * rate / (2 * np.pi * 0.6), rel=0.1)
 
 
+def test_what_swells_and_fades_again_is_no_mode():
+    """A line through its amplitude falls by a third, and explains little of it."""
+    swell = 1 + 0.4 * np.sin(2 * np.pi * 1.25 * TIMES / TIMES[-1])
+    ring = 0.02 * swell * np.sin(2 * np.pi * 0.6 * TIMES)
+    places = [Site("sg1", "unit", "a", 1 + 0.01 * ring, 0.1 * ring, 5 + ring, 1 + 0.1 * ring)]
+    assert at(locate(made_ready("swell", TIMES, places)), 0.6).evidence.kind == "not known"
+
+
 def test_noise_of_loads_alone_forces_nothing():
     for name in ("two_area", "ieee39"):
         found = locate(record(name, {}, loads=0.002, measuring=5e-5, times=times_of(60.0)))

@@ -118,6 +118,14 @@ def test_a_frame_without_extent_still_has_axes():
     assert Frame((0, 2), (0, 1), "", "").at(1, 0)[0] > 0
 
 
+def test_the_fastest_eigenvalue_stands_in_the_picture():
+    """Right of the axis, from which the picture begins; and the right half plane is seen as well."""
+    text = complex_plane("plane", [Mark(x, 2.0, "red", "a mode", "circle") for x in (-10.0, 0.0)])
+    fastest, still = (float(x) for x in re.findall(r'<circle class="tip" cx="(\S+)"', text))
+    begin, end = Frame((0, 1), (0, 1), "", "").at(0, 0)[0], Frame((0, 1), (0, 1), "", "").at(1, 0)[0]
+    assert begin + 10 < fastest < still < end
+
+
 def test_rays_of_equal_damping_stand_at_their_percent():
     """Each ends where it leaves the picture; its slope is that of its damping, f/|σ| = sqrt(1 − ζ²)/(2π·ζ)."""
     text = complex_plane("plane", [Mark(-1.0, 2.0, "red", "a mode")])

@@ -13,7 +13,7 @@ from lxml import etree
 from orchestrator.api.models import build
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent
-from orchestrator.ssp.reference_experiment import FOLDER, TOLERANCE
+from orchestrator.ssp.reference_experiment import FOLDER, TOLERANCE, _purpose
 
 LS = "{http://fmi-standard.org/fmi-ls-manifest}"
 ROLE = re.compile(
@@ -136,3 +136,7 @@ def test_the_fmu_is_the_same_but_for_these_files(converter, tmp_path):
         with zipfile.ZipFile(path) as archive:
             members.append({n: archive.read(n) for n in archive.namelist() if not n.startswith(FOLDER)})
     assert members[0] == members[1]
+
+
+def test_a_saved_state_names_its_platform():
+    assert _purpose("state.win64.bin")[1] == "serialized-state/win64"

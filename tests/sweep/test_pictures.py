@@ -3,10 +3,12 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
 from orchestrator.sweep import plots, tables
+from orchestrator.sweep.view import ParameterSweep
 
 
 @pytest.fixture
@@ -76,3 +78,12 @@ def test_a_curve_stands_over_the_last_axis():
         patch.setattr(plots, "_rows", lambda given: [given])
         plots._draw(axis, SimpleNamespace(axes=axes), curve, lambda sample: sample["damping"])
     assert [(list(line.get_xdata()), list(line.get_ydata())) for line in axis.lines] == [([5.0, 7.0], [40.0, 60.0])] * 2
+
+
+def test_a_sweep_shows_itself_under_its_own_name(monkeypatch):
+    plan = SimpleNamespace(case=SimpleNamespace(name="two_area"), number_of_points=2)
+    sweep = ParameterSweep.__new__(ParameterSweep)
+    sweep.result = SimpleNamespace(plan=plan, failures=lambda: iter(()), scenarios=[])
+    sweep.samples = SimpleNamespace(axes=[SimpleNamespace(key="grid.X_L")])
+    monkeypatch.setattr(ParameterSweep, "table", lambda self: pd.DataFrame())
+    assert sweep._repr_html_().startswith("<p><b>ParameterSweep of two_area over grid.X_L</b>")

@@ -7,9 +7,10 @@ import pytest
 
 from orchestrator.certification.codes.all_codes import CODES, code_for
 from orchestrator.certification.codes.bench_point import BenchResult
-from orchestrator.certification.codes.record import row_pictures
+from orchestrator.certification.codes.record import LIMIT, row_pictures
 from orchestrator.certification.codes.row_verdict import judge_row
-from orchestrator.report.html.elements import Figures
+from orchestrator.report.html.charts import legend
+from orchestrator.report.html.elements import Figures, colour
 
 pytestmark = pytest.mark.filterwarnings("error")
 
@@ -79,3 +80,17 @@ def test_a_broken_or_a_short_response_is_drawn_as_far_as_it_goes(power, until):
     assert any(label == "response" and len(x) > 100 for label, x, _ in curves(page))
     assert all(np.isfinite(y).all() for _, _, y in curves(page))
     assert drawn(RTE, "igfm1_scr10_p50", lambda t: np.full(t.shape, np.nan)).count("no value is a number") == 2
+
+
+def test_the_legend_shows_a_limit_in_the_colour_in_which_it_is_drawn():
+    page = drawn(RTE, "igfm1_scr10_p50", lambda t: np.full(t.shape, 0.5))
+    both = legend([("response", colour(1)), ("limit", LIMIT)])
+    assert both in page
+    assert f'stroke="{colour(1)}"' in page
+    assert f'stroke="{LIMIT}"' in page
+
+
+@pytest.mark.parametrize(("until", "pictures"), [(0.0, 0), (1e-3, 1)])
+def test_two_samples_are_a_picture_and_one_is_none(until, pictures):
+    page = drawn(RTE, "igfm1_scr10_p50", lambda t: np.full(t.shape, 0.5), until)
+    assert bool(page.count("<figure")) == bool(pictures)
