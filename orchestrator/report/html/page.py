@@ -122,7 +122,7 @@ def _of_run(run: Results, figures: Figures) -> Sections:
     return content
 
 
-_OPEN, _LONGEST = 4, 110  # what was not judged on the first page, and the characters of each
+_OPEN, _LONGEST = 4, 240  # what was not judged on the first page, and the characters of each
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
@@ -135,7 +135,7 @@ def first_page(chapters: Sequence[Chapter]) -> str:
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
         asked = f'{escape(one.question)}<br><span class="soft">{escape(str(one.source))}</span>'
-        rows.append([asked, answer, escape(short(one.sure, 3 * _LONGEST)), open_ + more])
+        rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), open_ + more])
     return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
 
 
