@@ -69,7 +69,7 @@ def test_an_option_is_spelt_for_who_reads_it(text, python):
 
 
 def test_what_was_given_as_tables_is_named_as_it_was_given():
-    kept = "/tmp/x/given/0123456789abcdef"
+    kept = "cases/given/0123456789abcdef"
     assert spelled(f"{kept}/case.toml: no table") == "case: no table"
     assert spelled(f"{kept}/points.csv, line 1: no head") == "points: no head"
     assert spelled(f"{kept}/points.csv, line 4: hour = 'x'") == "points, row 3: hour = 'x'"
