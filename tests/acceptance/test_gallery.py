@@ -13,7 +13,7 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.acceptance.checks import droop
+from orchestrator.acceptance.checks import droop, port
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.api.acceptance import Acceptance
 from orchestrator.fmi.limits import Limits
@@ -162,6 +162,35 @@ def test_a_sign_that_turns_with_larger_changes_of_the_frequency_is_found(tmp_pat
     (*_, found) = check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results
     assert found.fault == "wrong sign"
     assert "with 0.5 % less frequency its active power goes the wrong way" in found.evidence
+
+
+@pytest.mark.parametrize(
+    ("defines", "only", "fault"),
+    [({"FAULT_TRIPLES_IN_SWELL": 0.3}, "after_dips", "changed by a disturbance"),
+     ({"FAULT_LIMIT_OFF_WHERE": "(m[Q_REF] < -0.2)"}, "limits", "no current limit")],
+)  # fmt: skip
+def test_what_a_lasting_overvoltage_and_a_dip_while_absorbing_bring_is_found(defines, only, fault, tmp_path):
+    path = build(converter("plant", **defines), tmp_path)
+    assert check_fmu(path, None, LIMITS, (only,), run_for=0.3).faults == [fault]
+
+
+def test_a_drift_that_begins_after_half_a_minute_is_looked_for_where_it_showed(tmp_path, monkeypatch):
+    """At rest there would be no time for it; the run with small changes had."""
+    monkeypatch.setattr(port, "_PART", 0.0)
+    path = build(converter("drifts", FAULT_DRIFTS_AFTER=30.0, FAULT_DRIFTS_BY=0.1), tmp_path)
+    assert check_fmu(path, None, LIMITS, ("steady_state",)).trusted
+    assert check_fmu(path, None, LIMITS, ("runs", "steady_state")).faults == ["leaves its steady state"]
+
+
+@pytest.mark.parametrize("name", ["gain_of_the_fourth_dip", "gain_for_a_while", "wound_up"])
+def test_states_that_come_back_show_the_same_after_dips(name, gallery):
+    """In one run what else takes a run for each answer."""
+    alone, known = (
+        check_fmu(*gallery(name), LIMITS, only, run_for=0.3).results[-1]
+        for only in (("after_dips",), ("reading", "state", "after_dips"))
+    )
+    assert known == alone
+    assert alone.fault
 
 
 def test_a_place_at_which_its_small_answer_jumps_is_told(tmp_path):

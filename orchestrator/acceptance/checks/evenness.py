@@ -48,7 +48,6 @@ def evenness(subject: Subject) -> CheckResult:
     if not subject.starts:
         return not_applicable("evenness", WHY["no start" if subject.port else "no port"])
     found: dict[OperatingAt, Complex] = {}
-    machine = subject.description.kind == "machine"
     for point in _points(subject):
         try:
             way = -1.0 if point.P > _MUCH else 1.0  # away from its limit
@@ -57,7 +56,7 @@ def evenness(subject: Subject) -> CheckResult:
             if point is _GIVES:
                 raise
             continue  # which 'power_balance' and 'operating_points' tell
-        if fault := _other(found[_GIVES].real, found[point].real, machine):
+        if fault := _other(found[_GIVES].real, found[point].real, subject.is_machine):
             says = f"{fault[1]} from P_0 = {point.P:g}, Q_0 = {point.Q:g}, v_0 = {point.v:g}"
             return failed("evenness", fault[0], f"{says}, and not from P_0 = {_GIVES.P:g}")
     for larger, word in ((_LARGER, "less"), (-_LARGER, "more")):

@@ -29,9 +29,8 @@ def loads(subject: Subject) -> CheckResult:
     both = answer if isinstance(answer, list) and len(answer) == 2 else (None, None)
     missing, spare = (process.typed(names, found) for found in both)
     if missing:
-        return failed(
-            "loads", "missing function", f"its binary has no {', '.join(missing)}, which what it declares needs"
-        )
+        says = f"its binary has no {', '.join(missing)}, which what it declares needs"
+        return failed("loads", "missing function", says)
     try:
         subject.open().close()
     except ComponentError as error:
@@ -51,10 +50,9 @@ def call_order(subject: Subject) -> CheckResult:
     """Make three calls that FMI forbids, each in an instance of its own; what an FMU does then is provoked."""
     h = subject.step_size
     steps = {
-        "before initialisation": (_unborn, 0.0, h),
-        "of size 0": (_stepped, h, 0.0),
+        "before initialisation": (Subject.open, 0.0, h), "of size 0": (_stepped, h, 0.0),
         "backwards": (_started, 0.0, -h),
-    }
+    }  # fmt: skip
     accepted, ended = [], []
     for words, (begin, time, step_size) in steps.items():
         component = begin(subject)  # until here all is allowed
@@ -66,16 +64,9 @@ def call_order(subject: Subject) -> CheckResult:
     if ended:
         return provoked("call_order", "; ".join(ended))
     if accepted:
-        return remarked(
-            "call_order",
-            f"it accepts {' and '.join(accepted)}",
-            "FMI forbids these calls; a master that makes them by mistake will not be told",
-        )
+        remedy = "FMI forbids these calls; a master that makes them by mistake will not be told"
+        return remarked("call_order", f"it accepts {' and '.join(accepted)}", remedy)
     return passed("call_order", "steps before initialisation, of size 0 and backwards are refused")
-
-
-def _unborn(subject: Subject) -> HostedComponent:
-    return subject.open()
 
 
 def _started(subject: Subject) -> HostedComponent:

@@ -11,7 +11,7 @@ from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject, saved
 from orchestrator.errors import ComponentError
 
-_BLOCKS, _BLOCK = 6, 0.5  # parts of a measurement, and the longest time of one with instances [s]
+_BLOCKS, _BLOCK = 6, 0.2  # parts of a measurement, and the longest time of one with instances [s]
 
 _LEAST = 4.0  # bytes kept by each step that count as a leak
 _RESETS, _FEW = 6, 4  # resets in a block, and instances between two counts of open files

@@ -36,19 +36,13 @@ def feedthrough(subject: Subject) -> CheckResult:
     subject.memory["feedthrough"] = seen
     declared = {n: subject.description.feedthrough(n) for n in subject.outputs}
     hidden = {n: sorted(seen[n] - set(declared[n])) for n in subject.outputs if seen[n] - set(declared[n])}
+    observed = {n: sorted(v) for n, v in seen.items()}
     if hidden:
         text = "; ".join(f"{n} follows {', '.join(names[:4])} at once" for n, names in list(hidden.items())[:3])
-        return failed(
-            "feedthrough",
-            "undeclared feed-through",
-            f"{text}, and the file says it does not",
-            observed={n: sorted(v) for n, v in seen.items()},
-        )
-    return passed(
-        "feedthrough",
-        f"{sum(map(len, seen.values()))} direct dependencies seen, all of them declared",
-        observed={n: sorted(v) for n, v in seen.items()},
-    )
+        says = f"{text}, and the file says it does not"
+        return failed("feedthrough", "undeclared feed-through", says, observed=observed)
+    says = f"{sum(map(len, seen.values()))} direct dependencies seen, all of them declared"
+    return passed("feedthrough", says, observed=observed)
 
 
 def _observed(subject: Subject) -> dict[str, set[str]]:
@@ -290,11 +284,8 @@ def internal_step(subject: Subject) -> CheckResult:
             for span, many in _RATIOS
         }
     except ComponentError as error:
-        return remarked(
-            "internal_step",
-            f"it refuses communication steps that are no multiple of its own: {error}",
-            "couple it with multiples of its own step only",
-        )
+        says = f"it refuses communication steps that are no multiple of its own: {error}"
+        return remarked("internal_step", says, "couple it with multiples of its own step only")
     worst, share = max(
         (_typical(run[::many], plain[::span][: total // span + 1]), f"{span}/{many}")
         for (span, many), run in odd.items()
