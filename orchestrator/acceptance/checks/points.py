@@ -8,12 +8,13 @@ import numpy as np
 
 from orchestrator.acceptance.checks import port
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.comparing import difference, scales
+from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.droop import FREQUENCY, VOLTAGE
 from orchestrator.acceptance.checks.events import scale
 from orchestrator.acceptance.checks.port import ANSWER, IMPORTING, POINTS, WHY, followed, present_current, rating_of
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
+from orchestrator.arrays import Numbers
 from orchestrator.binding.misfits import BALANCE, NO_LIMIT
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.port import BoundDescription
@@ -171,6 +172,10 @@ _LATE = 20_000.0  # A start [s] at which single precision has no milliseconds le
 _SAME, _STILL = 1e-4, 100.0
 """Difference of two answers, in parts of their range, up to which they are alike; and in parts of a rest's motion."""
 
+_ROUNDED = (
+    1e-8  # part of an output's size by which an angle of six million radians, which has no more digits, changes it
+)
+
 _FASTER, _LASTS = 0.012, 9.0  # frequency [pu] by which it is turned forth, and back for twice as long; in all [s]
 _TURNED = 5e-5  # difference of the currents that two angles bring [pu, S_n]: a jump of some hundredths of a milliradian
 
@@ -187,13 +192,12 @@ def later_times(subject: Subject) -> CheckResult:
     if (rested := subject.memory.get("rested")) is not None:
         point, rest, late = rested
         first = subject.trajectory(steps, h, subject.one_step(), point=point)
-        apart, output = difference(first, late)
-        found = apart if apart * scales(first, late)[output] >= _STILL * rest.moved else 0.0
+        found = _differs(first, late, _STILL * rest.moved)
         said.append(f"after {rest.time:.3g} s at rest it is {found:.2g} of its range away")
     first = subject.trajectory(steps, h, subject.one_step())
     try:
         subject.start_time = _LATE
-        apart, _ = difference(first, subject.trajectory(steps, h, subject.one_step()))
+        apart = _differs(first, subject.trajectory(steps, h, subject.one_step()), _ROUNDED * np.abs(first).max(axis=0))
         said.append(f"started at {_LATE:g} s it is {apart:.2g} of its range away")
         found = max(found, apart)
     except (ComponentError, EndedError) as error:
@@ -203,6 +207,11 @@ def later_times(subject: Subject) -> CheckResult:
     says = f"the answer to a small step: {', '.join(said)}"
     return (failed("later_times", "counts time", says, apart=found) if found > _SAME
             else passed("later_times", says, apart=found))  # fmt: skip
+
+
+def _differs(first: Numbers, late: Numbers, least: Numbers | float) -> float:
+    """By which part of its range an output differs by more than the least."""
+    return difference(first, np.where(np.abs(late - first) < least, first, late))[0]
 
 
 @check("angles", "Is it the same wherever its angle begins?", needs=(*SAME, "steady_state"))
