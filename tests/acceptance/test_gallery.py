@@ -13,7 +13,7 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.acceptance.checks import droop, port
+from orchestrator.acceptance.checks import droop, port, ride_through
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.api.acceptance import Acceptance
 from orchestrator.fmi.limits import Limits
@@ -142,6 +142,14 @@ def test_an_answer_that_another_rating_changes_is_told(tmp_path):
     *_, found = check_fmu(path, None, LIMITS, only, run_for=0.3).results
     assert found.verdict == "remark"
     assert "its answer to less voltage and frequency is" in found.evidence
+    path = build(converter("blocks", FAULT_BLOCKS_BELOW=0.35), tmp_path)
+    assert check_fmu(path, None, LIMITS, only, run_for=0.3).trusted  # no current in a dip, at any rating
+
+
+def test_a_limit_that_was_not_watched_to_the_end_is_said(gallery, monkeypatch):
+    monkeypatch.setattr(ride_through, "scale", lambda *_: 0.3)
+    found = check_fmu(*gallery("converter"), LIMITS, ("limits",), run_for=0.3)
+    assert found.not_judged == ["whether its limit lasts for more than 6 s"]
 
 
 def test_an_angle_that_turns_back_by_less_than_a_turn_is_told(tmp_path):

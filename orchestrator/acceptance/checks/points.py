@@ -128,7 +128,7 @@ def ratings(subject: Subject) -> CheckResult:
             says = f"{words}, its power is {power:.4g} pu where {asked:.4g} is asked"
             return failed("ratings", "base of another rating", says, power=[power.real, power.imag])
         says = f"{words}, its current in a dip to {_DIP:g} pu is {current:.3g} pu, and {usual:.3g} pu at its own rating"
-        if abs(current * part / usual - 1) < _STAYS and usual < NO_LIMIT:
+        if abs(current * part - usual) < _STAYS * usual < _STAYS * NO_LIMIT:
             return failed("ratings", "limit of another rating", says, current=current)
         if limit is not None and current > 1.05 * limit >= usual:
             return failed("ratings", "above its current limit", f"{says}; {limit:g} pu is declared", current=current)

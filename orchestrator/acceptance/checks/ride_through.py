@@ -121,7 +121,7 @@ def limits(subject: Subject) -> CheckResult:
     begin, budget = perf_counter(), _PART * subject.memory.get("run_for", 2.0)
     answers, refused = list[Answer](), list[str]()
     left_out, other_way = 0, ""
-    longest = max(_RIDDEN, _OVERLOAD * scale(subject, _OVERLOAD))
+    longest = max(_RIDDEN, _OVERLOAD * min(1.0, 2 * scale(subject, _OVERLOAD)))
     for number, run in enumerate(_runs(subject.random("limits"), longest)):
         rest = list(run)
         if rest[0].point is not None:
@@ -136,6 +136,8 @@ def limits(subject: Subject) -> CheckResult:
                 says = f"its current is no number in {bad}, and fmi2DoStep returned OK"
                 return failed("limits", "not a number", says, case=str(bad))
     result = _judged(subject, answers, refused, left_out)
+    if longest < _OVERLOAD:
+        result.figures["not_judged"] = f"whether its limit lasts for more than {longest:.2g} s"
     if other_way and not result.fault:
         remedy = result.remedy or "do not use it with imported power, or ask how it starts"
         return remarked("limits", f"{result.evidence}; {other_way}", remedy, **result.figures)
