@@ -63,9 +63,8 @@ def evenness(subject: Subject) -> CheckResult:
         end = np.sign(larger) * _course(subject, _MILD, {}, larger).real[-len(found[_GIVES]) // 10 :]
         if end.mean() < -_SOME and np.ptp(end) < 0.1 * abs(end.mean()):
             says = f"with {100 * _LARGER * FREQUENCY:g} % {word} frequency its active power goes the wrong way, "
-            return failed(
-                "evenness", "wrong sign", f"{says}by {abs(end.mean()):.2g} pu, and not after a smaller change"
-            )
+            says += f"by {abs(end.mean()):.2g} pu, and not after a smaller change"
+            return failed("evenness", "wrong sign", says)
     if jump := _jump(subject):
         return remarked("evenness", jump, "ask what it switches there: what holds at one place does not at the other")
     if _TAKES not in found:

@@ -37,11 +37,9 @@ def loads(subject: Subject) -> CheckResult:
         return failed("loads", "no instance", str(error))
     clocks = f"; it has {len(described.clocks)} clocks, which tick here" if described.clocks else ""
     if spare:
-        return remarked(
-            "loads",
-            f"its binary has no {some_of(spare, ', ')}, which nothing that it declares needs{clocks}",
-            f"FMI {described.fmi_version} asks for all of them; other masters may refuse it, tell the author",
-        )
+        says = f"its binary has no {some_of(spare, ', ')}, which nothing that it declares needs{clocks}"
+        remedy = f"FMI {described.fmi_version} asks for all of them; other masters may refuse it, tell the author"
+        return remarked("loads", says, remedy)
     return passed("loads", f"its binary loads, has all functions, and gives an instance{clocks}")
 
 

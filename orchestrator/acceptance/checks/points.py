@@ -140,9 +140,8 @@ def ratings(subject: Subject) -> CheckResult:
         remedy = "ask which of its parameters count on another rating or in units, and set them together with S_n"
         return remarked("ratings", "; ".join([*otherwise, *refused]), remedy)
     if refused:
-        return remarked(
-            "ratings", "; ".join([*seen, *refused]), "do not use it at other ratings, or ask which it takes"
-        )
+        remedy = "do not use it at other ratings, or ask which it takes"
+        return remarked("ratings", "; ".join([*seen, *refused]), remedy)
     return passed("ratings", "; ".join(seen))
 
 

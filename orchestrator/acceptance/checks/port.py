@@ -246,9 +246,8 @@ def _judged(
         "of": of, "a": [a.real, a.imag], "b": [b.real, b.imag], "c": [c.real, c.imag], "rest": rest, "worst": worst,
     }  # fmt: skip
     if worst <= BALANCE:
-        return passed(
-            "power_balance", f"S is what is asked within {worst:.2g} pu of the rating at {len(s)} points", **figures
-        )
+        says = f"S is what is asked within {worst:.2g} pu of the rating at {len(s)} points"
+        return passed("power_balance", says, **figures)
     imports = s_0.real < 0
     if (np.abs(s - s_0)[~imports] <= BALANCE).all():
         says = "it is as asked where it gives power, and not where it takes power"

@@ -169,11 +169,9 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     if wrong:
         return failed("signs", wrong[0], f"{wrong[1]} ({said})", **figures)
     if max(voltage.far, frequency.far) > _AWAY:
-        return remarked(
-            "signs", f"it goes {max(voltage.far, frequency.far):.3g} pu away ({said})",
-            "it is unstable at a stiff bus, or answers much; ask for the shortest network impedance that it bears",
-            **figures,
-        )  # fmt: skip
+        says = f"it goes {max(voltage.far, frequency.far):.3g} pu away ({said})"
+        remedy = "it is unstable at a stiff bus, or answers much; ask for the shortest network impedance that it bears"
+        return remarked("signs", says, remedy, **figures)
     swings = [way.ringing for answer in (voltage, frequency) for way in answer.ways]
     late = max((late for before, late, _ in swings if late > _TOLD * before), default=0.0)
     if late > _RINGS:

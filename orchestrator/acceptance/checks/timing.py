@@ -92,9 +92,8 @@ def delay(subject: Subject) -> CheckResult:
         return failed("delay", "delayed output", stale, steps=1)
     if stale := _stale(subject, declared=False):
         return remarked("delay", stale, "its partners see it one step late; ask for outputs that follow at once")
-    return passed(
-        "delay", f"no shift by communication steps is seen from {subject.step_size:g} s to {4 * subject.step_size:g} s"
-    )
+    says = f"no shift by communication steps is seen from {subject.step_size:g} s to {4 * subject.step_size:g} s"
+    return passed("delay", says)
 
 
 def _at_step_sizes(subject: Subject) -> tuple[Numbers, Numbers, Numbers] | str:
@@ -203,9 +202,8 @@ def _jump(subject: Subject, output: str, name: str, step_size: float) -> tuple[f
 def step_invariance(subject: Subject) -> CheckResult:
     runs = _at_step_sizes(subject)
     if isinstance(runs, str):
-        return remarked(
-            "step_invariance", f"it refuses another communication step: {runs}", "couple it with its own step only"
-        )
+        says = f"it refuses another communication step: {runs}"
+        return remarked("step_invariance", says, "couple it with its own step only")
     fine, double, fourfold = runs
     first, second = _typical(double, fine[::2]), _typical(fourfold, double[::2])
     h = subject.memory["base step"]
@@ -248,13 +246,9 @@ def _claimed(subject: Subject) -> float:
 
 def _switching(name: str, signals: list[str], seen: str, **figures: float) -> CheckResult:
     """What is to be said where only moments of switching follow the step."""
-    return remarked(
-        name,
-        f"{', '.join(signals)} switches at other moments with another step, and nothing else differs; {seen}",
-        "the moments of switching are as exact as the communication step: take a smaller one where they matter",
-        switching=signals,
-        **figures,
-    )
+    says = f"{', '.join(signals)} switches at other moments with another step, and nothing else differs; {seen}"
+    remedy = "the moments of switching are as exact as the communication step: take a smaller one where they matter"
+    return remarked(name, says, remedy, switching=signals, **figures)
 
 
 def _typical(a: Numbers, b: Numbers) -> float:
