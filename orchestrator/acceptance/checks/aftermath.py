@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import partial
 from itertools import pairwise
 from math import pi
 from typing import Any
@@ -37,7 +38,7 @@ _LEAST = 32.0
 _BLOCKS = 5  # parts of a disturbance, between which the memory is read
 _SOON = (0, 2, 4)  # numbers of those soon after which it is asked as well
 _PART = 0.75  # time to spend, in parts of the time for which an FMU is made to run
-_ALWAYS = (("deep", 0.45), ("jump", 0.15), ("series", 0), ("swell", 0.6))
+_ALWAYS = (("deep", 0.45), ("jump", 0.15), ("series", 0), ("high", 0.6))
 _IN_TIME = (("middle", 0.2), ("low", 0.15), ("small jump", 0.2))
 """Kinds of disturbances, and how long they last [s]; the latter are made as long as there is time."""
 _LATER = ((0.15, 0.4), (0.8, 1.6), (2.5, 3.5))
@@ -161,7 +162,7 @@ class _Look:
         with self._subject.running(point=self._point) as running:
             for _ in self._disturb(running, segments):
                 pass
-            followed(running, np.ones(wait))
+            followed(running, np.ones(wait, complex))
             return _in_frame(running, factors)
 
     def _answers(self, running: Running) -> tuple[Complex, Complex]:
@@ -209,11 +210,11 @@ class _Look:
             back = [round((running.time - begun) / self._subject.step_size)] if end is _End.BACK else []
             last = [(wait, *self._answers(running)) for wait in back if restores]
         if not restores:
-            courses = (self._small, self._still)
-            return end, away, kept, ((w, *(self._course(segments, w, c) for c in courses)) for w in [*waits, *back])
+            course = partial(self._course, segments)
+            return end, away, kept, ((w, course(w, self._small), course(w, self._still)) for w in [*waits, *back])
         found = []
         for before, wait in pairwise([0, *waits]):
-            followed(running, np.ones(wait - before))
+            followed(running, np.ones(wait - before, complex))
             found.append((wait, *self._answers(running)))
         return end, away, kept, [*found, *last]
 

@@ -1,6 +1,8 @@
 """Whether an FMU's binary can be loaded here and gives an instance, how that initialises, and what it does
 with calls that FMI forbids."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, provoked, remarked
@@ -47,7 +49,7 @@ def loads(subject: Subject) -> CheckResult:
 def call_order(subject: Subject) -> CheckResult:
     """Make three calls that FMI forbids, each in an instance of its own; what an FMU does then is provoked."""
     h = subject.step_size
-    steps = {
+    steps: dict[str, tuple[Callable[[Subject], HostedComponent], float, float]] = {
         "before initialisation": (Subject.open, 0.0, h), "of size 0": (_stepped, h, 0.0),
         "backwards": (_started, 0.0, -h),
     }  # fmt: skip
