@@ -1,6 +1,6 @@
 """Operating point of a scenario: its power flow, and what is unusual about the solution."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow_units import note_contradictions, undecided_units
@@ -54,13 +54,22 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         draft.note(draft.given.place("power_flow"), f"scenario {draft.given.name!r}: {error}", kind)
         return None
     question(draft, undecided)
-    draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
+    draft.found.questions += [
+        *_limit_questions(draft, flow), *_voltage_questions(draft, flow), *_left_over(draft, units, slack, flow),
+    ]  # fmt: skip
     return flow
 
 
 def _returning(draft: Draft) -> set[str]:
     events = draft.given.case.events if draft.given.scenario.events is None else draft.given.scenario.events
     return {event.unit for event in events if isinstance(event, UnitReconnectionTable)}
+
+
+def _left_over(draft: Draft, units: Mapping[str, str], slack: str, flow: PowerFlow) -> Iterator[Problem]:
+    """Powers that were asked of units at the slack bus, which feeds what is left."""
+    for name in (unit for unit, bus in units.items() if bus == slack and f"{unit}.P_0" in draft.given.from_outside):
+        fed = f"{slack} is the slack and feeds what is left, here P_0 = {flow.powers[name].real:.4g} pu"
+        yield Problem(draft.places.get(f"{name}.P_0", ""), f"{name}.P_0 cannot act: {fed}")
 
 
 def _reference(draft: Draft, units: Mapping[str, str], slack: str, grid: str) -> str:

@@ -25,7 +25,7 @@ _TIMES = ("time", "t", "timestamp", "datetime", "utc", "soc", "epoch", "zeit", "
 _THOUSANDS = r"[-+]?\d{1,3}(?:[.,'\s]\d{3})+(?:[.,]\d+)?"
 _DATE = re.compile(r"\d{1,4}[-./]\d{1,2}[-./]\d{1,4}([T\s].*)?|\d{1,2}:\d{2}(:.*)?")
 _TIME = re.compile(rf"\s*([-+]?\d*[.,]?\d+([eE][-+]?\d+)?|{_DATE.pattern})\s*")
-_SAMPLED = 0.11  # times farther apart [s] are slower than phasors are sent: perhaps ms
+_SAMPLED = 0.045  # times farther apart [s] are slower than phasors are usually sent: perhaps ms
 _EPOCH = 1e8  # numbers of seconds above it count from 1970, and are taken from the first sample on
 
 

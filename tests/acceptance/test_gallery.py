@@ -13,7 +13,7 @@ import pytest
 from fmus.toolchain.catalogue import build_model
 from fmus.toolchain.exporter import cached
 from fmus.toolchain.native_fmu import NativeFmu
-from orchestrator.acceptance.checks import droop
+from orchestrator.acceptance.checks import droop, port, ride_through
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.api.acceptance import Acceptance
 from orchestrator.fmi.limits import Limits
@@ -142,6 +142,14 @@ def test_an_answer_that_another_rating_changes_is_told(tmp_path):
     *_, found = check_fmu(path, None, LIMITS, only, run_for=0.3).results
     assert found.verdict == "remark"
     assert "its answer to less voltage and frequency is" in found.evidence
+    path = build(converter("blocks", FAULT_BLOCKS_BELOW=0.35), tmp_path)
+    assert check_fmu(path, None, LIMITS, only, run_for=0.3).trusted  # no current in a dip, at any rating
+
+
+def test_a_limit_that_was_not_watched_to_the_end_is_said(gallery, monkeypatch):
+    monkeypatch.setattr(ride_through, "scale", lambda *_: 0.3)
+    found = check_fmu(*gallery("converter"), LIMITS, ("limits",), run_for=0.3)
+    assert found.not_judged == ["whether its limit lasts for more than 6 s"]
 
 
 def test_an_angle_that_turns_back_by_less_than_a_turn_is_told(tmp_path):
@@ -162,6 +170,35 @@ def test_a_sign_that_turns_with_larger_changes_of_the_frequency_is_found(tmp_pat
     (*_, found) = check_fmu(path, None, LIMITS, ("evenness",), run_for=0.3).results
     assert found.fault == "wrong sign"
     assert "with 0.5 % less frequency its active power goes the wrong way" in found.evidence
+
+
+@pytest.mark.parametrize(
+    ("defines", "only", "fault"),
+    [({"FAULT_TRIPLES_IN_SWELL": 0.3}, "after_dips", "changed by a disturbance"),
+     ({"FAULT_LIMIT_OFF_WHERE": "(m[Q_REF] < -0.2)"}, "limits", "no current limit")],
+)  # fmt: skip
+def test_what_a_lasting_overvoltage_and_a_dip_while_absorbing_bring_is_found(defines, only, fault, tmp_path):
+    path = build(converter("plant", **defines), tmp_path)
+    assert check_fmu(path, None, LIMITS, (only,), run_for=0.3, seed=1).faults == [fault]
+
+
+def test_a_drift_that_begins_after_half_a_minute_is_looked_for_where_it_showed(tmp_path, monkeypatch):
+    """At rest there would be no time for it; the run with small changes had."""
+    monkeypatch.setattr(port, "_PART", 0.0)
+    path = build(converter("drifts", FAULT_DRIFTS_AFTER=30.0, FAULT_DRIFTS_BY=0.1), tmp_path)
+    assert check_fmu(path, None, LIMITS, ("steady_state",)).trusted
+    assert check_fmu(path, None, LIMITS, ("runs", "steady_state")).faults == ["leaves its steady state"]
+
+
+@pytest.mark.parametrize("name", ["gain_of_the_fourth_dip", "gain_for_a_while", "wound_up"])
+def test_states_that_come_back_show_the_same_after_dips(name, gallery):
+    """In one run what else takes a run for each answer."""
+    alone, known = (
+        check_fmu(*gallery(name), LIMITS, only, run_for=0.3).results[-1]
+        for only in (("after_dips",), ("reading", "state", "after_dips"))
+    )
+    assert known == alone
+    assert alone.fault
 
 
 def test_a_place_at_which_its_small_answer_jumps_is_told(tmp_path):

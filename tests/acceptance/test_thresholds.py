@@ -3,8 +3,10 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from orchestrator.acceptance.checks import points
 from orchestrator.acceptance.checks.subject import Use
 from orchestrator.acceptance.runner import check_fmu
 from orchestrator.fmi.limits import Limits
@@ -86,3 +88,13 @@ def test_steps_that_are_too_long_for_it_are_a_fault_where_it_declares_them(decla
     assert report.results[-1].verdict == verdict
     assert "steps of 0.0001 and 0.0002 s differ by " in report.results[-1].evidence
     assert "0.0002 and 0.0004 s by " in report.results[-1].evidence
+
+
+def test_the_last_digits_of_an_output_that_rests_are_no_clock():
+    """As those of the power that a DLL shows: its circuit's angle is six million radians at a start at 20,000 s."""
+    moving = np.linspace(0.0, 1.0, 5)
+    first, late = (np.column_stack([moving, np.full(5, rest)]) for rest in (0.5, 0.5 + 5.3e-11))
+    least = points._ROUNDED * np.abs(first).max(axis=0)
+    assert points._differs(first, late, least) == 0
+    late[3] += 2e-4
+    assert points._differs(first, late, least) > points._SAME

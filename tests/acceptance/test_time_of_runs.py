@@ -36,7 +36,7 @@ def result_of(monkeypatch, seconds, share, nan_at=np.inf, stop=1.0):
 
     subject = SimpleNamespace(
         step_size=1e-4, description=SimpleNamespace(stop_time=stop), steps=lambda hold: None, memory={},
-        running=opened, memory_in_use=lambda: 0, watched=["y"],
+        running=opened, memory_in_use=lambda: 0, watched=["y"], port=False,
     )  # fmt: skip
     return running.runs(subject), clock
 

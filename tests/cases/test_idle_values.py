@@ -56,3 +56,10 @@ def test_lead_and_lag_of_a_gain_of_0_and_what_is_connected_with_nothing():
 def test_a_sweep_tells_of_an_axis_that_acts_in_no_scenario(scenarios, told):
     plan = plan_sweep(CASE, SweepRequest([parse_vary("gfor.pod_p.K=100:200:3")], scenarios))
     assert [str(q).startswith("--vary gfor.pod_p.K: gfor.pod_p.K cannot act") for q in plan.idle] == [True] * told
+
+
+def test_the_power_of_a_unit_at_the_slack_is_what_is_left():
+    case = load_case("wscc9")
+    values = {"sg1.P_0": 0.6, "sg2.P_0": 0.7}
+    (text,) = [str(q) for q in case.prepare(["base"], values)[0].questions if "cannot act" in str(q)]
+    assert text.startswith("--set sg1.P_0: sg1.P_0 cannot act: bus_1 is the slack and feeds what is left, here P_0 = ")

@@ -83,7 +83,7 @@ def test_units_that_do_not_fit_are_refused(gfor, tmp_path, measured, units, said
 
 def test_a_record_without_phasors_is_told_what_it_needs(gfor, tmp_path):
     file = tmp_path / "f.csv"
-    file.write_text("time,f\n" + "".join(f"{0.1 * k},50\n" for k in range(100)))
+    file.write_text("time,f\n" + "".join(f"{0.02 * k},50\n" for k in range(100)))
     code, _, error = gfor("signal", "source", file)
     assert code == 2
     assert "NORTH.vm [pu]" in error

@@ -91,6 +91,7 @@ def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
         ("time,f\n1,2\n2,3,4,5\n", "and '2,3,4,5' has 4; name them all"),
         ("time,f\n0,00,50,1\n0,02,50,2\n", "the comma both parts the columns and stands in the numbers"),
         ("time,f\n0.0,1\n0.5,2\n1.0,3\n", "its times are 0.5 apart, perhaps in ms"),
+        ("time,f\n0.0,1\n0.1,2\n0.2,3\n", "its times are 0.1 apart, perhaps in ms"),
         ("time,f\n0.1,1,\n0.2,2,\n", "names 2 columns, and '0.1,1,' has 3; name them all"),
         (
             "time,f\n0,1\n20,2\n40,3\n",
@@ -98,9 +99,9 @@ def test_what_is_no_table_over_the_time_is_refused_in_own_words(tmp_path):
         ),
         ("time,f\n0.00,1\n20.00,2\n40.00,3\n", "or 'time [ms]'"),
         ("time,f\n1/5/2025 23:59:59,1\n2/5/2025 00:00:00,2\n", "or as dates such as 2025-03-01"),
-        ("time;P\n0;1.234,5\n0,1;1.235,5\n", "'P' has '1.234,5'; write its numbers without marks between thousands"),
-        ('time,P\n0.0,"1,234"\n0.1,999\n', "without marks between thousands"),
-        ("time,f\n0.0,1\n0.1,bad\n", "column 'f' has 'bad' among numbers; leave such cells empty"),
+        ("time;P\n0;1.234,5\n0,02;1.235,5\n", "'P' has '1.234,5'; write its numbers without marks between thousands"),
+        ('time,P\n0.0,"1,234"\n0.02,999\n', "without marks between thousands"),
+        ("time,f\n0.0,1\n0.02,bad\n", "column 'f' has 'bad' among numbers; leave such cells empty"),
         ("", "its first column is ''"),
     ):
         path.write_text(text)

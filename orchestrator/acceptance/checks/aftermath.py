@@ -1,8 +1,10 @@
 """What dips, overvoltages and jumps leave behind: another answer to small changes, another rest, memory."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import Enum, auto
+from functools import partial
 from itertools import pairwise
 from math import pi
 from typing import Any
@@ -13,7 +15,7 @@ from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed
 from orchestrator.acceptance.checks.events import Segment, factor, in_words, scale, series
 from orchestrator.acceptance.checks.port import WHY, current_limit, currents, followed, voltage_rows
 from orchestrator.acceptance.checks.running import RUN_FOR, spent_since
-from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject
+from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject, saved
 from orchestrator.arrays import Complex
 from orchestrator.errors import ComponentError
 
@@ -36,9 +38,9 @@ _LEAST = 32.0
 _BLOCKS = 5  # parts of a disturbance, between which the memory is read
 _SOON = (0, 2, 4)  # numbers of those soon after which it is asked as well
 _PART = 0.75  # time to spend, in parts of the time for which an FMU is made to run
-_EVENTS = (("deep", 0.45), ("jump", 0.15), ("series", 0), ("swell", 0.6), ("middle", 0.2), ("low", 0.15),
-           ("small jump", 0.2))  # fmt: skip
-"""Kinds of disturbances, the first four of which are always made, and how long they last [s]."""
+_ALWAYS = (("deep", 0.45), ("jump", 0.15), ("series", 0), ("high", 0.6))
+_IN_TIME = (("middle", 0.2), ("low", 0.15), ("small jump", 0.2))
+"""Kinds of disturbances, and how long they last [s]; the latter are made as long as there is time."""
 _LATER = ((0.15, 0.4), (0.8, 1.6), (2.5, 3.5))
 """Times [s] after a disturbance, of which one each is drawn, at which it is asked before it has come back as well."""
 _NEAR, _BENT = 0.3, 0.5
@@ -85,7 +87,7 @@ def after_dips(subject: Subject) -> CheckResult:
     found: list[_After] = []
     spent, budget = spent_since(), _PART * subject.memory.get("run_for", RUN_FOR)
     for number, segments in enumerate(_drawn(subject)):
-        if number >= 4 and spent() > budget:
+        if number >= len(_ALWAYS) and spent() > budget:
             break
         found.append(look.after(segments, number in _SOON))
         if found[-1].end is not _End.BACK and found[-1].end is not _End.ELSEWHERE:
@@ -97,7 +99,7 @@ def after_dips(subject: Subject) -> CheckResult:
 
 def _drawn(subject: Subject) -> Iterator[list[Segment]]:
     draw = subject.random("after dips")
-    for kind, lasts in _EVENTS:
+    for kind, lasts in (*_ALWAYS, *_IN_TIME):
         one = round(lasts * draw.uniform(0.85, 1.15), 3)
         yield series(draw) if kind == "series" else [(factor(draw, kind), one)]
 
@@ -138,12 +140,10 @@ class _Look:
         self._point = (subject.use.point or _POINT) if subject.starts else None
         self._times = scale(subject, 1.5)
         time = np.arange(self._steps(_PROBE)) * subject.step_size
+        self._still = np.ones(len(time), complex)
         self._small = 0.985 * np.exp(1j * pi * (1 / 120 - 0.1 * time))
         self._rest = complex(self._course((), 0, np.ones(self._steps(_WINDOW), complex))[-1])
         self._usual = self._course((), 0, self._small) - self._rest
-
-    def _running(self) -> Running:
-        return self._subject.running(point=self._point)
 
     def _steps(self, seconds: float) -> int:
         return max(2, round(self._times * seconds / self._subject.step_size))
@@ -159,11 +159,18 @@ class _Look:
 
     def _course(self, segments: Sequence[Segment], wait: int, factors: Complex) -> Complex:
         """The current in the frame of the voltage while that is changed by factors, some steps after a disturbance."""
-        with self._running() as running:
+        with self._subject.running(point=self._point) as running:
             for _ in self._disturb(running, segments):
                 pass
-            seen = followed(running, np.concatenate([np.ones(wait), factors]))
-        return seen[wait:] * np.abs(factors) / factors
+            followed(running, np.ones(wait, complex))
+            return _in_frame(running, factors)
+
+    def _answers(self, running: Running) -> tuple[Complex, Complex]:
+        """What it does with and without small changes from here on, where it stays."""
+        with _unmoved(running):
+            small = _in_frame(running, self._small)
+        with _unmoved(running):
+            return small, _in_frame(running, self._still)
 
     def after(self, segments: Sequence[Segment], soon: bool) -> _After:
         """What a disturbance of the voltage by factors leaves behind.
@@ -173,11 +180,11 @@ class _Look:
         one = f"{in_words(segments[0][0])} for {lasts}"
         words = one if len(segments) == 1 else f"{len(segments) // 2} dips, overvoltages and jumps in {lasts}"
         try:
-            with self._subject.while_doing(f"in the {words} and after it"), self._running() as running:
-                end, away, kept, wait = self._seen(running, segments)
-            waits = [self._steps(self._draw.uniform(*bounds)) for bounds in (_LATER if soon else ())]
-            for steps in [*waits, *([wait] if end is _End.BACK else [])]:
-                if changed := self._changed(segments, steps):
+            with (self._subject.while_doing(f"in the {words} and after it"),
+                  self._subject.running(point=self._point) as running):  # fmt: skip
+                end, away, kept, answers = self._seen(running, segments, soon)
+            for steps, small, here in answers:
+                if changed := self._changed(segments, steps, small, here):
                     later = f"{words}, {steps * self._subject.step_size:.2g} s later"
                     return _After(later, _End.BACK, away, changed, kept)
         except ComponentError:
@@ -185,30 +192,43 @@ class _Look:
             return _After(words, _End.REFUSED)
         return _After(words, end, away, kept=kept)
 
-    def _seen(self, running: Running, segments: Sequence[Segment]) -> tuple[_End, float, float, int]:
-        """What becomes of it, how far away it is, the bytes that each step keeps, and after how many steps."""
+    def _seen(
+        self, running: Running, segments: Sequence[Segment], soon: bool
+    ) -> tuple[_End, float, float, Iterable[tuple[int, Complex, Complex]]]:
+        """What becomes of it, how far away it is, the bytes that each step keeps, and its answers after how many steps.
+
+        Where its states come back, one run shows all of them."""
         sizes = []
         for number, steps in enumerate(self._disturb(running, segments)):
             if number < _BLOCKS:
                 sizes.append((self._subject.memory_in_use(), steps))
         kept = max(0.0, min((b - a) / steps for (a, _), (b, steps) in pairwise(sizes)))
-        begun = running.time
-        end, away = self._came_back(running, self._rest)
-        return end, away, kept, round((running.time - begun) / self._subject.step_size)
+        begun, restores = running.time, self._subject.memory.get("restores", False)
+        waits = sorted(self._steps(self._draw.uniform(*bounds)) for bounds in (_LATER if soon else ()))
+        with _unmoved(running) if restores else nullcontext():
+            end, away = self._came_back(running, self._rest)
+            back = [round((running.time - begun) / self._subject.step_size)] if end is _End.BACK else []
+            last = [(wait, *self._answers(running)) for wait in back if restores]
+        if not restores:
+            course = partial(self._course, segments)
+            return end, away, kept, ((w, course(w, self._small), course(w, self._still)) for w in [*waits, *back])
+        found = []
+        for before, wait in pairwise([0, *waits]):
+            followed(running, np.ones(wait - before, complex))
+            found.append((wait, *self._answers(running)))
+        return end, away, kept, [*found, *last]
 
-    def _changed(self, segments: Sequence[Segment], wait: int) -> float:
+    def _changed(self, segments: Sequence[Segment], wait: int, small: Complex, here: Complex) -> float:
         """By which part of it the answer to small changes differs, beside the same run without them; 0 where alike."""
-        still = np.ones(len(self._small), complex)
-        here = self._course(segments, wait, still)
         away = float(np.abs(here - self._rest).max())
         if not away < _NEAR:
             return 0.0
-        answer, most = self._course(segments, wait, self._small) - here, _CHANGED + _BENT * away
+        answer, most = small - here, _CHANGED + _BENT * away
         size = max(float(np.abs(self._usual).max()), 0.01)
         changed = float(np.abs(answer - self._usual).max()) / size
         if changed > most:  # perhaps by the time that has passed
             idle = [(1 + 0j, lasts) for _, lasts in segments]
-            usual = self._course(idle, wait, self._small) - self._course(idle, wait, still)
+            usual = self._course(idle, wait, self._small) - self._course(idle, wait, self._still)
             changed = float(np.abs(answer - usual).max()) / size
         return changed if changed > most else 0.0
 
@@ -230,3 +250,18 @@ class _Look:
         if size < _NOTHING:
             return _End.NOTHING, away
         return (_End.HELD if size > _LATCHED * min(1.0, current_limit(self._subject) or 1.0) else _End.ELSEWHERE), away
+
+
+def _in_frame(running: Running, factors: Complex) -> Complex:
+    """The current in the frame of the voltage while that is changed by factors."""
+    return followed(running, factors) * np.abs(factors) / factors
+
+
+@contextmanager
+def _unmoved(running: Running) -> Iterator[None]:
+    """Bring it back to where it was before what is done meanwhile."""
+    at = running.time
+    with saved(running) as kept:
+        yield
+        running.restore(kept)
+        running.time = at

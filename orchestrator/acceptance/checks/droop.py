@@ -20,11 +20,8 @@ FREQUENCY = 0.001
 
 CHARGING = OperatingAt(1.0, 0.0, -0.6, 0.1)  # while it takes active power
 _FURTHER = (OperatingAt(1.0, 0.0, 0.2, 0.02), OperatingAt(1.0, 0.0, 0.2, 0.3), OperatingAt(1.0, 0.0, -0.5, 0.1))
-_FURTHER_ABSORBING = (
-    OperatingAt(1.0, 0.0, 0.2, -0.25),
-    OperatingAt(1.0, 0.0, 0.2, -0.4),
-    OperatingAt(1.0, 0.0, -0.5, -0.3),
-)
+_FURTHER_ABSORBING = (OperatingAt(1.0, 0.0, 0.2, -0.25), OperatingAt(1.0, 0.0, 0.2, -0.4),
+                      OperatingAt(1.0, 0.0, -0.5, -0.3))  # fmt: skip
 
 SETTLED = 1e-3  # power [pu, S_n] by which an answer may still move
 _GOOD = 0.2  # largest error of the law, in parts of what the droop does where the frequency changes

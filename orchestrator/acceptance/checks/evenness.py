@@ -48,7 +48,6 @@ def evenness(subject: Subject) -> CheckResult:
     if not subject.starts:
         return not_applicable("evenness", WHY["no start" if subject.port else "no port"])
     found: dict[OperatingAt, Complex] = {}
-    machine = subject.description.kind == "machine"
     for point in _points(subject):
         try:
             way = -1.0 if point.P > _MUCH else 1.0  # away from its limit
@@ -57,16 +56,15 @@ def evenness(subject: Subject) -> CheckResult:
             if point is _GIVES:
                 raise
             continue  # which 'power_balance' and 'operating_points' tell
-        if fault := _other(found[_GIVES].real, found[point].real, machine):
+        if fault := _other(found[_GIVES].real, found[point].real, subject.is_machine):
             says = f"{fault[1]} from P_0 = {point.P:g}, Q_0 = {point.Q:g}, v_0 = {point.v:g}"
             return failed("evenness", fault[0], f"{says}, and not from P_0 = {_GIVES.P:g}")
     for larger, word in ((_LARGER, "less"), (-_LARGER, "more")):
         end = np.sign(larger) * _course(subject, _MILD, {}, larger).real[-len(found[_GIVES]) // 10 :]
         if end.mean() < -_SOME and np.ptp(end) < 0.1 * abs(end.mean()):
             says = f"with {100 * _LARGER * FREQUENCY:g} % {word} frequency its active power goes the wrong way, "
-            return failed(
-                "evenness", "wrong sign", f"{says}by {abs(end.mean()):.2g} pu, and not after a smaller change"
-            )
+            says += f"by {abs(end.mean()):.2g} pu, and not after a smaller change"
+            return failed("evenness", "wrong sign", says)
     if jump := _jump(subject):
         return remarked("evenness", jump, "ask what it switches there: what holds at one place does not at the other")
     if _TAKES not in found:

@@ -23,6 +23,7 @@ _FAINT = 1e-3
 
 RANGES = {
     "shallow": (0.76, 0.95), "middle": (0.56, 0.74), "low": (0.36, 0.54), "deep": (0.06, 0.34), "swell": (1.06, 1.28),
+    "high": (1.13, 1.28),
 }  # fmt: skip
 """Bounds of the voltage [pu] by kind."""
 

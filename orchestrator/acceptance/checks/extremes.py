@@ -10,6 +10,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
 
 _STEPS = 50
+_SILENT = "outputs that are no numbers, and no error"
 
 
 @check("nan_input", "Does it tell of inputs that are no numbers, and get over them?", needs=SAME)
@@ -18,18 +19,12 @@ def nan_input(subject: Subject) -> CheckResult:
         return not_applicable("nan_input", "because there are no Real inputs")
     steps, h = affordable(subject, 200), subject.step_size
     clean = subject.trajectory(steps, h, subject.one_step())
-    answers = {}
-    for bad in (np.nan, np.inf):
-        answers[str(bad)] = _answer(subject, np.full(len(subject.inputs), bad))
+    answers = {str(bad): _answer(subject, np.full(len(subject.inputs), bad)) for bad in (np.nan, np.inf)}
     after = subject.trajectory(steps, h, subject.one_step())
     apart, place = difference(clean, after)
     if apart > EQUAL:
-        return failed(
-            "nan_input",
-            "not a number stays",
-            f"{subject.watched[place]} of a new instance differs by {apart:.3g} after another one was given NaN",
-            difference=apart,
-        )
+        says = f"{subject.watched[place]} of a new instance differs by {apart:.3g} after another one was given NaN"
+        return failed("nan_input", "not a number stays", says, difference=apart)
     seen = "; ".join(f"{bad}: {answer}" for bad, (answer, _) in answers.items())
     if not all(told for _, told in answers.values()):
         return remarked("nan_input", seen, "a master learns of it late; ask for fmi2Error where an input is not finite")
@@ -58,9 +53,7 @@ def extreme_inputs(subject: Subject) -> CheckResult:
     """Inputs far out, each alone and all together; a NaN or infinite output needs an error from the call."""
     if not subject.inputs:
         return not_applicable("extreme_inputs", "because there are no Real inputs")
-    wild: list[str] = []
-    silent: list[str] = []
-    texts: list[str] = []
+    wild, silent, texts = list[str](), list[str](), list[str]()
     for size in (3.0, 10.0, 100.0, 1e6):
         for name, deviation in _deviations(subject, size):
             answer = _held(subject, deviation)
@@ -69,16 +62,10 @@ def extreme_inputs(subject: Subject) -> CheckResult:
             elif answer:
                 texts.append(answer)
     if wild:
-        return failed(
-            "extreme_inputs", "not a number", f"{wild[0]}: outputs that are no numbers, and no error", cases=wild
-        )
+        return failed("extreme_inputs", "not a number", f"{wild[0]}: {_SILENT}", cases=wild)
     if silent:
-        return remarked(
-            "extreme_inputs",
-            f"{silent[0]}: outputs that are no numbers, and no error",
-            "keep its inputs within reason; the master stops where a number is none",
-            cases=silent,
-        )
+        remedy = "keep its inputs within reason; the master stops where a number is none"
+        return remarked("extreme_inputs", f"{silent[0]}: {_SILENT}", remedy, cases=silent)
     said = f"; it says: {texts[0]}" if texts else ""
     return passed("extreme_inputs", f"finite or refused up to 1e6{said}")
 

@@ -35,12 +35,8 @@ def fmi_validity(subject: Subject) -> CheckResult:
     if grave:
         return failed("fmi_validity", "invalid FMI", some_of(grave), problems=grave + harmless)
     if harmless:
-        return remarked(
-            "fmi_validity",
-            some_of(harmless),
-            "breaks the standard without changing an answer here; tell the author",
-            problems=harmless,
-        )
+        remedy = "breaks the standard without changing an answer here; tell the author"
+        return remarked("fmi_validity", some_of(harmless), remedy, problems=harmless)
     return passed("fmi_validity", "FMPy's validator finds no problem")
 
 
@@ -133,9 +129,6 @@ def declared_dependencies(subject: Subject) -> CheckResult:
         return not_applicable("declared_dependencies", "because the FMU has no outputs")
     silent = [name for name in described.outputs if described.output_dependencies.get(name) is None]
     if silent and described.inputs:
-        return remarked(
-            "declared_dependencies",
-            f"nothing is said of {some_of(silent)}, so all inputs are assumed to act at once",
-            "ask for the dependencies, so that a master can order its calls",
-        )
+        says = f"nothing is said of {some_of(silent)}, so all inputs are assumed to act at once"
+        return remarked("declared_dependencies", says, "ask for the dependencies, so that a master can order its calls")
     return passed("declared_dependencies", f"all {len(described.outputs)} outputs say what they depend on")

@@ -1,6 +1,8 @@
 """Whether an FMU's binary can be loaded here and gives an instance, how that initialises, and what it does
 with calls that FMI forbids."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, provoked, remarked
@@ -29,20 +31,17 @@ def loads(subject: Subject) -> CheckResult:
     both = answer if isinstance(answer, list) and len(answer) == 2 else (None, None)
     missing, spare = (process.typed(names, found) for found in both)
     if missing:
-        return failed(
-            "loads", "missing function", f"its binary has no {', '.join(missing)}, which what it declares needs"
-        )
+        says = f"its binary has no {', '.join(missing)}, which what it declares needs"
+        return failed("loads", "missing function", says)
     try:
         subject.open().close()
     except ComponentError as error:
         return failed("loads", "no instance", str(error))
     clocks = f"; it has {len(described.clocks)} clocks, which tick here" if described.clocks else ""
     if spare:
-        return remarked(
-            "loads",
-            f"its binary has no {some_of(spare, ', ')}, which nothing that it declares needs{clocks}",
-            f"FMI {described.fmi_version} asks for all of them; other masters may refuse it, tell the author",
-        )
+        says = f"its binary has no {some_of(spare, ', ')}, which nothing that it declares needs{clocks}"
+        remedy = f"FMI {described.fmi_version} asks for all of them; other masters may refuse it, tell the author"
+        return remarked("loads", says, remedy)
     return passed("loads", f"its binary loads, has all functions, and gives an instance{clocks}")
 
 
@@ -50,11 +49,10 @@ def loads(subject: Subject) -> CheckResult:
 def call_order(subject: Subject) -> CheckResult:
     """Make three calls that FMI forbids, each in an instance of its own; what an FMU does then is provoked."""
     h = subject.step_size
-    steps = {
-        "before initialisation": (_unborn, 0.0, h),
-        "of size 0": (_stepped, h, 0.0),
+    steps: dict[str, tuple[Callable[[Subject], HostedComponent], float, float]] = {
+        "before initialisation": (Subject.open, 0.0, h), "of size 0": (_stepped, h, 0.0),
         "backwards": (_started, 0.0, -h),
-    }
+    }  # fmt: skip
     accepted, ended = [], []
     for words, (begin, time, step_size) in steps.items():
         component = begin(subject)  # until here all is allowed
@@ -66,16 +64,9 @@ def call_order(subject: Subject) -> CheckResult:
     if ended:
         return provoked("call_order", "; ".join(ended))
     if accepted:
-        return remarked(
-            "call_order",
-            f"it accepts {' and '.join(accepted)}",
-            "FMI forbids these calls; a master that makes them by mistake will not be told",
-        )
+        remedy = "FMI forbids these calls; a master that makes them by mistake will not be told"
+        return remarked("call_order", f"it accepts {' and '.join(accepted)}", remedy)
     return passed("call_order", "steps before initialisation, of size 0 and backwards are refused")
-
-
-def _unborn(subject: Subject) -> HostedComponent:
-    return subject.open()
 
 
 def _started(subject: Subject) -> HostedComponent:

@@ -8,12 +8,13 @@ import numpy as np
 
 from orchestrator.acceptance.checks import port
 from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed, not_applicable, passed, remarked
-from orchestrator.acceptance.checks.comparing import difference, scales
+from orchestrator.acceptance.checks.comparing import difference
 from orchestrator.acceptance.checks.droop import FREQUENCY, VOLTAGE
 from orchestrator.acceptance.checks.events import scale
 from orchestrator.acceptance.checks.port import ANSWER, IMPORTING, POINTS, WHY, followed, present_current, rating_of
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
+from orchestrator.arrays import Numbers
 from orchestrator.binding.misfits import BALANCE, NO_LIMIT
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.port import BoundDescription
@@ -127,7 +128,7 @@ def ratings(subject: Subject) -> CheckResult:
             says = f"{words}, its power is {power:.4g} pu where {asked:.4g} is asked"
             return failed("ratings", "base of another rating", says, power=[power.real, power.imag])
         says = f"{words}, its current in a dip to {_DIP:g} pu is {current:.3g} pu, and {usual:.3g} pu at its own rating"
-        if abs(current * part / usual - 1) < _STAYS and usual < NO_LIMIT:
+        if abs(current * part - usual) < _STAYS * usual < _STAYS * NO_LIMIT:
             return failed("ratings", "limit of another rating", says, current=current)
         if limit is not None and current > 1.05 * limit >= usual:
             return failed("ratings", "above its current limit", f"{says}; {limit:g} pu is declared", current=current)
@@ -139,9 +140,8 @@ def ratings(subject: Subject) -> CheckResult:
         remedy = "ask which of its parameters count on another rating or in units, and set them together with S_n"
         return remarked("ratings", "; ".join([*otherwise, *refused]), remedy)
     if refused:
-        return remarked(
-            "ratings", "; ".join([*seen, *refused]), "do not use it at other ratings, or ask which it takes"
-        )
+        remedy = "do not use it at other ratings, or ask which it takes"
+        return remarked("ratings", "; ".join([*seen, *refused]), remedy)
     return passed("ratings", "; ".join(seen))
 
 
@@ -171,6 +171,10 @@ _LATE = 20_000.0  # A start [s] at which single precision has no milliseconds le
 _SAME, _STILL = 1e-4, 100.0
 """Difference of two answers, in parts of their range, up to which they are alike; and in parts of a rest's motion."""
 
+_ROUNDED = (
+    1e-8  # part of an output's size by which an angle of six million radians, which has no more digits, changes it
+)
+
 _FASTER, _LASTS = 0.012, 9.0  # frequency [pu] by which it is turned forth, and back for twice as long; in all [s]
 _TURNED = 5e-5  # difference of the currents that two angles bring [pu, S_n]: a jump of some hundredths of a milliradian
 
@@ -187,13 +191,12 @@ def later_times(subject: Subject) -> CheckResult:
     if (rested := subject.memory.get("rested")) is not None:
         point, rest, late = rested
         first = subject.trajectory(steps, h, subject.one_step(), point=point)
-        apart, output = difference(first, late)
-        found = apart if apart * scales(first, late)[output] >= _STILL * rest.moved else 0.0
+        found = _differs(first, late, _STILL * rest.moved)
         said.append(f"after {rest.time:.3g} s at rest it is {found:.2g} of its range away")
     first = subject.trajectory(steps, h, subject.one_step())
     try:
         subject.start_time = _LATE
-        apart, _ = difference(first, subject.trajectory(steps, h, subject.one_step()))
+        apart = _differs(first, subject.trajectory(steps, h, subject.one_step()), _ROUNDED * np.abs(first).max(axis=0))
         said.append(f"started at {_LATE:g} s it is {apart:.2g} of its range away")
         found = max(found, apart)
     except (ComponentError, EndedError) as error:
@@ -203,6 +206,11 @@ def later_times(subject: Subject) -> CheckResult:
     says = f"the answer to a small step: {', '.join(said)}"
     return (failed("later_times", "counts time", says, apart=found) if found > _SAME
             else passed("later_times", says, apart=found))  # fmt: skip
+
+
+def _differs(first: Numbers, late: Numbers, least: Numbers | float) -> float:
+    """By which part of its range an output differs by more than the least."""
+    return difference(first, np.where(np.abs(late - first) < least, first, late))[0]
 
 
 @check("angles", "Is it the same wherever its angle begins?", needs=(*SAME, "steady_state"))

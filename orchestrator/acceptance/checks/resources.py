@@ -11,7 +11,7 @@ from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject, saved
 from orchestrator.errors import ComponentError
 
-_BLOCKS, _BLOCK = 6, 0.5  # parts of a measurement, and the longest time of one with instances [s]
+_BLOCKS, _BLOCK = 6, 0.2  # parts of a measurement, and the longest time of one with instances [s]
 
 _LEAST = 4.0  # bytes kept by each step that count as a leak
 _RESETS, _FEW = 6, 4  # resets in a block, and instances between two counts of open files
@@ -109,7 +109,7 @@ def _of_a_long_run(subject: Subject) -> float | _Unknown:
 def _of_instances(subject: Subject) -> float | _Unknown:
     """A quick look, and a longer one where that sees something: an interpreter's own memory moves as well."""
     steps = int(min(4000, max(40, 0.5 / subject.memory.get("seconds_per_step", 1e-6))))
-    few, clock = max(3, steps // 400), perf_counter()
+    few, clock = max(3, steps // 800), perf_counter()
     quick = _of_so_many(subject, few)
     if isinstance(quick, float) and quick <= _INSTANCE:
         return quick

@@ -25,7 +25,7 @@ _RIDDEN, _OVERLOAD = 2.0, 10.0
 
 _STAY = (
     ((0.8, 0.9), 1.0, _RIDDEN, None), ((0.17, 0.21), 1.0, 0.5, None), ((0.2, 0.35), 0.1, _OVERLOAD, None),
-    ((0.42, 0.55), 0.1, _OVERLOAD, None), ((0.2, 0.35), 0.1, _OVERLOAD, replace(IMPORTING[0], Q=-0.3)),
+    ((0.42, 0.55), 0.1, _OVERLOAD, None), ((0.1, 0.25), 0.1, _OVERLOAD, replace(IMPORTING[0], Q=-0.3)),
 )  # fmt: skip
 """Dips that stay: to what voltage [pu], when [s], how long [s], from which point."""
 
@@ -119,10 +119,9 @@ def limits(subject: Subject) -> CheckResult:
     if not subject.port:
         return not_applicable("limits", WHY["no port"])
     begin, budget = perf_counter(), _PART * subject.memory.get("run_for", 2.0)
-    answers: list[Answer] = []
-    refused: list[str] = []
+    answers, refused = list[Answer](), list[str]()
     left_out, other_way = 0, ""
-    longest = max(_RIDDEN, _OVERLOAD * scale(subject, _OVERLOAD))
+    longest = max(_RIDDEN, _OVERLOAD * min(1.0, 2 * scale(subject, _OVERLOAD)))
     for number, run in enumerate(_runs(subject.random("limits"), longest)):
         rest = list(run)
         if rest[0].point is not None:
@@ -134,11 +133,11 @@ def limits(subject: Subject) -> CheckResult:
                 break
             bad = _disturbed(subject, rest, answers, refused)
             if bad is not None:
-                return failed(
-                    "limits", "not a number", f"its current is no number in {bad}, and fmi2DoStep returned OK",
-                    case=str(bad),
-                )  # fmt: skip
+                says = f"its current is no number in {bad}, and fmi2DoStep returned OK"
+                return failed("limits", "not a number", says, case=str(bad))
     result = _judged(subject, answers, refused, left_out)
+    if longest < _OVERLOAD:
+        result.figures["not_judged"] = f"whether its limit lasts for more than {longest:.2g} s"
     if other_way and not result.fault:
         remedy = result.remedy or "do not use it with imported power, or ask how it starts"
         return remarked("limits", f"{result.evidence}; {other_way}", remedy, **result.figures)
@@ -210,7 +209,7 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     }  # fmt: skip
     if declared is not None and worst.mean > 1.05 * declared:
         return failed("limits", "above its current limit", f"{seen}; {declared:g} pu is declared", **figures)
-    machine = subject.description.kind == "machine"
+    machine = subject.is_machine
     unsaid = declared is None and not machine
     seen += "; it is a machine, whose current nothing limits" if machine and declared is None else ""
     if unsaid and worst.mean > NO_LIMIT:

@@ -18,21 +18,16 @@ def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | b
     for name, info in subject.description.variables.items():
         if info.causality != "parameter" or info.variability != "tunable" or info.start is None:
             continue
-        value = info.start_number
-        if info.type == "Real" and _may_be_a_flag(info):
-            low, high = info.minimum, info.maximum
-            if low is not None and high is not None and value + 1 <= high:
-                found[name] = value + 1
-            elif low is not None and high is not None and value - 1 >= low:
-                found[name] = value - 1
+        value, low, high = info.start_number, info.minimum, info.maximum
+        flag = info.type == "Real" and _may_be_a_flag(info)
+        if flag or info.type == "Integer":
+            others = [] if low is None or high is None else [n for n in (value - 1, value + 1) if low <= n <= high]
+            if others and (flag or switches):
+                found[name] = others[-1]
         elif info.type == "Real":
             moved = value * 1.1 if value else 0.1
-            if (info.minimum is None or moved >= info.minimum) and (info.maximum is None or moved <= info.maximum):
+            if (low is None or moved >= low) and (high is None or moved <= high):
                 found[name] = moved
-        elif info.type == "Integer" and info.minimum is not None and info.maximum is not None:
-            others = [other for other in (value - 1, value + 1) if info.minimum <= other <= info.maximum]
-            if others and switches:
-                found[name] = others[-1]
         elif info.type == "Boolean" and switches:
             found[name] = not _switched_on(subject, name)
     return found

@@ -17,7 +17,7 @@ from orchestrator.binding.misfits import SLIGHT, at_rest, of_frequency, omega_se
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
-_LASTS = 3.0  # time [s] in which an answer settles
+_LASTS, _SHORTER = 3.0, 0.67  # time [s] in which an answer settles, and the part of it at other voltages
 
 _EARLY = (0.005, 0.025)
 """Cycle in which a converter is still the source behind its impedance that it was; oscillations of the network's
@@ -103,7 +103,7 @@ def signs(subject: Subject) -> CheckResult:
         if point is droops.CHARGING and cannot_import(subject, point):
             continue  # which 'power_balance' tells
         try:
-            result = _at(subject, steps, point)
+            result = _at(subject, steps if point.v == 1.0 else round(_SHORTER * steps), point)
             if point is droops.CHARGING and seen and not result.fault:
                 result = _evenly(_summary(seen), result)
         except ComponentError as error:
@@ -169,11 +169,9 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     if wrong:
         return failed("signs", wrong[0], f"{wrong[1]} ({said})", **figures)
     if max(voltage.far, frequency.far) > _AWAY:
-        return remarked(
-            "signs", f"it goes {max(voltage.far, frequency.far):.3g} pu away ({said})",
-            "it is unstable at a stiff bus, or answers much; ask for the shortest network impedance that it bears",
-            **figures,
-        )  # fmt: skip
+        says = f"it goes {max(voltage.far, frequency.far):.3g} pu away ({said})"
+        remedy = "it is unstable at a stiff bus, or answers much; ask for the shortest network impedance that it bears"
+        return remarked("signs", says, remedy, **figures)
     swings = [way.ringing for answer in (voltage, frequency) for way in answer.ways]
     late = max((late for before, late, _ in swings if late > _TOLD * before), default=0.0)
     if late > _RINGS:

@@ -45,13 +45,8 @@ def state(subject: Subject) -> CheckResult:
     worst, place, where = seen
     steps = affordable(subject, _STEPS)
     if worst > _CLEAR:
-        return failed(
-            "state",
-            "hidden state",
-            f"{subject.watched[place]} differs by {worst:.3g} of its range after "
-            f"fmi2SetFMUstate and {steps} equal steps{where}{_which(subject)}",
-            difference=worst,
-        )
+        says = f"{subject.watched[place]} differs by {worst:.3g} of its range after fmi2SetFMUstate and {steps} "
+        return failed("state", "hidden state", f"{says}equal steps{where}{_which(subject)}", difference=worst)
     least = _CLEAR if worst <= _EXACT else _RESTARTED
     in_events = ""
     if subject.port:
@@ -60,12 +55,10 @@ def state(subject: Subject) -> CheckResult:
                 return failed("state", "hidden state", f"{text}{said}", difference=apart)
             in_events = in_events or (text if apart == 0 else IN_EVENTS)
     if worst > _EXACT:
-        return remarked(
-            "state",
-            f"{subject.watched[place]} differs by {worst:.3g} of its range after fmi2SetFMUstate",
-            "an integrator that begins anew does that; perturbations should be much larger",
-            difference=worst,
-        )
+        says = f"{subject.watched[place]} differs by {worst:.3g} of its range after fmi2SetFMUstate"
+        remedy = "an integrator that begins anew does that; perturbations should be much larger"
+        return remarked("state", says, remedy, difference=worst)
+    subject.memory["restores"] = in_events == IN_EVENTS
     says = f"{steps} steps after fmi2SetFMUstate are the same ({worst:.1g}){in_events}"
     return passed("state", says, difference=worst)
 
@@ -169,18 +162,13 @@ def state_size(subject: Subject) -> CheckResult:
     least = 8 * len(subject.description.states)
     figures = {"bytes": sizes[0], "microseconds": 1e6 * seconds}
     if sizes[-1] > sizes[0] and sizes == sorted(sizes) and len(set(sizes)) > 2:
-        return failed(
-            "state_size",
-            "growing state",
-            f"the serialised state grows from {sizes[0]} to {sizes[-1]} bytes in 150 steps",
-            **figures,
-        )
+        says = f"the serialised state grows from {sizes[0]} to {sizes[-1]} bytes in 150 steps"
+        return failed("state_size", "growing state", says, **figures)
     if again is not None:
         return failed("state_size", "serialised state", again, **figures)
     if sizes[0] < least:
-        return failed(
-            "state_size", "incomplete state", f"{sizes[0]} bytes cannot hold {least // 8} continuous states", **figures
-        )
+        says = f"{sizes[0]} bytes cannot hold {least // 8} continuous states"
+        return failed("state_size", "incomplete state", says, **figures)
     return passed("state_size", f"{sizes[0]} bytes, saved in {1e6 * seconds:.0f} µs", **figures)
 
 

@@ -19,6 +19,7 @@ from orchestrator.fmi.port import START, BoundDescription
 
 Stimulus = Callable[[float], Numbers]  # time [s] → the inputs' deviations from where they start
 
+STEPS_IN_A_ROUND = 4096  # random inputs, after which they come again
 PORT_STEP = 1e-4  # communication step [s] at which converters are coupled
 
 
@@ -143,6 +144,10 @@ class Subject:
         return tuple(v.name for v in variables if v.type == "Real" and v.causality == "local")[:50]
 
     @property
+    def is_machine(self) -> bool:
+        return self.description.kind == "machine"
+
+    @property
     def point(self) -> OperatingAt:
         """Where it starts, where nobody says otherwise."""
         return self.use.point or OperatingAt()
@@ -178,7 +183,7 @@ class Subject:
 
     def steps(self, hold: float, seed: int = 1) -> Stimulus:
         """Steps of random height that are held for ``hold`` seconds; equal seeds give equal steps."""
-        heights = np.random.default_rng(seed).uniform(-1, 1, (4096, len(self.inputs))) * self.amplitudes
+        heights = np.random.default_rng(seed).uniform(-1, 1, (STEPS_IN_A_ROUND, len(self.inputs))) * self.amplitudes
         return lambda time: heights[int(time / hold + 1e-6) % len(heights)]
 
     def one_step(self) -> Stimulus:

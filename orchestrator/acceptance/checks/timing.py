@@ -36,19 +36,13 @@ def feedthrough(subject: Subject) -> CheckResult:
     subject.memory["feedthrough"] = seen
     declared = {n: subject.description.feedthrough(n) for n in subject.outputs}
     hidden = {n: sorted(seen[n] - set(declared[n])) for n in subject.outputs if seen[n] - set(declared[n])}
+    observed = {n: sorted(v) for n, v in seen.items()}
     if hidden:
         text = "; ".join(f"{n} follows {', '.join(names[:4])} at once" for n, names in list(hidden.items())[:3])
-        return failed(
-            "feedthrough",
-            "undeclared feed-through",
-            f"{text}, and the file says it does not",
-            observed={n: sorted(v) for n, v in seen.items()},
-        )
-    return passed(
-        "feedthrough",
-        f"{sum(map(len, seen.values()))} direct dependencies seen, all of them declared",
-        observed={n: sorted(v) for n, v in seen.items()},
-    )
+        says = f"{text}, and the file says it does not"
+        return failed("feedthrough", "undeclared feed-through", says, observed=observed)
+    says = f"{sum(map(len, seen.values()))} direct dependencies seen, all of them declared"
+    return passed("feedthrough", says, observed=observed)
 
 
 def _observed(subject: Subject) -> dict[str, set[str]]:
@@ -98,9 +92,8 @@ def delay(subject: Subject) -> CheckResult:
         return failed("delay", "delayed output", stale, steps=1)
     if stale := _stale(subject, declared=False):
         return remarked("delay", stale, "its partners see it one step late; ask for outputs that follow at once")
-    return passed(
-        "delay", f"no shift by communication steps is seen from {subject.step_size:g} s to {4 * subject.step_size:g} s"
-    )
+    says = f"no shift by communication steps is seen from {subject.step_size:g} s to {4 * subject.step_size:g} s"
+    return passed("delay", says)
 
 
 def _at_step_sizes(subject: Subject) -> tuple[Numbers, Numbers, Numbers] | str:
@@ -209,9 +202,8 @@ def _jump(subject: Subject, output: str, name: str, step_size: float) -> tuple[f
 def step_invariance(subject: Subject) -> CheckResult:
     runs = _at_step_sizes(subject)
     if isinstance(runs, str):
-        return remarked(
-            "step_invariance", f"it refuses another communication step: {runs}", "couple it with its own step only"
-        )
+        says = f"it refuses another communication step: {runs}"
+        return remarked("step_invariance", says, "couple it with its own step only")
     fine, double, fourfold = runs
     first, second = _typical(double, fine[::2]), _typical(fourfold, double[::2])
     h = subject.memory["base step"]
@@ -254,13 +246,9 @@ def _claimed(subject: Subject) -> float:
 
 def _switching(name: str, signals: list[str], seen: str, **figures: float) -> CheckResult:
     """What is to be said where only moments of switching follow the step."""
-    return remarked(
-        name,
-        f"{', '.join(signals)} switches at other moments with another step, and nothing else differs; {seen}",
-        "the moments of switching are as exact as the communication step: take a smaller one where they matter",
-        switching=signals,
-        **figures,
-    )
+    says = f"{', '.join(signals)} switches at other moments with another step, and nothing else differs; {seen}"
+    remedy = "the moments of switching are as exact as the communication step: take a smaller one where they matter"
+    return remarked(name, says, remedy, switching=signals, **figures)
 
 
 def _typical(a: Numbers, b: Numbers) -> float:
@@ -290,11 +278,8 @@ def internal_step(subject: Subject) -> CheckResult:
             for span, many in _RATIOS
         }
     except ComponentError as error:
-        return remarked(
-            "internal_step",
-            f"it refuses communication steps that are no multiple of its own: {error}",
-            "couple it with multiples of its own step only",
-        )
+        says = f"it refuses communication steps that are no multiple of its own: {error}"
+        return remarked("internal_step", says, "couple it with multiples of its own step only")
     worst, share = max(
         (_typical(run[::many], plain[::span][: total // span + 1]), f"{span}/{many}")
         for (span, many), run in odd.items()

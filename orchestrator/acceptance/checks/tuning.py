@@ -42,9 +42,8 @@ def tunables(subject: Subject) -> CheckResult:
         acts = difference(plain, before)[0] > _ACTS
         acting += acts
         if acts and difference(plain, during)[0] == 0:
-            return failed(
-                "tunables", "parameter not taken", f"{says} it changes nothing, and set before the run it does"
-            )
+            says += " it changes nothing, and set before the run it does"
+            return failed("tunables", "parameter not taken", says)
     return passed("tunables", f"{acting} of {len(names)} tunable parameters act on a short run, set before or in it")
 
 

@@ -217,6 +217,9 @@ static void notice(double *m, phasor v, double h) {
     m[LOW] = low ? m[LOW] + h : 0;
     m[SINCE] = size < 0.4 ? 0 : m[SINCE] + h;
     m[OVER] = size > 1.1 ? m[OVER] + h : 0;
+#ifdef FAULT_TRIPLES_IN_SWELL /* its duration [s] */
+    if (m[OVER] > FAULT_TRIPLES_IN_SWELL) m[TRIPLED] = 1;
+#endif
     m[WOUND] = low ? fmin(m[WOUND] + h * (1 - size), 0.3) : m[WOUND] * exp(-h / 0.03);
 #ifdef FAULT_WINDS_UP
     if (m[LOW] > FAULT_WINDS_UP && size < 0.4) m[P_REF] += 0.3 * h; /* and nothing takes that back */
