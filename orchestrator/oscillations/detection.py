@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.arrays import Numbers
+from orchestrator.arrays import Numbers, Vector
 from orchestrator.oscillations.measurements import Measurements
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 8.0
-_ABOVE = 40.0  # power of a line beside the median of its neighbours: a mode that noise shakes seldom reaches it
+_ABOVE = 35.0  # power of a line beside the median of its neighbours: a mode that noise shakes seldom reaches it
 _MOST = 6
 _LEAST_SHARE = 0.01  # part of the strongest oscillation's power from which on a weaker one is told
 _AS_CLEAR = 0.1  # power beside its noise, as a part of that of the clearest signal
@@ -66,19 +66,18 @@ def find_oscillations(signals: Signals) -> list[SpectralLine]:
     each = np.column_stack([power, each])
     highest = np.lib.stride_tricks.sliding_window_view(np.pad(each, ((12, 12), (0, 0))), 25, axis=0).max(axis=-1)
     low, high = max(LOWEST_HZ, _PERIODS / length), min(HIGHEST_HZ, 0.4 / step)
-    lines: list[tuple[float, int, dict[int, float]]] = []
-    for k in map(int, np.flatnonzero((grid >= low) & (grid <= high))):
-        peaks = np.flatnonzero(each[k] == highest[k])
-        above = each[k, peaks] / _background(each[:, peaks], k) - np.where(peaks > 0, np.log2(count), 0.0)
-        if order := [j for j in np.argsort(-above) if above[j] > _ABOVE]:
-            lines.append((float(power[k]), k, {int(peaks[j]) - 1: float(above[j]) for j in order if peaks[j]}))
-    lines.sort(key=lambda line: -line[0])
-    kept: list[float] = []
-    found: list[SpectralLine] = []
-    for strength, k, shown in lines:
+    at, column = np.nonzero((each == highest) & ((grid >= low) & (grid <= high))[:, None])
+    above = each[at, column] / _background(each, at, column) - np.where(column > 0, np.log2(count), 0.0)
+    lines: dict[int, dict[int, float]] = {}
+    for j in np.argsort(-above)[: (above > _ABOVE).sum()]:
+        lines.setdefault(int(at[j]), {})[int(column[j]) - 1] = float(above[j])
+    strongest = sorted(lines, key=lambda k: -power[k])
+    kept, found = list[float](), list[SpectralLine]()
+    for k in strongest:
         clear = all(abs(grid[k] - other) * length > 3 for other in kept)
-        if strength < _LEAST_SHARE * lines[0][0] or not clear or len(found) == _MOST:
+        if power[k] < _LEAST_SHARE * power[strongest[0]] or not clear or len(found) == _MOST:
             continue
+        shown = {signal: size for signal, size in lines[k].items() if signal >= 0}
         frequency = refined(signals, [*shown] or [*range(count)], float(grid[k]))
         kept.append(frequency)
         base = next((o for o in found if _multiple(frequency, o.frequency, length)), None)
@@ -94,13 +93,17 @@ def spectra(values: Numbers, step: float) -> tuple[Numbers, Numbers]:
     """Frequencies [Hz] and the power of each signal as a part of its own, shape (frequencies, m)."""
     window = np.hanning(len(values))[:, None]
     power = np.abs(np.fft.rfft(values * window, 4 * len(values), axis=0)) ** 2
-    return np.fft.rfftfreq(4 * len(values), step), np.asarray(power / np.maximum(power.sum(axis=0), 1e-300))
+    share = np.asarray(power / np.maximum(power.sum(axis=0), 1e-300), dtype=np.float64)
+    return np.asarray(np.fft.rfftfreq(4 * len(values), step), dtype=np.float64), share
 
 
-def _background(power: Numbers, k: int) -> Numbers:
+def _background(power: Numbers, at: Vector, column: Vector) -> Numbers:
     """Medians further off than a line's own width: the larger of those of forty and of twelve independent bins."""
-    sides = (np.concatenate([power[max(0, k - n) : max(0, k - 14)], power[k + 15 : k + n + 1]]) for n in (100, 40))
-    return np.maximum(np.maximum(*(np.median(around, axis=0) for around in sides)), 1e-300)
+    medians = []
+    for far in (101, 41):
+        beside = np.abs(at[:, None] + np.r_[-far:-14:2, 15:far:2])  # a spectrum is the same below 0 Hz
+        medians.append(np.median(power[np.minimum(beside, len(power) - 1), column[:, None]], axis=1))
+    return np.asarray(1e-300 + np.maximum(*medians))
 
 
 def refined(signals: Signals, columns: list[int], guess: float) -> float:

@@ -111,7 +111,8 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
     rivals = {name: best(there) for name, there in swung.items()}
     beside = min((x for name, x in rivals.items() if name != known[top].bus), default=1.0)
     rest, parts = left(voltages - effects[top]), [left(effect) for effect in effects]
-    alone = bool(sure[top]) and ranking[0][1] >= _SHARE and max([*parts[:top], *parts[top + 1 :], 0.0]) < _CONTRARY
+    most = sure[top] > 0 and sure[top] ** 2 >= _SHARE * (sure**2).sum()
+    alone = most and max([*parts[:top], *parts[top + 1 :], 0.0]) < _CONTRARY
     away = np.repeat([unit.bus != known[top].bus for unit in known], 2)
 
     def follows(effect: Complex) -> bool:
@@ -126,8 +127,9 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
         return bool(near and beyond(effect) < _EXPLAINED)
 
     if alone and (follows(effects[top]) or (rest < _EXPLAINED and best(reach(known[top].reach)) <= beside)):
+        noisy = ", the rest being noise" if rest > _EXPLAINED else ""
         why = (f"{names[top]} gives a current that its own linear model does not, and that explains "
-               f"{100 * (1 - rest):.0f} % of what the voltages do")  # fmt: skip
+               f"{100 * (1 - rest):.0f} % of what the voltages do{noisy}")  # fmt: skip
         also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
         sole = not also and beyond(effects[top]) < _UNEXPLAINED
         why += "; less so " + ", ".join(also) if also else ""
