@@ -71,9 +71,8 @@ def _prepared(times: Numbers, values: Numbers, highest_hz: float) -> tuple[float
         raise AnalysisError(f"a sample every {step:g} s shows no modes up to {highest_hz:g} Hz; "
                             f"it takes {_RATE * highest_hz:g} samples a second")  # fmt: skip
     thin = max(1, int(1 / (_RATE * highest_hz * step) + 1e-6))
-    line = np.column_stack(
-        [np.ones(len(values)), np.linspace(-1, 1, len(values)), np.linspace(-1, 1, len(values)) ** 2]
-    )
+    x = np.linspace(-1, 1, len(values))
+    line = np.column_stack([np.ones(len(values)), x, x**2])
     y = values - line @ np.linalg.lstsq(line, values, rcond=None)[0]
     if thin > 1:
         from scipy.signal import firwin  # noqa: PLC0415 - slow to import

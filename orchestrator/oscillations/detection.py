@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.arrays import Numbers
+from orchestrator.arrays import Numbers, Vector
 from orchestrator.oscillations.measurements import Measurements
 
 LOWEST_HZ, HIGHEST_HZ = 0.08, 8.0
-_ABOVE = 30.0  # power of a line beside the median of its neighbours from which it is an oscillation
+_ABOVE = 35.0  # power of a line beside the median of its neighbours: a mode that noise shakes seldom reaches it
 _MOST = 6
 _LEAST_SHARE = 0.01  # part of the strongest oscillation's power from which on a weaker one is told
+_AS_CLEAR = 0.1  # power beside its noise, as a part of that of the clearest signal
 _PERIODS = 6  # fewest periods in a record
 
 
@@ -34,6 +35,7 @@ class SpectralLine:
     # multiples of the frequency that are there as well, by order, as parts of the amplitude.
     harmonics: dict[int, float]
     amplitudes: dict[str, float]  # by signal [its unit], the strongest beside its own noise first
+    clear: int  # how many of these show it about as well as the first; 0 where none does by itself
 
     def periods(self, interval: float) -> float:
         """How many are seen, from the time between two samples [s]."""
@@ -54,55 +56,62 @@ def signals_of(measured: Measurements) -> Signals:
 
 
 def find_oscillations(signals: Signals) -> list[SpectralLine]:
-    """Lines of the spectrum, the strongest first; multiples of one belong to it."""
-    n, step = len(signals.times), float(signals.times[1] - signals.times[0])
-    length = n * step
-    grid, power = spectrum(signals.values, step)
+    """Lines of the spectrum of any signal or of their mean, the strongest in all first; multiples of one belong to it.
+
+    Of m signals one must exceed the noise by log2(m) more: noise exceeds x times its median with the chance 2^-x."""
+    step, count = float(signals.times[1] - signals.times[0]), len(signals.names)
+    length = len(signals.times) * step
+    grid, each = spectra(signals.values, step)
+    power = each.mean(axis=1)
+    each = np.column_stack([power, each])
+    highest = np.lib.stride_tricks.sliding_window_view(np.pad(each, ((12, 12), (0, 0))), 25, axis=0).max(axis=-1)
     low, high = max(LOWEST_HZ, _PERIODS / length), min(HIGHEST_HZ, 0.4 / step)
-    inside = np.flatnonzero((grid >= low) & (grid <= high))
-    lines: list[tuple[float, float]] = []
-    for k in map(int, inside):
-        if power[k] == power[max(0, k - 12) : k + 13].max() and power[k] > _ABOVE * _background(power, k):
-            lines.append((float(power[k]), refined(signals, float(grid[k]))))
-    lines.sort(reverse=True)
-    kept: list[float] = []
-    found: list[SpectralLine] = []
-    for strength, frequency in lines:
-        clear = all(abs(frequency - other) * length > 3 for other in kept)
-        if strength < _LEAST_SHARE * lines[0][0] or not clear or len(found) == _MOST:
+    at, column = np.nonzero((each == highest) & ((grid >= low) & (grid <= high))[:, None])
+    above = each[at, column] / _background(each, at, column) - np.where(column > 0, np.log2(count), 0.0)
+    lines: dict[int, dict[int, float]] = {}
+    for j in np.argsort(-above)[: (above > _ABOVE).sum()]:
+        lines.setdefault(int(at[j]), {})[int(column[j]) - 1] = float(above[j])
+    strongest = sorted(lines, key=lambda k: -power[k])
+    kept, found = list[float](), list[SpectralLine]()
+    for k in strongest:
+        clear = all(abs(grid[k] - other) * length > 3 for other in kept)
+        if power[k] < _LEAST_SHARE * power[strongest[0]] or not clear or len(found) == _MOST:
             continue
+        shown = {signal: size for signal, size in lines[k].items() if signal >= 0}
+        frequency = refined(signals, [*shown] or [*range(count)], float(grid[k]))
         kept.append(frequency)
         base = next((o for o in found if _multiple(frequency, o.frequency, length)), None)
         if base is not None:
             order = round(frequency / base.frequency)
             base.harmonics[order] = _relative(signals, base, order)
         else:
-            found.append(_described(signals, frequency))
+            found.append(_described(signals, frequency, shown))
     return found
 
 
-def spectrum(values: Numbers, step: float) -> tuple[Numbers, Numbers]:
-    """Frequencies [Hz] and the mean power of all signals, each as a part of its own."""
+def spectra(values: Numbers, step: float) -> tuple[Numbers, Numbers]:
+    """Frequencies [Hz] and the power of each signal as a part of its own, shape (frequencies, m)."""
     window = np.hanning(len(values))[:, None]
     power = np.abs(np.fft.rfft(values * window, 4 * len(values), axis=0)) ** 2
-    share = power / np.maximum(power.sum(axis=0), 1e-300)
-    return np.asarray(np.fft.rfftfreq(4 * len(values), step), dtype=np.float64), np.asarray(
-        share.mean(axis=1), dtype=np.float64
-    )
+    share = np.asarray(power / np.maximum(power.sum(axis=0), 1e-300), dtype=np.float64)
+    return np.asarray(np.fft.rfftfreq(4 * len(values), step), dtype=np.float64), share
 
 
-def _background(power: Numbers, k: int) -> float:
-    """Median beside the line, further off than its own width, over some forty independent bins."""
-    around = np.concatenate([power[max(0, k - 100) : max(0, k - 14)], power[k + 15 : k + 101]])
-    return float(np.median(around)) if len(around) else 0.0
+def _background(power: Numbers, at: Vector, column: Vector) -> Numbers:
+    """Medians further off than a line's own width: the larger of those of forty and of twelve independent bins."""
+    medians = []
+    for far in (101, 41):
+        beside = np.abs(at[:, None] + np.r_[-far:-14:2, 15:far:2])  # a spectrum is the same below 0 Hz
+        medians.append(np.median(power[np.minimum(beside, len(power) - 1), column[:, None]], axis=1))
+    return np.asarray(1e-300 + np.maximum(*medians))
 
 
-def refined(signals: Signals, guess: float) -> float:
-    """The frequency near a guess at which a sine explains most of the signals."""
+def refined(signals: Signals, columns: list[int], guess: float) -> float:
+    """The frequency near a guess at which a sine explains most of some of the signals."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415 - slow to import
 
-    spread = signals.values.std(axis=0)
-    strong = signals.values[:, spread > 0] / spread[spread > 0]
+    values = signals.values[:, columns]
+    strong = values / np.maximum(values.std(axis=0), 1e-300)
     window = np.hanning(len(strong))[:, None]
     t = signals.times - signals.times.mean()
 
@@ -139,10 +148,10 @@ def envelope(times: Numbers, values: Numbers, frequency: float, periods: float =
     return np.convolve(turned, 2 * window / window.sum(), mode="valid"), half
 
 
-def _described(signals: Signals, frequency: float) -> SpectralLine:
+def _described(signals: Signals, frequency: float, shown: dict[int, float]) -> SpectralLine:
     amplitude = np.abs(phasors(signals.times, signals.values, [frequency]))
-    spread = signals.values.std(axis=0)
-    order = np.argsort(-amplitude / np.maximum(spread, 1e-300))
+    size = amplitude / np.maximum(signals.values.std(axis=0), 1e-300)
+    order = [*shown, *(int(k) for k in np.argsort(-size) if k not in shown)]
     z, half = envelope(signals.times, signals.values[:, order[0]], frequency)
     size = np.abs(z)
     level = float(np.median(size[size > 0.5 * size.max()]))
@@ -153,7 +162,8 @@ def _described(signals: Signals, frequency: float) -> SpectralLine:
     used = slice(first, last)
     strength = np.abs(phasors(signals.times[used], signals.values[used], [frequency]))
     amplitudes = {signals.names[k]: float(strength[k]) for k in order if strength[k] > 0}
-    return SpectralLine(frequency, begin, first, last, {}, amplitudes)
+    clear = sum(above > _AS_CLEAR * max(shown.values()) for above in shown.values())
+    return SpectralLine(frequency, begin, first, last, {}, amplitudes, clear)
 
 
 def _relative(signals: Signals, base: SpectralLine, order: int) -> float:

@@ -96,10 +96,8 @@ def _opinions(
         why = f"it acts through active power (reactive work {100 * ratio:.0f} % of the dissipating): says nothing here"
         phase = replace(phase, applies=False, place=None, reason=why)
     elif ratio >= _VOLTAGE:
-        why = (
-            f"it acts through voltage (reactive work {100 * ratio:.0f} % of the dissipating), where energy flow is "
-            f"known to point elsewhere{f', here to {flow.place}' if flow.place else ''}"
-        )
+        why = (f"it acts through voltage (reactive work {100 * ratio:.0f} % of the dissipating), where energy flow is "
+               f"known to point elsewhere{f', here to {flow.place}' if flow.place else ''}")  # fmt: skip
         flow = replace(flow, applies=False, place=None, reason=why)
     return [flow, dynamic_mode(places, measured.times, found), phase]
 
@@ -116,7 +114,7 @@ def works(places: Sequence[Site], times: Numbers, found: SpectralLine, others: S
 
 
 def block_phasors(places: Sequence[Site], times: Numbers, found: SpectralLine, others: Sequence[float]) -> Complex:
-    """Phasors of p, q, angle and ln v of each place in several blocks, each turned by the phase that all share."""
+    """Phasors of p, q, angle and ln v of each place in blocks, turned by the phase that the clear ones share."""
     step = float(times[1] - times[0])
     settle = 0 if found.begin is None else round(2 / (found.frequency * step))
     used = np.arange(min(found.first + settle, found.last - 4), found.last)
@@ -124,18 +122,19 @@ def block_phasors(places: Sequence[Site], times: Numbers, found: SpectralLine, o
     beside = [found.frequency, *(order * found.frequency for order in found.harmonics), *others]
     signals = np.column_stack([x for p in places for x in (p.p, p.q, p.angle, np.log(np.maximum(p.v, 1e-9)))])
     blocks = np.array([phasors(times[block], signals[block], beside) for block in np.array_split(used, count)])
-    shared = np.linalg.svd(blocks / np.maximum(np.abs(blocks).mean(axis=0), 1e-300), full_matrices=False)[0][:, 0]
+    clear = {name.replace(".speed", ".angle") for name in [*found.amplitudes][: found.clear]}
+    named = [name for p in places for name in (f"{p.name}.p", f"{p.name}.q", f"{p.bus}.angle", f"{p.bus}.v")]
+    chosen = blocks[:, [name in clear for name in named]] if clear & {*named} else blocks
+    shared = np.linalg.svd(chosen / np.maximum(np.abs(chosen).mean(axis=0), 1e-300), full_matrices=False)[0][:, 0]
     return np.asarray(blocks * np.exp(-1j * np.angle(shared))[:, None])
 
 
 def felt_beyond(measured: Measurements, found: SpectralLine, others: Sequence[float], name: str) -> bool:
     """Whether a voltage at another bus than a place's own moves with it for sure: what drives a grid moves it."""
     (home,) = {place.bus for place in measured.places if place.name == name}
-    away = [place for place in measured.places if place.bus != home]
-    if not away:
-        return False
-    whole, errors = jackknife(block_phasors([*away], measured.times, found, others), lambda mean: mean)
-    return bool((np.abs(whole) > 2 * _CERTAIN * errors).reshape(-1, 4)[:, 2:].any())
+    away = [place.bus != home for place in measured.places]
+    whole, errors = jackknife(block_phasors(measured.places, measured.times, found, others), lambda mean: mean)
+    return bool((np.abs(whole) > 2 * _CERTAIN * errors).reshape(-1, 4)[away, 2:].any())
 
 
 def jackknife(blocks: Complex, figures: Callable[[Complex], Any]) -> tuple[Any, Numbers]:

@@ -12,10 +12,8 @@ from orchestrator.errors import InputError
 
 RATE = 40.0  # samples a second that are kept; denser records pass an anti-alias filter
 _LONGEST_GAP = 0.25  # gap that is filled by a straight line [s]: a quarter of a period at 1 Hz
-
 _FEWEST = 60
 _MOST_FILLED = 0.1  # part of a place's samples that may be missing
-
 
 Kind = Literal["unit", "branch"]
 

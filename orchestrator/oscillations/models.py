@@ -8,23 +8,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.arrays import Complex, Matrix
+from orchestrator.arrays import Complex, Matrix, Numbers
 from orchestrator.oscillations.detection import SpectralLine
 from orchestrator.oscillations.location import Opinion, block_phasors, jackknife
 from orchestrator.oscillations.measurements import Measurements, Site
 
 OWN_MODEL = "own linear models"
-_OTHER_POINT = (
-    0.05  # difference of the mean power, beside the apparent one, from which on the model is of another point
-)
+_OTHER_POINT = 0.05  # difference of the mean power, beside the apparent one, from which a model is of another point
 _CERTAIN = 3.0  # standard errors by which a deviation must exceed zero
 _EXPLAINED = 0.4  # part of all voltages' swing that a place may leave unexplained
+_OWN_NOISE = 0.01  # power of each voltage's own noise, beside what loads' noise does to them
 _SHARE = 0.8  # of the squares of all unexplained currents that one unit must have
 _CONTRARY = 0.2  # what the deviation of another unit does, from which on no single place is named
 _NOTED = 0.05  # the same, from which on the unit is not alone
 _UNEXPLAINED = 0.15  # part of the voltages' swing beyond its errors from which on something else drives as well
 _CLEARER = 0.6  # what the best place leaves beside what the second best does
-
 
 Response = Callable[[complex], Complex]  # of s
 
@@ -78,7 +76,8 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
         unlike = [current[:, k] - own[k] @ voltage[:, k] for k in range(len(places))]
         return np.array([unlike, voltage.T])
 
-    whole, errors = jackknife(block_phasors(places, measured.times, found, others), driven)
+    swings = block_phasors(places, measured.times, found, others)
+    whole, errors = jackknife(swings, driven)
     extra, voltages = whole[0], whole[1].ravel()
     rows = [models.buses.index(unit.bus) for unit in known]
 
@@ -88,12 +87,11 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
         there = np.concatenate([_frame(unit.voltage).T @ parts[b] for b, unit in zip(rows, known, strict=True)])
         return np.asarray(there @ _frame(frame) if there.shape[1] == 2 else there)
 
-    def left(rest: Complex) -> float:
+    def left(rest: Complex | Numbers) -> float:
         return float(np.linalg.norm(rest) / (np.linalg.norm(voltages) or 1.0))
 
-    def beyond(effect: Complex) -> Complex:
-        rest = np.abs(voltages - effect) - _CERTAIN * errors[1].ravel()
-        return np.asarray(np.maximum(rest, 0.0), dtype=np.complex128)
+    def beyond(effect: Complex) -> float:
+        return left(np.maximum(np.abs(voltages - effect) - _CERTAIN * errors[1].ravel(), 0.0))
 
     amount = np.linalg.norm(extra, axis=1)
     ranking = tuple((names[k], float(amount[k] ** 2 / ((amount**2).sum() or 1.0))) for k in np.argsort(-amount))
@@ -109,25 +107,40 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
 
     unseen = {n: u for n, u in models.units.items() if n.casefold() not in {name.casefold() for name in names}}
     further = {**{u.bus: u.reach for u in unseen.values()}, **models.loads} if len(set(rows)) > 1 else {}
-    rivals = {name: best(reach(response)) for name, response in further.items()}
+    swung = {name: reach(response) for name, response in further.items()}
+    rivals = {name: best(there) for name, there in swung.items()}
     beside = min((x for name, x in rivals.items() if name != known[top].bus), default=1.0)
     rest, parts = left(voltages - effects[top]), [left(effect) for effect in effects]
-    alone = bool(sure[top]) and ranking[0][1] >= _SHARE and max([*parts[:top], *parts[top + 1 :], 0.0]) < _CONTRARY
-    if alone and rest < _EXPLAINED and best(reach(known[top].reach)) <= beside:
+    most = sure[top] > 0 and sure[top] ** 2 >= _SHARE * (sure**2).sum()
+    alone = most and max([*parts[:top], *parts[top + 1 :], 0.0]) < _CONTRARY
+    away = np.repeat([unit.bus != known[top].bus for unit in known], 2)
+
+    def follows(effect: Complex) -> bool:
+        """Whether the voltages elsewhere have an effect in its size and phase, beside what loads do to them all."""
+        loads = np.column_stack([1e-12 * np.eye(len(voltages)), *(swung[x] for x in models.loads if x in swung)])
+        noise = loads @ loads.conj().T
+        noise += _OWN_NOISE * np.trace(noise).real / len(noise) * np.eye(len(noise))
+        there = np.linalg.solve(noise[np.ix_(away, away)], effect[away])
+        there /= np.vdot(effect[away], there).real or 1.0
+        factor, error = jackknife(swings, lambda mean: np.vdot(there, driven(mean)[1].ravel()[away]))
+        near = abs(factor) > 2 * _CERTAIN * error and abs(factor - 1) < _EXPLAINED
+        return bool(near and beyond(effect) < _EXPLAINED)
+
+    if alone and (follows(effects[top]) or (rest < _EXPLAINED and best(reach(known[top].reach)) <= beside)):
+        noisy = ", the rest being noise" if rest > _EXPLAINED else ""
         why = (f"{names[top]} gives a current that its own linear model does not, and that explains "
-               f"{100 * (1 - rest):.0f} % of what the voltages do")  # fmt: skip
+               f"{100 * (1 - rest):.0f} % of what the voltages do{noisy}")  # fmt: skip
         also = [names[k] for k, part in enumerate(parts) if k != top and part > _NOTED]
-        sole = not also and left(beyond(effects[top])) < _UNEXPLAINED
-        return Opinion(
-            OWN_MODEL, names[top], True, why + ("; less so " + ", ".join(also) if also else ""), ranking, sole
-        )
+        sole = not also and beyond(effects[top]) < _UNEXPLAINED
+        why += "; less so " + ", ".join(also) if also else ""
+        return Opinion(OWN_MODEL, names[top], True, why, ranking, sole)
     order = sorted(rivals, key=rivals.__getitem__)
     first, second, *_ = [*(rivals[name] for name in order), 1.0, 1.0]
     if first < min(_EXPLAINED, _CLEARER * second) and max(parts) < _CONTRARY:
         name = " or ".join(n for n, u in unseen.items() if u.bus == order[0]) or order[0]
         why = (f"the units that are observed do as their models, and a current of {name} explains "
                f"{100 * (1 - first):.0f} % of what the voltages do")  # fmt: skip
-        sole = max(parts) < _NOTED and left(beyond(fitted(reach(further[order[0]])))) < _UNEXPLAINED
+        sole = max(parts) < _NOTED and beyond(fitted(swung[order[0]])) < _UNEXPLAINED
         return Opinion(OWN_MODEL, name, True, why, ranking, sole)
     both = ", ".join(f"{n} {100 * x:.0f} %" for n, x in ranking[:3])
     why = f"no place alone deviates from its model and explains the voltages (deviations: {both})"

@@ -5,7 +5,7 @@ from html import escape
 
 import numpy as np
 
-from orchestrator.oscillations.detection import envelope, signals_of, spectrum
+from orchestrator.oscillations.detection import envelope, signals_of, spectra
 from orchestrator.oscillations.location import works
 from orchestrator.oscillations.measurements import Measurements
 from orchestrator.oscillations.verdict import Located
@@ -60,18 +60,15 @@ def _map(measured: Measurements, one: Located, others: list[float], figures: Fig
         fed[place.bus] = fed.get(place.bus, 0.0) + (0.0 if place.beyond else energy[place.name] / scale)
     branches = [(place.bus, place.beyond) for place in measured.places if place.beyond]
     texts = {bus: f"{bus}: {'feeds' if part > 0 else 'takes'} {abs(part):.0%}" for bus, part in fed.items()}
-    text = (
-        "Dissipating energy, as parts of the largest flow: the redder a bus, the more is fed there; arrows along flows."
-    )
+    text = "Dissipating energy, as parts of the largest flow: the redder a bus, the more it feeds; arrows along flows."
     return figures.add(network_map("map of energy flows", branches, fed, texts, flows), text)[0]
 
 
 def _spectrum(measured: Measurements, found: list[Located], figures: Figures) -> str:
-    grid, power = spectrum(signals_of(measured).values, measured.interval)
+    grid, power = spectra(signals_of(measured).values, measured.interval)
     shown = (grid > 0.05) & (grid < min(4.0, 0.4 / measured.interval))
-    level = 10 * np.log10(np.maximum(power[shown] / power[shown].max(), 1e-12))
-    chart = line_chart(
-        "spectrum", "Frequency [Hz]", "Power [dB]", [ChartCurve("all signals", colour(1), grid[shown], level)]
-    )
+    level = 10 * np.log10(np.maximum((mean := power[shown].mean(axis=1)) / mean.max(), 1e-12))
+    curves = [ChartCurve("all signals", colour(1), grid[shown], level)]
+    chart = line_chart("spectrum", "Frequency [Hz]", "Power [dB]", curves)
     lines = ", ".join(f"{x.found.frequency:.4f} Hz" for x in found) or "none"
     return figures.add(chart, f"Mean power of all signals, each as a part of its own. Lines found: {lines}.")[0]

@@ -108,9 +108,8 @@ def _in_base(curve: xr.DataArray, what: str, where: str) -> tuple[Numbers, str]:
 
 
 def contest_cases(folder: Path) -> list[Path]:
-    inside = sorted(
-        (p for p in folder.glob("*") if p.is_dir()), key=lambda p: [int(n) for n in re.findall(r"\d+", p.name)]
-    )
+    folders = (p for p in folder.glob("*") if p.is_dir())
+    inside = sorted(folders, key=lambda p: [int(n) for n in re.findall(r"\d+", p.name)])
     found = [path for path in (folder, *inside) if all((path / name).is_file() for name in CONTEST_FILES)]
     if not found:
         raise InputError(f"--contest {folder}: neither it nor a folder in it holds {', '.join(CONTEST_FILES)}")

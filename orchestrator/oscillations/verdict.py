@@ -50,28 +50,25 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     f, step = found.frequency, float(signals.times[1] - signals.times[0])
     settle = 0 if found.begin is None else round(2 / (f * step))
     used = slice(min(found.first + settle, found.last - 2), found.last)
-    names = list(found.amplitudes)[:_STRONGEST]
+    names = list(found.amplitudes)[: min(found.clear or _STRONGEST, _STRONGEST)]
     columns = [signals.names.index(name) for name in names]
     t = signals.times[used]
     periods = len(t) * step * f
     if periods < _FEWEST_PERIODS:
         return Evidence("not known", 0.0, 0.0, 0.0, 0.0, 0.0, periods, False, (f"only {periods:.1f} periods are seen",))
-    spreads, kurtoses, coherences, slopes, changes = [], [], [], [], []
+    seen = []
     for k in columns:
         z, half = envelope(t, signals.values[used, k], f)
         size, late = np.abs(z), t[half : len(t) - half]
         slope, level = np.polyfit(late - late.mean(), np.log(np.maximum(size, 1e-300)), 1)
-        spreads.append(float(size.std() / size.mean()))
-        slopes.append(float(slope))
         trend = np.exp(level + slope * (late - late.mean()))
         explained = 1 - float(((size - trend) ** 2).mean() / size.var())
-        changes.append(float(np.expm1(slope * (late[-1] - late[0]))) if explained > _TREND else 0.0)
-        coherences.append(float(abs(z.mean()) / size.mean()))
+        change = np.expm1(slope * (late[-1] - late[0])) if explained > _TREND else 0.0
         wave = np.real(z * np.exp(2j * np.pi * f * late))
-        kurtoses.append(float((wave**4).mean() / (wave**2).mean() ** 2))
+        kurtosis = (wave**4).mean() / (wave**2).mean() ** 2
+        seen.append([size.std() / size.mean(), kurtosis, abs(z.mean()) / size.mean(), slope, change])
     skirt = float(np.median([_skirt(t, signals.values[used, k], f) for k in columns]))
-    middle = [float(np.median(x)) for x in (spreads, kurtoses, coherences, slopes, changes)]
-    spread, kurtosis, coherence, slope, change = middle
+    spread, kurtosis, coherence, slope, change = np.median(seen, axis=0).tolist()
     disturbed = _disturbed(signals, found)
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
     figures = Evidence("not known", damping, spread, kurtosis, coherence, skirt, periods, disturbed, ())
@@ -89,15 +86,12 @@ def _judged(seen: Evidence, change: float, found: SpectralLine) -> tuple[Oscilla
     harmonics = ", ".join(f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items())
     sharp = seen.envelope_spread <= _CLEAN or seen.skirt <= _SKIRT or bool(harmonics)
     steady = seen.envelope_spread < _STEADY and seen.kurtosis < _SINE and seen.coherence > _COHERENT
-    figures = (
-        f"envelope ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f}, phase coherence "
-        f"{seen.coherence:.2f}"
-    )
+    figures = (f"envelope ± {100 * seen.envelope_spread:.0f} %, kurtosis {seen.kurtosis:.2f}, phase coherence "
+               f"{seen.coherence:.2f}")  # fmt: skip
     if abs(change) > _CHANGE and seen.coherence > 0.8 and not harmonics:
         way = "decays" if change < 0 else "grows"
-        return "mode", [
-            f"its amplitude {way}, by {100 * abs(change):.0f} % over {seen.periods:.0f} periods ({figures})"
-        ]
+        trend = f"its amplitude {way}, by {100 * abs(change):.0f} % over {seen.periods:.0f} periods ({figures})"
+        return "mode", [trend]
     if steady and seen.disturbed and not harmonics:
         after = "a mode without damping would ring alike after the disturbance with which it begins"
         return "not known", [f"it is steady ({figures}), but {after}"]
@@ -188,17 +182,14 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
         if models is not None:
             own = own_models(models, measured, one, others)
             said = [own, *said] if own.applies else [*said, own]
-            if own.place is not None and evidence.kind == "not known":
+            if own.place not in {None, *models.loads} and evidence.kind == "not known":
                 evidence = replace(evidence, kind="forced", reasons=(own.reason,))
         drives, reason = _verdict(evidence, said)
         reason += f"; {OWN_MODEL}: {said[-1].reason}" if said[-1].method == OWN_MODEL else ""
         if drives is not None and said[0].method != OWN_MODEL and not felt_beyond(measured, one, others, drives):
-            drives, reason = (
-                None,
-                f"no other bus moves with {drives}: its measuring may err, or nothing else is in view",
-            )
-        sole = said[0].alone and drives is not None
-        if drives is not None and not sole:
+            reason = f"no other bus moves with {drives}: its measuring may err, or nothing else is in view"
+            drives = None
+        if not (sole := said[0].alone and drives is not None) and drives is not None:
             reason += f"; whether {drives} does so alone is not known"
         advice = _advice(measured, evidence, drives, sole=sole)
         answers.append(Located(one, evidence, tuple(said), drives, drives if sole else None, reason, advice))
@@ -208,9 +199,8 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
 def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, str]:
     """What drives it, where the methods agree or one is known not to apply."""
     if evidence.kind != "forced":
-        what = (
-            "a mode of the system has no source" if evidence.kind == "mode" else "it is not known whether it is forced"
-        )
+        known = "a mode of the system has no source"
+        what = known if evidence.kind == "mode" else "it is not known whether it is forced"
         return None, f"{what}: {evidence.reasons[0]}"
     if said[0].method == OWN_MODEL:
         others = "; ".join(f"{o.method}: {o.reason}" for o in said[1:] if o.applies and o.place != said[0].place)
@@ -236,11 +226,6 @@ def _advice(measured: Measurements, evidence: Evidence, drives: str | None, *, s
         return "look at the places that lead the methods' rankings; a longer record, or more of the grid, may decide"
     if any(p.name == drives and p.kind == "branch" for p in measured.places):
         return f"measure beyond {drives}: it comes from there"
-    held = f"hold the references of {drives}, or switch its controllers to manual"
-    return (
-        f"{held}: the oscillation has to end"
-        if sole
-        else (
-            f"{held}: if it does not end, something else drives it as well, which the units' models can show (--case)"
-        )
-    )
+    more = "if it does not end, something else drives it as well, which the units' models can show (--case)"
+    end = "the oscillation has to end" if sole else more
+    return f"hold the references of {drives}, or switch its controllers to manual: {end}"

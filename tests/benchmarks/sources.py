@@ -1,16 +1,22 @@
 """Whether `gfor signal source` finds the unit that was forced: each reference of each unit, away from modes and at one.
 
-    python -m tests.benchmarks.sources             # the tables, some minutes
-    python -m tests.benchmarks.sources --models    # the linear models of tests/oscillations/models
+    python -m tests.benchmarks.sources --case ieee39      # what is named, and what each method says
+    python -m tests.benchmarks.sources --case ieee118 --part 2/4   # every fourth try, from the second on
+    python -m tests.benchmarks.sources --pairs 60         # two references at once, at one frequency
+    python -m tests.benchmarks.sources --noise 300        # noise of loads alone: what is named is named wrongly
+    python -m tests.benchmarks.sources --models           # the linear models of tests/oscillations/models
 
 Records are 60 s at 30 samples a second from the case's linear model, with noise of loads and of measuring. With every
-second bus in view, units elsewhere are not seen at all.
+second bus in view, units elsewhere are not seen at all. Each is judged with the units' own models and without.
 """
 
 import argparse
 from collections import Counter
 
+import numpy as np
+
 from orchestrator.oscillations import location
+from orchestrator.oscillations.models import OWN_MODEL
 from orchestrator.oscillations.verdict import locate
 from tests.support.forced_records import make_model, model, record, save, sine, times_of, unit_models_of
 
@@ -19,68 +25,90 @@ CASES = {"two_area": (0.3, 0.5817, 0.9), "ieee39": (0.4, 0.722, 1.25), "ieee118"
 
 SMALL = ("two_area", "ieee39")  # whose models are kept; that of ieee118 is made first: --models --case ieee118
 AMPLITUDE = 0.02
-NOISE = {"without noise": (0.0, 0.0), "with noise": (5e-4, 5e-5)}
+LOADS, MEASURING = 5e-4, 5e-5
+NO_CASE = "no case"
 METHODS = (location.DEF, location.DYNAMIC_MODE, location.QV_PHASE)
+TIMES = times_of(60.0)
 
 
-def tried(case, noise, half, own, every=1):
-    """One answer for each reference and frequency: who was forced, how, and what was said."""
-    times, system = times_of(60.0), model(case)
+def answers(case, forced, frequency, seed, hidden=(), loads=LOADS):
+    """What is found near a frequency with the units' own models, and without."""
+    inputs = {reference: sine(TIMES, frequency, AMPLITUDE) for reference in forced}
+    measured = record(case, inputs, times=TIMES, loads=loads, measuring=MEASURING, seed=seed, without=hidden)
+    for judge, models in ((OWN_MODEL, unit_models_of(model(case))), (NO_CASE, None)):
+        found = locate(measured, models)
+        near = next((x for x in found if abs(x.found.frequency - frequency) < 0.01), None)
+        yield judge, near if forced else found
+
+
+def named(name, units):
+    """Whether it is one of the units, or what stands at the bus of one, with "or" between."""
+    return "none" if name is None else "right" if set(units) & set(name.split(" or ")) else "wrong"
+
+
+def forcings(case, half, part):
+    """Counts of what was named, by how was forced and whether its bus is in view."""
+    system, counts = model(case), Counter()
     hidden = sorted(set(system.buses))[1::2] if half else ()
-    for number, reference in enumerate(system.references[::every]):
+    tries = [(k, r, f) for k, r in enumerate(system.references) for f in CASES[case]]
+    for number, reference, frequency in tries[part[0] - 1 :: part[1]]:
         unit = reference.partition(".")[0]
-        for frequency in CASES[case]:
-            measured = record(case, {reference: sine(times, frequency, AMPLITUDE)}, times=times, loads=noise[0],
-                              measuring=noise[1], seed=number, without=hidden)  # fmt: skip
-            found = [
-                x
-                for x in locate(measured, unit_models_of(system) if own else None)
-                if abs(x.found.frequency - frequency) < 0.01
-            ]
-            seen = system.buses[system.units.index(unit)] not in hidden
-            yield unit, "P" if "P_ref" in reference else "V", seen, found[0] if found else None
+        kind = ("P" if "P_ref" in reference else "V", system.buses[system.units.index(unit)] not in hidden)
+        for judge, one in answers(case, [reference], frequency, number, hidden):
+            counts[kind, judge, "not found" if one is None else named(one.drives, [unit])] += 1
+            for o in one.opinions if one and judge == NO_CASE else ():
+                counts[kind, o.method, named(o.place, [unit])] += 1
+                counts[kind, o.method, "first"] += bool(o.ranking) and o.ranking[0][0] == unit
+    for kind in sorted({kind for kind, *_ in counts}, reverse=True):
+        for judge in (OWN_MODEL, NO_CASE, *METHODS):
+            cells = [counts[kind, judge, k] for k in ("right", "none", "not found", "wrong", "first")]
+            view = "all PMUs" if not half else "every second bus, " + ("seen" if kind[1] else "not seen")
+            print("|", " | ".join(map(str, (case, view, kind[0], judge, *cells))), "|", flush=True)
 
 
-def verdict(unit, one):
-    if one is None:
-        return "not found"
-    if one.drives is None:
-        return "not known"
-    return "right" if unit in one.drives.split(" or ") else "wrong"
+def pairs(case, count):
+    """Two units at once: a source, which drives alone, would be wrong, and so is a third unit."""
+    system, rng, counts = model(case), np.random.default_rng(7), Counter()
+    for number in range(count):
+        one, other = rng.choice(system.references, 2, replace=False)
+        units = {str(one).partition(".")[0], str(other).partition(".")[0]}
+        if len(units) == 1:
+            continue
+        frequency = CASES[case][number % 3]
+        for judge, x in answers(case, [one, other], frequency, number):
+            counts[judge, "drives", named(x and x.drives, units)] += 1
+            counts[judge, "source", "none" if x is None or x.source is None else "one of two"] += 1
+            counts[judge, "both named in the reason"] += x is not None and all(u in x.reason for u in units)
+    print(case, dict(counts), flush=True)
 
 
-def first(unit, one, method):
-    """Whether the method puts the unit first, whether it applies or not."""
-    ranking = next(o.ranking for o in one.opinions if o.method == method)
-    return ranking[0][0] == unit
+def noise(case, count):
+    kinds = Counter()
+    for seed in range(count):
+        for judge, found in answers(case, (), 0, seed + 5000, loads=(5e-4, 2e-3, 5e-3)[seed % 3]):
+            kinds.update((judge, x.evidence.kind, x.drives) for x in found)
+    print(case, count, dict(kinds), flush=True)
 
 
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--models", action="store_true")
-    parser.add_argument("--own", dest="models_known", action="store_true", help="with each unit's own model")
     parser.add_argument("--case", choices=[*CASES], action="append")
-    parser.add_argument("--every", type=int, default=1, help="only every so many references")
+    parser.add_argument("--part", default="1/1", help="which of how many parts of all tries")
+    parser.add_argument("--pairs", type=int)
+    parser.add_argument("--noise", type=int)
     options = parser.parse_args()
-    if options.models:
-        for case in options.case or SMALL:
-            save(make_model(case, "gfor", {} if case in SMALL else {"models": "phasor"}), case)
-        return
-    print("| Case | Record | Forced | Tries | Right | Not known | Not found | Wrong | " + " | ".join(METHODS) + " |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
+    if not (options.models or options.pairs or options.noise):
+        print("| Case | View | Forced | Judge | Right | None named | Not found | Wrong | Ranks it first |")
+        print("|---|---|---|---|---|---|---|---|---|")
     for case in options.case or SMALL:
-        for half in (False, True):
-            for label, noise in NOISE.items():
-                answers = list(tried(case, noise, half, options.models_known, options.every))
-                for how in ("P", "V"):
-                    for in_view in (True, False) if half else (True,):
-                        chosen = [(u, one) for u, h, seen, one in answers if h == how and seen == in_view]
-                        counts = Counter(verdict(u, one) for u, one in chosen)
-                        ranks = [sum(one is not None and first(u, one, m) for u, one in chosen) for m in METHODS]
-                        where = "" if not half else ", every second bus: " + ("seen" if in_view else "not seen")
-                        cells = [counts[k] for k in ("right", "not known", "not found", "wrong")]
-                        row = [case, label + where, how, len(chosen), *cells, *ranks]
-                        print("| " + " | ".join(map(str, row)) + " |", flush=True)
+        if options.models:
+            save(make_model(case, "gfor", {} if case in SMALL else {"models": "phasor"}), case)
+        elif options.pairs or options.noise:
+            (pairs if options.pairs else noise)(case, options.pairs or options.noise)
+        else:
+            for half in (False, True):
+                forcings(case, half, [int(x) for x in options.part.split("/")])
 
 
 if __name__ == "__main__":

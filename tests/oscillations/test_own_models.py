@@ -12,7 +12,7 @@ from orchestrator.oscillations.reading import measurements_of
 from orchestrator.oscillations.verdict import locate
 from tests.oscillations.test_planted import TIMES, at, late, turned
 from tests.oscillations.test_reading import csv
-from tests.support.forced_records import model, record, sine, unit_models_of
+from tests.support.forced_records import model, record, sine, times_of, unit_models_of
 
 NOISE = {"loads": 5e-4, "measuring": 5e-5}
 
@@ -99,6 +99,22 @@ def test_a_machine_at_another_operating_point_is_not_judged_by_its_model():
     own = next(o for o in found.opinions if o.method == OWN_MODEL)
     assert not own.applies
     assert (found.drives, found.source) == ("sg1", None)  # the other methods agree
+
+
+def test_a_swing_that_only_the_machine_itself_shows_is_found_in_the_noise_of_loads():
+    """In the mean of all signals, and in the voltages, it drowns."""
+    inputs = {"sg38.governor.delta_P_ref": sine(TIMES, 0.4, 0.006)}
+    measured = record("ieee39", inputs, times=TIMES, loads=2e-3, measuring=5e-5)
+    found = at(locate(measured, unit_models_of(model("ieee39"))), 0.4)
+    assert found.drives == "sg38"
+    assert found.found.clear < 4
+    assert "the rest being noise" in found.reason
+
+
+def test_noise_of_a_load_that_explains_the_voltages_forces_nothing():
+    measured = record("two_area", {}, times=times_of(60.0), loads=5e-3, measuring=5e-5, seed=5062)
+    found = locate(measured, unit_models_of(model("two_area")))
+    assert all(x.evidence.kind != "forced" and x.drives is None for x in found)
 
 
 def test_noise_alone_has_no_source():
