@@ -112,6 +112,7 @@ class Case(CaseDefinition):
             questions += [q for q in preparer.draft.found.questions if q not in questions]
         if not problems and self.numbered and mentions.unmatched(self.table, named, self.place):
             problems += self._mentions
+        problems += [] if problems else self._switched_on(scenarios or [*self.scenarios], parameters)
         if problems:  # unusual data may be the reason of the failure
             kind = problems[0].kind  # a question besides is of no kind of its own
             asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
@@ -122,7 +123,32 @@ class Case(CaseDefinition):
         beside = partial(self._beside, overrides, step_size, parameters)
         ready = [p for p in prepared if p is not None]
         idle = idle_values.idle_everywhere([p.idle for p in ready])
-        return [replace(p, beside=beside, questions=(*p.questions, *idle)) for p in ready]
+        given = [file.values for file in parameters if not file.text] + [overrides or {}]
+        changed = [file.path.name for file in parameters if file.text]
+        changed += [f"{key} = {value}" for values in given for key, value in values.items()]
+        changed[_NAMED:] = [f"{len(changed) - _NAMED} more"] if len(changed) > _NAMED else []
+        words = ", ".join(changed)
+        return [replace(p, beside=beside, questions=(*p.questions, *idle), changed=words) for p in ready]
+
+    def _switched_on(self, scenarios: Sequence[str], parameters: Sequence[ParameterFile]) -> list[Problem]:
+        """Controllers that a file switches on in one of several scenarios, where the scenario has it off."""
+        problems = []
+        for file in parameters if len(scenarios) > 1 else ():
+            for key in (key for key, value in file.values.items() if value is True and key.endswith(".enabled")):
+                pattern, _, variable = key.partition(".")
+                on = {
+                    scenario: bool(plan.value(variable))
+                    for scenario in scenarios
+                    for name, plan in self.components_of(scenario).items()
+                    if fnmatchcase(name, pattern) and variable in plan.description.variables
+                }
+                if len(on) > 1 and (off := [scenario for scenario, is_on in on.items() if not is_on]):
+                    text = (
+                        f"it would switch this on in {', '.join(off)} too, where it is off; a file of values is for "
+                        f"the scenario that it was made for: choose one of {', '.join(on)}"
+                    )
+                    problems.append(Problem(file.place(key), text))
+        return problems
 
     def _beside(
         self, overrides: Mapping[str, Value] | None, step_size: float | None, parameters: Sequence[ParameterFile],
@@ -215,6 +241,7 @@ class Case(CaseDefinition):
         return prepare.Preparer(self, name, dict(overrides or {}), parameters)
 
 
+_NAMED = 2  # values set that a title names; the others are counted
 _FED = 1e-6  # power of a unit from which its loss is told [pu]
 
 

@@ -30,6 +30,7 @@ class Results:
     linear: dict[str, xr.Dataset]
     # how and where the study ended before its last scenario, as in ``summary.json``; None where it came to its end
     ended_early: dict[str, Any] | None = None
+    beside: Sequence[str] = ()  # what devices bring, as `gfor modes` says it
 
 
 def read_results(folder: Path) -> Results:
@@ -45,6 +46,7 @@ def read_results(folder: Path) -> Results:
             folder, case, scenarios, _rows(folder / "modes.csv"), _rows(folder / "participation.csv"),
             _rows(folder / "step_size.csv"), dict(_datasets(folder, names, "trajectory.nc")),
             dict(_datasets(folder, names, "linear.nc")), ended_early=content.get("ended_early"),
+            beside=content.get("beside", []),
         )  # fmt: skip
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder}: a result file cannot be read: {error}; run the study again") from error
