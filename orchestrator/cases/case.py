@@ -26,7 +26,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
 from orchestrator.cases.values import TWICE, flatten, given_twice
-from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
+from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem, few
 from orchestrator.late import Late
 from orchestrator.toml_files import Table, fault_of, read_toml
 
@@ -126,29 +126,20 @@ class Case(CaseDefinition):
         given = [file.values for file in parameters if not file.text] + [overrides or {}]
         changed = [file.path.name for file in parameters if file.text]
         changed += [f"{key} = {value}" for values in given for key, value in values.items()]
-        changed[_NAMED:] = [f"{len(changed) - _NAMED} more"] if len(changed) > _NAMED else []
-        words = ", ".join(changed)
-        return [replace(p, beside=beside, questions=(*p.questions, *idle), changed=words) for p in ready]
+        return [replace(p, beside=beside, questions=(*p.questions, *idle), changed=few(changed, _NAMED)) for p in ready]
 
     def _switched_on(self, scenarios: Sequence[str], parameters: Sequence[ParameterFile]) -> list[Problem]:
         """Controllers that a file switches on in one of several scenarios, where the scenario has it off."""
-        problems = []
+        found = []
         for file in parameters if len(scenarios) > 1 else ():
             for key in (key for key, value in file.values.items() if value is True and key.endswith(".enabled")):
                 pattern, _, variable = key.partition(".")
-                on = {
-                    scenario: bool(plan.value(variable))
-                    for scenario in scenarios
-                    for name, plan in self.components_of(scenario).items()
-                    if fnmatchcase(name, pattern) and variable in plan.description.variables
-                }
+                each = [(s, self.components_of(s).items()) for s in scenarios]
+                on = {s: p.value(variable) for s, plans in each for name, p in plans if fnmatchcase(name, pattern)}
                 if len(on) > 1 and (off := [scenario for scenario, is_on in on.items() if not is_on]):
-                    text = (
-                        f"it would switch this on in {', '.join(off)} too, where it is off; a file of values is for "
-                        f"the scenario that it was made for: choose one of {', '.join(on)}"
-                    )
-                    problems.append(Problem(file.place(key), text))
-        return problems
+                    text = f"it would switch this on in {', '.join(off)} too, where it is off: choose one scenario"
+                    found.append(Problem(file.place(key), f"{text} of {', '.join(on)}"))
+        return found
 
     def _beside(
         self, overrides: Mapping[str, Value] | None, step_size: float | None, parameters: Sequence[ParameterFile],

@@ -62,8 +62,7 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
     ]
     told += [f"which mode is {name!r} is not known" for name in result.unnamed]
     remark = _with_misfits(result, "; ".join(told))
-    prepared = result.prepared
-    title = f"{prepared.title}, with {prepared.changed}" if prepared.changed else prepared.title
+    title = ", with ".join(filter(None, (result.prepared.title, result.prepared.changed)))
     return ScenarioAnswer(title, verdict.stable, verdict.verdict, mode, remark)
 
 

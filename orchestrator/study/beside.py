@@ -11,7 +11,6 @@ from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.study.mode_identity import MOST_STATES, damping_gains
 from orchestrator.study.modes import ModesResult, compute_modes
 
-_SAME_DAMPING = 0.005  # Two dampings that differ by less are told alike [%]
 _SAME_VOLTAGE = 1e-4  # between two power flows that are one operating point [pu]
 
 
@@ -40,7 +39,7 @@ def _compared(result: ModesResult, other: ModesResult, before: Mode) -> str:
     except CosimError as error:
         points = least - before.damping_percent
         return f"{title} at least {points:+.2f} points (least damped: {least:.2f} %), as {error}"
-    weaker = f", and the least damped now {least:.2f} %" if least < damping - _SAME_DAMPING else ""
+    weaker = f", and the least damped now {least:.2f} %" if round(least, 2) < round(damping, 2) else ""
     return f"{title} {damping - before.damping_percent:+.2f} points ({damping:.2f} %{weaker})"
 
 
@@ -53,8 +52,8 @@ def _followed(result: ModesResult, other: ModesResult, before: Mode) -> float:
         rest, seen = prepared.beside(prepared.name, False, gains), result.hidden
         if rest is not None:
             start = compute_modes(rest, seen.frequency_range if seen else ELECTROMECHANICAL_HZ)
-    links = match(_set(other), _set(start))
-    here = next((start.modes[link.target] for link in links if other.modes[link.source] is before), None)
+    one, two = (ModeSet.of(r.modes, tuple(r.model.names)) for r in (other, start))
+    here = next((start.modes[link.target] for link in match(one, two) if other.modes[link.source] is before), None)
     way = continuation.between(start.model, result.model)
     if here is None or way is None:
         raise AnalysisError("no mode is clearly the same")
@@ -63,7 +62,3 @@ def _followed(result: ModesResult, other: ModesResult, before: Mode) -> float:
         return damping_percent(continuation.follow_along(pair, way, 0.0, 1.0, continuation.CAREFUL).eigenvalue)
     except continuation.ModesMeetError as error:
         raise AnalysisError(f"the mode meets another one at {error.beyond:.0%} of the controllers' gains") from error
-
-
-def _set(result: ModesResult) -> ModeSet:
-    return ModeSet.of(result.modes, tuple(result.model.names))

@@ -77,8 +77,7 @@ def chapters_of(place: Path) -> list[Chapter]:
 def of_run(
     folder: Path, scenarios: Sequence[Content], content: str = "", kind: str = "", beside: Sequence[str] = ()
 ) -> Chapter:
-    """Of a run's summary, or the same of `gfor modes`; ``kind``: of the models, such as phasor; ``beside``: what
-    devices bring."""
+    """Of a run's summary, or the same of `gfor modes`; ``kind``: of the models; ``beside``: what devices bring."""
     said, open_, sure = [], [], []
     for s in scenarios:
         answer: Content = s.get("answer") or {}

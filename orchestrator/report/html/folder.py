@@ -53,11 +53,8 @@ def read_results(folder: Path) -> Results:
 
 
 def sweeps_of(place: Path) -> list[xr.Dataset]:
-    return [_load(path) for path in _files(place, "sweep.nc")]
-
-
-def _files(place: Path, pattern: str) -> list[Path]:
-    return [place] if place.is_file() and place.match(pattern) else sorted(place.glob(pattern))
+    own = place.is_file() and place.match("sweep.nc")
+    return [_load(path) for path in ([place] if own else sorted(place.glob("sweep.nc")))]
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
