@@ -1,7 +1,7 @@
 """The errors a user can meet. Each message says what failed, where, the value seen, the rule and the remedy."""
 
 import copyreg
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -12,6 +12,13 @@ NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
 INTERRUPTED = 130  # exit code after Ctrl-C
 
 TERMINATED = 143  # exit code after SIGTERM
+
+
+def few(texts: Iterable[str], most: int, between: str = ", ") -> str:
+    """The first of some texts; the others are counted."""
+    texts = list(texts)
+    more = f"{between.strip(', ')} and {len(texts) - most} more" if len(texts) > most else ""
+    return between.join(texts[:most]) + more
 
 
 class ErrorKind(StrEnum):

@@ -2,6 +2,7 @@
 
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.coupling.master import Master
+from orchestrator.errors import few
 
 _SHOWN = 3
 
@@ -17,11 +18,8 @@ def standing_apart(master: Master, model: LinearModel, zeros: int) -> list[str]:
     names = [name for name in model.apart if _unit(master, name) != "s"]
     if not names:
         return []
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return [
-        f"states that nothing moves and that move nothing, as of a controller that is off: {', '.join(names[:_SHOWN])}"
-        f"{more}; their zeros are not counted"
-    ]
+    text = f"states that nothing moves and that move nothing, as of a controller that is off: {few(names, _SHOWN)}"
+    return [f"{text}; their zeros are not counted"]
 
 
 def _unit(master: Master, name: str) -> str:

@@ -96,7 +96,10 @@ def follow_along(
     while here != end:
         there = end if abs(end - here) <= abs(stride) * (1 + 1e-12) else here + stride
         model = model_at(there)
-        found = _recognise(pair, [_of(p, model, common) for p in pairs_near(model, pair.eigenvalue)], strides)
+        states = [model.names.index(name) for name in common]
+        found = _recognise(
+            pair, [p.within(states) if states else p for p in pairs_near(model, pair.eigenvalue)], strides
+        )
         if found is not None:
             here, pair, stride = there, found, 2 * stride
         elif abs(stride) > shortest:
@@ -136,10 +139,6 @@ def _recognise(pair: Eigenpair, candidates: Sequence[Eigenpair], strides: Stride
         return None
     beside = max([alike[k] for k in order[1:]] + [alike[order[0]] - 1])  # above 1 it is half of a double eigenvalue
     return candidates[order[0]] if beside <= strides.rival else None
-
-
-def _of(pair: Eigenpair, model: LinearModel, common: Sequence[str]) -> Eigenpair:
-    return pair.within([model.names.index(name) for name in common]) if common else pair
 
 
 def _pair(eigenvalue: complex, left: Vector, right: Vector) -> Eigenpair:

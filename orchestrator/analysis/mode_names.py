@@ -87,7 +87,9 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
             reasons[name] = _taken(name, modes[best], names[owner])
             continue
         fits[name] = (modes[k], measures[name])
-        free = [j for j in range(len(modes)) if j != k and j not in column.values() and _swings_as(modes[j], modes[k])]
+        resonant = modes[k].damping_ratio < NO_RESONANCE  # such a one is not taken for one without resonance
+        alike = [not resonant or mode.damping_ratio < NO_RESONANCE for mode in modes]
+        free = [j for j in range(len(modes)) if j != k and j not in column.values() and alike[j]]
         rival = max(free, key=lambda j: fit[row, j], default=None)
         if np.delete(fit[row], k).max(initial=0.0) >= CONTESTED * fit[row, k]:
             contested.append(name)
@@ -100,11 +102,6 @@ def name_modes(modes: Sequence[Mode], measures: Mapping[str, Measure]) -> Naming
             continue
         named[name] = modes[k]
     return Naming(named, reasons, tuple(contested), fits)
-
-
-def _swings_as(rival: Mode, mode: Mode) -> bool:
-    """Whether a mode can be taken for the other: one without resonance for none that has it."""
-    return bool(rival.damping_ratio < NO_RESONANCE or mode.damping_ratio >= NO_RESONANCE)
 
 
 def _assigned(fit: np.ndarray) -> dict[int, int]:

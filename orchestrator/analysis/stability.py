@@ -26,6 +26,7 @@ from orchestrator.analysis.modes import (
     make_mode,
     oscillations,
 )
+from orchestrator.errors import few
 
 WHOLE = 4000
 """Up to this number of states, all eigenvalues are computed; in larger systems only growing ones are searched for."""
@@ -72,10 +73,9 @@ class Hidden:
         if not self.electromechanical:
             return text
         shown = [f"{z.imag / (2 * np.pi):.4g} Hz, {damping_percent(z):.2f} %" for z in self.electromechanical]
-        more = f" and {len(shown) - _SWINGS_SHOWN} more" if len(shown) > _SWINGS_SHOWN else ""
         highest = max(z.imag for z in self.electromechanical) / (2 * np.pi)
         wide = f"{min(low, self._lowest_swing):.2g}:{max(high, np.ceil(10 * highest) / 10):g}"
-        text += f"; electromechanical: {'; '.join(shown[:_SWINGS_SHOWN])}{more}"
+        text += f"; electromechanical: {few(shown, _SWINGS_SHOWN, '; ')}"
         return f"{text}: show them by --range {wide}" if remedy else text
 
     def as_json(self) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.parameter_files import ParameterFile, read_parameter_file
 from orchestrator.cases.schema import CaseTable, ComponentTable, Value
 from orchestrator.cases.values import TWICE, flatten, given_twice
-from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem
+from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, InputError, Problem, few
 from orchestrator.late import Late
 from orchestrator.toml_files import Table, fault_of, read_toml
 
@@ -112,6 +112,7 @@ class Case(CaseDefinition):
             questions += [q for q in preparer.draft.found.questions if q not in questions]
         if not problems and self.numbered and mentions.unmatched(self.table, named, self.place):
             problems += self._mentions
+        problems += [] if problems else self._switched_on(scenarios or [*self.scenarios], parameters)
         if problems:  # unusual data may be the reason of the failure
             kind = problems[0].kind  # a question besides is of no kind of its own
             asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
@@ -122,7 +123,23 @@ class Case(CaseDefinition):
         beside = partial(self._beside, overrides, step_size, parameters)
         ready = [p for p in prepared if p is not None]
         idle = idle_values.idle_everywhere([p.idle for p in ready])
-        return [replace(p, beside=beside, questions=(*p.questions, *idle)) for p in ready]
+        given = [file.values for file in parameters if not file.text] + [overrides or {}]
+        changed = [file.path.name for file in parameters if file.text]
+        changed += [f"{key} = {value}" for values in given for key, value in values.items()]
+        return [replace(p, beside=beside, questions=(*p.questions, *idle), changed=few(changed, _NAMED)) for p in ready]
+
+    def _switched_on(self, scenarios: Sequence[str], parameters: Sequence[ParameterFile]) -> list[Problem]:
+        """Controllers that a file switches on in one of several scenarios, where the scenario has it off."""
+        found = []
+        for file in parameters if len(scenarios) > 1 else ():
+            for key in (key for key, value in file.values.items() if value is True and key.endswith(".enabled")):
+                pattern, _, variable = key.partition(".")
+                each = [(s, self.components_of(s).items()) for s in scenarios]
+                on = {s: p.value(variable) for s, plans in each for name, p in plans if fnmatchcase(name, pattern)}
+                if len(on) > 1 and (off := [scenario for scenario, is_on in on.items() if not is_on]):
+                    text = f"it would switch this on in {', '.join(off)} too, where it is off: choose one scenario"
+                    found.append(Problem(file.place(key), f"{text} of {', '.join(on)}"))
+        return found
 
     def _beside(
         self, overrides: Mapping[str, Value] | None, step_size: float | None, parameters: Sequence[ParameterFile],
@@ -215,6 +232,7 @@ class Case(CaseDefinition):
         return prepare.Preparer(self, name, dict(overrides or {}), parameters)
 
 
+_NAMED = 2  # values set that a title names; the others are counted
 _FED = 1e-6  # power of a unit from which its loss is told [pu]
 
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.coupling.system import ComponentPlan
 
 SOURCES = ("raw", "matpower", "pandapower", "cgmes")  # keys of ``[network]`` that name another program's data
 _NAMES = {zip_: name for name, zip_ in LAWS.items()}
@@ -52,7 +51,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     at_slack = [name for name in feeding if units[name] == units.get(wanted, wanted)]
     machines = [n for n in feeding if plans[n].kind == "machine"]
     magnitudes = [abs(flow.voltages[bus]) for bus in network.buses]
-    loads = [(load, _power(load, grid)) for load in network.loads]
+    loads = [(x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads]
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
     return Facts(
         (*sources, *dyr), rated_frequency(prepared), len(network.buses), len(machines), len(feeding) - len(machines),
@@ -71,10 +70,6 @@ def rated_frequency(prepared: PreparedScenario) -> float | None:
 
 def _counted(number: int, what: str) -> str:
     return f"{number} {what}" if number == 1 else f"{number} {what}{'es' if what.endswith('s') else 's'}"
-
-
-def _power(load: Load, grid: ComponentPlan) -> float:
-    return grid.number(f"{load.name}.scale") * grid.number(f"{load.name}.P")
 
 
 def _model(loads: list[Load]) -> str:

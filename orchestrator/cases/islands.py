@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from fmus.grid.network import Network
 from orchestrator.cases.draft import Draft
 from orchestrator.coupling.events import Event
-from orchestrator.errors import Problem
+from orchestrator.errors import Problem, few
 
 _SHOWN = 5  # buses that a question names; the others are counted
 
@@ -35,11 +35,10 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
         for part in _without_unit(draft.network, units, values):
             if frozenset(part) not in asked:
                 asked.add(frozenset(part))
-                more = f" and {len(part) - _SHOWN} more" if len(part) > _SHOWN else ""
                 draft.found.questions.append(
                     Problem(
                         where,
-                        f"from t = {time:g} s on no unit is connected to {', '.join(part[:_SHOWN])}{more}: nothing "
+                        f"from t = {time:g} s on no unit is connected to {few(part, _SHOWN)}: nothing "
                         "holds the voltage and the frequency of the loads there, and no verdict speaks of them; trip "
                         "these loads at the same time",
                     )

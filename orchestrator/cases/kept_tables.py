@@ -48,7 +48,7 @@ _CODE = "".join(file.read_text(encoding="utf-8") for file in _FILES)
 
 def kept_tables(name: str, content: bytes, make: Callable[[], SourceTables]) -> SourceTables:
     """The tables of a network as they are kept, or else as they are made, and kept for the next time."""
-    versions = _versions()
+    versions = {library: installed_version(library) for library in LIBRARIES}
     if not versions["pandapower"]:
         return make()
     parts = [name, hashlib.sha256(content).hexdigest(), versions, sys.platform, sys.version, _CODE]
@@ -66,10 +66,6 @@ def tables_beside(path: Path) -> SourceTables | None:
     """The tables that lie beside a case for the network of its name: built-in cases need no pandapower."""
     file = path.with_name(f"{path.name}.tables.json")
     return _from_json(json.loads(file.read_bytes())) if file.is_file() else None
-
-
-def _versions() -> dict[str, str]:
-    return {library: installed_version(library) for library in LIBRARIES}
 
 
 def _as_json(tables: SourceTables) -> dict[str, Any]:

@@ -17,8 +17,9 @@ from orchestrator.cases.csv_rows import number, rows_of
 from orchestrator.cases.names import close_names
 from orchestrator.cases.network_data import bus_name
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.cases.psse.records import read_records
 from orchestrator.cases.short_circuit import source_impedance
-from orchestrator.errors import InputError, Problem
+from orchestrator.errors import InputError, Problem, few
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.units import to_unit
 
@@ -129,7 +130,7 @@ def write_case(wanted: WantedCase) -> NewCase:
         largest = max(machines, key=machines.__getitem__)
         wanted = replace(wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz")
     base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
-    place = None if wanted.converter is None else _placed(wanted.converter, base)
+    place = None if wanted.converter is None else _placed(wanted.converter, base, _called(wanted.files))
     draft = _Text(wanted, sources, base, place, _switched(device))
     scenarios = _prepared(draft.text, wanted, [])
     questions = dict.fromkeys(q for prepared in scenarios for q in prepared.questions)
@@ -219,13 +220,23 @@ class _Place:
         return {f"{self.less}.P_0": f"{left:.6f}"} if self.less else {}
 
 
-def _placed(wanted: WantedConverter, base: PreparedScenario) -> _Place:
+def _called(files: Sequence[Path]) -> dict[str, list[str]]:
+    """The buses by the names that a RAW file gives them."""
+    found: dict[str, list[str]] = {}
+    for record in (
+        record for path in files if path.suffix.lower() == ".raw" for record in read_records(path).of("bus")
+    ):
+        found.setdefault(record.text(1, "").strip(), []).append(bus_name(str(record.whole(0, "the bus' number"))))
+    return found
+
+
+def _placed(wanted: WantedConverter, base: PreparedScenario, called: Mapping[str, Sequence[str]]) -> _Place:
     network, flow = base.network, base.power_flow
     if network is None or flow is None:
         raise InputError("the network has no power flow")
-    names = {wanted.bus, bus_name(wanted.bus), f"bus_{wanted.bus}"} & set(network.buses)
+    names = {wanted.bus, bus_name(wanted.bus), f"bus_{wanted.bus}", *called.get(wanted.bus, ())} & set(network.buses)
     if len(names) != 1:
-        hint = close_names(bus_name(wanted.bus), network.buses, f"there are: {', '.join(network.buses[:8])}")
+        hint = close_names(bus_name(wanted.bus), [*network.buses, *called], f"there are: {few(network.buses, 8)}")
         raise InputError(f"--converter: the network has no bus {wanted.bus!r}; {hint}")
     (bus,) = names
     plans = base.system.components
@@ -234,10 +245,12 @@ def _placed(wanted: WantedConverter, base: PreparedScenario) -> _Place:
     found = _Place(wanted, bus, round(abs(flow.voltages[bus]), 5), ", ".join(at_slack))
     if wanted.less is None:
         return found
+    if len(there := [unit for unit, place in units.items() if place in called.get(wanted.less, ())]) == 1:
+        wanted = replace(wanted, less=there[0])
     if wanted.less not in units:
         known = f"the network's units: {', '.join(units)}"
         raise InputError(f"--converter: there is no unit {wanted.less!r} to feed less; "
-                         f"{close_names(wanted.less, units, known)}")  # fmt: skip
+                         f"{close_names(str(wanted.less), units, known)}")  # fmt: skip
     rating = plans[wanted.less].number("S_n")
     power = flow.powers[wanted.less].real * rating
     if wanted.replaces:

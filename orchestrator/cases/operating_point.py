@@ -1,6 +1,6 @@
 """Operating point of a scenario: its power flow, and what is unusual about the solution."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.flow_units import note_contradictions, undecided_units
@@ -9,7 +9,7 @@ from orchestrator.cases.plausibility import question
 from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.cases.schema import UnitReconnectionTable
 from orchestrator.cases.start_values import is_connected, start_from_power_flow
-from orchestrator.errors import ErrorKind, InputError, Problem
+from orchestrator.errors import ErrorKind, InputError, Problem, few
 
 _USUAL_VOLTAGES = (0.8, 1.2)  # magnitudes [pu] of bus voltages that are not questioned
 _SHOWN = 5  # buses that a question names; the others are counted
@@ -85,10 +85,6 @@ def _reference(draft: Draft, units: Mapping[str, str], slack: str, grid: str) ->
     return units[max(left, key=lambda name: plans[name].number("S_n"))]
 
 
-def _first_few(texts: Sequence[str]) -> str:
-    return ", ".join(texts[:_SHOWN]) + (f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else "")
-
-
 def _voltage_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
     """Ask about voltages with which no network is run."""
     low, high = _USUAL_VOLTAGES
@@ -98,7 +94,7 @@ def _voltage_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
     return [
         Problem(
             draft.given.place("power_flow"),
-            f"the power flow gives voltages outside of {low:g} to {high:g} pu: {_first_few(unusual)}; check loads, "
+            f"the power flow gives voltages outside of {low:g} to {high:g} pu: {few(unusual, _SHOWN)}; check loads, "
             "shunts and stray_B there",
         )
     ]
@@ -115,10 +111,10 @@ def _limit_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
     where = draft.given.place("power_flow", *(["reactive_limits"] if kept is not None else []))
     found = []
     if flow.at_limits:
-        told = _first_few([excess.text(kept=True) for excess in flow.at_limits])
+        told = few([excess.text(kept=True) for excess in flow.at_limits], _SHOWN)
         found.append(Problem(where, f"limits of reactive power are reached: {told}"))
     if flow.beyond_limits and kept is not False:
-        told = _first_few([excess.text(kept=False) for excess in flow.beyond_limits])
+        told = few([excess.text(kept=False) for excess in flow.beyond_limits], _SHOWN)
         remedy = (
             "the slack bus keeps no limit; take another slack"
             if kept

@@ -17,7 +17,7 @@ from orchestrator.cases.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of, unit_of, value_of
 from orchestrator.coupling.schedule import SECOND_ORDER
 from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import Problem
+from orchestrator.errors import Problem, few
 from orchestrator.fmi.port import BoundDescription
 
 
@@ -214,7 +214,9 @@ def _check_rule(draft: Draft, name: str, plan: ComponentPlan, rule: Rule) -> Non
 
 def _check_frequencies(draft: Draft) -> None:
     """Check that coupled components have one rated frequency: frames of two frequencies turn against each other."""
-    rated = {name: f for name, plan in draft.system.components.items() if (f := _frequency(plan)) is not None}
+    fs = {n: p.description.port.f_n if isinstance(p.description, BoundDescription) else value_of(p, "f_n")
+          for n, p in draft.system.components.items()}  # fmt: skip
+    rated = {name: f for name, f in fs.items() if f is not None}
     for group in _coupled(draft):
         known = {name: f for name, f in rated.items() if name in group}
         if len(set(known.values())) < 2:
@@ -230,11 +232,6 @@ def _check_frequencies(draft: Draft) -> None:
                     f"frequency, because voltages and currents are exchanged in one frame: give both the same f_n "
                     f"(a whole [network] has a key 'frequency', a binding has rating.f_n)",
                 )
-
-
-def _frequency(plan: ComponentPlan) -> float | None:
-    """Rated frequency of a component. For a bound FMU the binding defines it, whatever parameters the FMU has."""
-    return plan.description.port.f_n if isinstance(plan.description, BoundDescription) else value_of(plan, "f_n")
 
 
 def _frequency_place(draft: Draft, name: str) -> str:
@@ -282,11 +279,7 @@ def _merged(doubts: list[UnusualValue]) -> list[Problem]:
 
 def _question(text: str, names: list[str]) -> str:
     components = [name.partition(".")[0] for name in names]
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     variable = names[0].partition(".")[2]
     answers = names if len(names) <= _SHOWN else [f"*.{variable}"]
     quoted = ", ".join(f'"{name}"' for name in answers)
-    return (
-        f"{', '.join(components[:_SHOWN])}{more}: {text}; if it is meant, say so at the top of the case: "
-        f"meant = [{quoted}]"
-    )
+    return f"{few(components, _SHOWN)}: {text}; if it is meant, say so at the top of the case: meant = [{quoted}]"

@@ -11,6 +11,7 @@ from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_ranges import COMPENSATION, LINE_B, LINE_RATIO, LINE_X, MOST_R_OVER_X, STRAY_B
 from orchestrator.cases.plausible_values import UnusualValue, outside, value_of
 from orchestrator.coupling.system import ComponentPlan
+from orchestrator.errors import few
 
 _SHOWN = 3  # equivalents that are named; lines beyond which one is compared with the others
 _UNLIKE = 8.0  # times from which on a line is unlike the others
@@ -37,10 +38,9 @@ def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualV
     for quantity, what in (("R", "resistance"), ("X", "reactance")):
         found = [line for line in network.lines if getattr(line, quantity) < 0]
         if found:
-            shown = ", ".join(f"{line.name!r} ({getattr(line, quantity):g} pu)" for line in found[:_SHOWN])
-            more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+            shown = few((f"{line.name!r} ({getattr(line, quantity):g} pu)" for line in found), _SHOWN)
             text = (
-                f"{len(found)} of {len(network.lines)} branches have a negative {what}: {shown}{more}; as equivalents "
+                f"{len(found)} of {len(network.lines)} branches have a negative {what}: {shown}; as equivalents "
                 "of a reduced network they are taken as admittances, which hold at rated frequency alone"
             )
             yield UnusualValue(f"{name}.{found[0].variable(quantity)}", draft.given.place("network"), text)

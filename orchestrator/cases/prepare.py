@@ -73,6 +73,7 @@ class PreparedScenario:
     given: Mapping[str, Value] = field(default_factory=dict, repr=False)
     # what came from outside of the file, and where that cannot act; see `idle_everywhere`.
     idle: Idle = field(default_factory=dict, repr=False)
+    changed: str = ""  # what parameter files and the caller set, in few words
     not_reached: tuple[float, ...] = ()  # times of events for which the run stops too early [s]
 
     @property

@@ -18,7 +18,7 @@ from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.start_values import is_connected
 from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 
 CONVENTION = (
     "initial three-phase short circuit from 1 pu (c = 1); machines as R_s + jX''d with their transformer, external "
@@ -133,7 +133,7 @@ class ShortCircuit:
     def known(self, bus: str) -> str:
         if bus in self.buses:
             return bus
-        hint = close_names(bus, self.buses, f"there are: {', '.join(self.buses[:8])}")
+        hint = close_names(bus, self.buses, f"there are: {few(self.buses, 8)}")
         raise InputError(f"the network has no bus {bus!r}; {hint}")
 
     def _admittances(self) -> np.ndarray:

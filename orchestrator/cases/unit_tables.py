@@ -20,7 +20,7 @@ from orchestrator.cases.psse.dyr_units import completed, missing_records, rows_o
 from orchestrator.cases.schema import ComponentTable, UnitsTable
 from orchestrator.cases.source_changes import Changes
 from orchestrator.cases.unit_row import UnitRow, checked
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 
 UNIT_KINDS = ("sg", "gfor")  # first parts of the names of a unit's generator and converter
 _LIMITS = ("q_min_mvar", "q_max_mvar")
@@ -51,7 +51,7 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     draft.reactive_limits |= {row.bus: (row.q_min_mvar, row.q_max_mvar) for row in rows}
     for row in rows:
         if draft.data is not None and draft.data.buses and row.bus not in draft.data.buses:
-            hint = close_names(row.bus, draft.data.buses, f"there are: {', '.join(draft.data.buses[:8])}")
+            hint = close_names(row.bus, draft.data.buses, f"there are: {few(draft.data.buses, 8)}")
             draft.note_network(
                 row.place or draft.given.place("units"),
                 f"the unit at bus {row.label}: the network has no bus {row.bus!r}; {hint}",
@@ -118,7 +118,9 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         unit = UnitRow(label, bus, **numbers, alpha=alpha, parameters=own, place=place_of(entry), parts=parts)  # type: ignore[arg-type]
         rows.append(checked(unit, place_of(entry)))
     _require_names(rows, path)
-    return [_with_limits_of_bus(row, [r for r in rows if r.bus == row.bus]) for row in rows]
+    at_bus = {row.bus: [r for r in rows if r.bus == row.bus] for row in rows}
+    reach = {bus: (sum(u.q_min_mvar for u in us), sum(u.q_max_mvar for u in us)) for bus, us in at_bus.items()}
+    return [replace(row, q_min_mvar=reach[row.bus][0], q_max_mvar=reach[row.bus][1]) for row in rows]
 
 
 def _name_in(entry: Row) -> str:
@@ -138,10 +140,6 @@ def _require_names(rows: Sequence[UnitRow], path: Path) -> None:
                 f"{path}: the bus of unit {row.label} has more than one row; give each row of this bus a name of its "
                 "own in the column 'unit', or merge the rows"
             )
-
-
-def _with_limits_of_bus(row: UnitRow, units: Sequence[UnitRow]) -> UnitRow:
-    return replace(row, q_min_mvar=sum(u.q_min_mvar for u in units), q_max_mvar=sum(u.q_max_mvar for u in units))
 
 
 def _known_rows(path: Path) -> list[Row]:

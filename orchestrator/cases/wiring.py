@@ -2,7 +2,7 @@
 
 from fmus.toolchain.catalogue import model_names
 from orchestrator.cases.draft import Draft
-from orchestrator.errors import InputError, Problem
+from orchestrator.errors import InputError, Problem, few
 
 _PHASOR_PORT = ("e_re", "e_im", "y_re", "y_im")  # what a device gives to a network of phasors
 
@@ -47,13 +47,13 @@ def _check_forms(draft: Draft, names: list[str]) -> None:
         others = [name for name, its in draft.found.misfits.items() if its == model]
         draft.note(
             _place_of_model(draft, others[0]),
-            f"{_all(others)}: {model!r} is an EMT model, and the network {draft.grid!r} is one of phasors "
+            f"{few(others, 1)}: {model!r} is an EMT model, and the network {draft.grid!r} is one of phasors "
             f"({draft.tables[draft.grid].model}), to which a device gives an emf behind an admittance; "
             f"{_remedy(model)}",
         )
     for model, others in phasors.items():
         text = (
-            f"{_all(others)}: {model!r} is a phasor model, and the network {draft.grid!r} is an EMT one "
+            f"{few(others, 1)}: {model!r} is a phasor model, and the network {draft.grid!r} is an EMT one "
             f"({draft.tables[draft.grid].model}): its current would follow the voltage at once; take "
             f"{model.removesuffix('_phasor')!r}, or model = 'phasor_grid' for the network and phasor models for all"
         )
@@ -75,10 +75,6 @@ def _place_of_model(draft: Draft, name: str) -> str:
     if origin is None:
         return draft.given.place("components", name, "model" if draft.tables[name].model else "fmu")
     return draft.given.place("units", origin.common.removesuffix("_parameters"))
-
-
-def _all(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
 
 
 def check_inputs(draft: Draft) -> None:

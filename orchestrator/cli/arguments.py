@@ -159,9 +159,7 @@ READERS: dict[str, Callable[[str], Any]] = {
 
 
 def add_executor_arguments(parser: argparse._ActionsContainer) -> None:
-    option(parser, "--workers", "N", "processes to compute in (default: one a core)", read=read_whole(1, 1000))
-    option(parser, "--scheduler", "ADDRESS", "compute on a Dask cluster, such as tcp://host:8786")
-    option(parser, "--tls", "DIR", "folder with ca.pem, cert.pem, key.pem, for --scheduler tls://…")
+    add_options(parser, "executor", workers=read_whole(1, 1000))
 
 
 def choose_executor(options: argparse.Namespace, imports: Sequence[str]) -> Executor:

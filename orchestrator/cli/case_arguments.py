@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 from orchestrator.api.scenario import Scenario, choose
-from orchestrator.asked import read_positive
 from orchestrator.black_box.frequency_response import METHODS, Excitation
 from orchestrator.cases.case import Case, load_case
 from orchestrator.cases.forcing import with_events
@@ -13,7 +12,7 @@ from orchestrator.cases.parameter_files import ParameterFile, read_parameter_fil
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.sharing import SharingRule
-from orchestrator.cli.arguments import add_options, asked_by, option, repeatable, seconds, switch
+from orchestrator.cli.arguments import add_options, asked_by, option, repeatable, seconds
 from orchestrator.cli.terminal import print_questions
 from orchestrator.coupling.schedule import SCHEDULES
 from orchestrator.errors import InputError
@@ -99,14 +98,9 @@ _DEFAULTS = Excitation()
 
 
 def add_excitation_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--method", choices=METHODS, default=_DEFAULTS.method, help="excitation (default: multisine)")
-    parser.add_argument("--amplitude", type=read_positive, default=_DEFAULTS.amplitude, metavar="A",
-                        help=f"largest deviation of the voltage [pu] ({_DEFAULTS.amplitude:g})")  # fmt: skip
-    parser.add_argument("--from-hz", type=read_positive, default=_DEFAULTS.lowest_hz, metavar="F",
-                        help=f"lowest frequency [Hz] ({_DEFAULTS.lowest_hz:g})")  # fmt: skip
-    parser.add_argument("--to-hz", type=read_positive, default=_DEFAULTS.highest_hz, metavar="F",
-                        help=f"highest frequency [Hz] ({_DEFAULTS.highest_hz:g})")  # fmt: skip
-    switch(parser, "--no-state", "never save or restore the FMU's state")
+    add_options(parser, "excitation", methods=METHODS, multisine=_DEFAULTS.method, **{
+        name: getattr(_DEFAULTS, name) for name in ("amplitude", "lowest_hz", "highest_hz")
+    })  # fmt: skip
 
 
 def excitation_given(options: argparse.Namespace) -> list[str]:

@@ -16,7 +16,7 @@ from orchestrator.cli.verdict import add_details_argument, add_verdict_argument,
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 from orchestrator.safe_files import made_folder
-from orchestrator.study import tables
+from orchestrator.study import beside, tables
 from orchestrator.study.all_modes import compute_all_modes
 from orchestrator.study.answers import of_modes
 from orchestrator.study.load_model_weight import load_model_weights
@@ -78,7 +78,7 @@ def _compute(
         written = write_modes(results, folder)
     weights = [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
     if options.json:
-        terminal.print_json(modes_json(results, weights))
+        terminal.print_json(modes_json(results, weights, [*beside.told(results)]))
         return exit_code(options, [r.stability for r in results])
     console = terminal.make_console()
     print_answers(console, [of_modes(r) for r in results], results)

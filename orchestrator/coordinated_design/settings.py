@@ -8,6 +8,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.coordinated_design.open_loops import PodPlace, Setting
+from orchestrator.errors import few
 from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, NO_COMPENSATION, lead_lag_turning
 
@@ -25,8 +26,7 @@ class PodGroup:
     @property
     def name(self) -> str:
         """For people: ``gfor*.pod_p``."""
-        shown = ", ".join(self.key[:3]) + (f" and {len(self.key) - 3} more" if len(self.key) > 3 else "")
-        return f"{shown}: {self.controller}"
+        return f"{few(self.key, 3)}: {self.controller}"
 
     @property
     def places(self) -> tuple[PodPlace, ...]:

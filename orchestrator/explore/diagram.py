@@ -6,7 +6,7 @@ import numpy as np
 
 from orchestrator.api.scenario import Scenario
 from orchestrator.cases.names import close_names
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 from orchestrator.report.html.network_map import HEIGHT, WIDTH, places
 
 
@@ -44,7 +44,7 @@ def diagram(scenario: Scenario) -> dict[str, Any] | None:
     if unknown := [bus for bus in given if bus not in network.buses]:
         raise InputError(
             f"{prepared.case.path}: [diagram] positions: there is no bus {unknown[0]!r}; "
-            + close_names(unknown[0], network.buses, f"there are: {', '.join(network.buses[:8])} …")
+            + close_names(unknown[0], network.buses, f"there are: {few(network.buses, 8)}")
         )
     at = [given.get(bus, tuple(xy)) for bus, xy in zip(network.buses, points.tolist(), strict=True)]
     return {

@@ -147,7 +147,12 @@ def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:
     groups = [*plan.vendors, *(g for g in dict.fromkeys(plan.groups.values()) if g not in plan.vendors)]
 
     def share_of(group: str) -> Column[JudgedMode]:
-        return Column(group, lambda judged: judged.groups.get(group, 0.0), _share, f"share.{group}")
+        return Column(
+            group,
+            lambda judged: judged.groups.get(group, 0.0),
+            lambda x: f"{x:.0%}" * (x >= _LEAST_SHARE),
+            f"share.{group}",
+        )
 
     return ColumnTable("As in the case", (
         *mode_columns(lambda judged: judged.mode),
@@ -156,10 +161,6 @@ def modes_table(judgement: JudgedInteractions) -> ColumnTable[JudgedMode]:
         Column("", lambda judged: ", ".join(judged.vendors), name="shared_by"),
         Column("Shared by", lambda judged: ", ".join(judged.vendors) if judged.is_interaction else ""),
     ), judgement.modes)  # fmt: skip
-
-
-def _share(share: float) -> str:
-    return f"{share:.0%}" if share >= _LEAST_SHARE else ""
 
 
 def _figures(of: Callable[[Row], JudgedSystem]) -> list[Column[Row]]:

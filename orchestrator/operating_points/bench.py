@@ -14,7 +14,7 @@ from orchestrator.closing import Closing
 from orchestrator.coupling.master import Master
 from orchestrator.coupling.step_awareness import other_step
 from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import ComponentError
+from orchestrator.errors import ComponentError, few
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.instance import is_ours
 from orchestrator.study.modes import running
@@ -94,8 +94,8 @@ class PointBench(Closing):
         assert self._master is not None
         whole = {name: self.linearized(name) for name in self._master.components}
         blocks = Blocks(self._master, known={n: without_references(c) for n, c in whole.items()}, without_step=True)
-        doubtful = [f"{name}: {', '.join(c.doubtful[:_SHOWN])}" for name, c in whole.items() if c.doubtful]
-        text = f"a limit is so close that the linear model is doubtful: {'; '.join(doubtful[:_SHOWN])}"
+        doubtful = [f"{name}: {few(c.doubtful, _SHOWN)}" for name, c in whole.items() if c.doubtful]
+        text = f"a limit is so close that the linear model is doubtful: {few(doubtful, _SHOWN, '; ')}"
         return PointModel(continuous(blocks), blocks, whole, (text,) if doubtful else ())
 
     def close(self) -> None:

@@ -10,7 +10,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import convert
 from orchestrator.coupling.system import ComponentPlan
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 from orchestrator.units import read_value
 
 IN_SERVICE, ACTIVE, REACTIVE = "in_service", "P_mw", "Q_mvar"
@@ -109,7 +109,7 @@ def _factor(column: str, text: str) -> float:
 
 def _service(column: str, name: str, elements: Elements, prepared: PreparedScenario) -> Reading:
     if name not in elements.names:
-        hint = close_names(name, elements.names, f"there are: {', '.join(elements.names[:8])} …")
+        hint = close_names(name, elements.names, f"there are: {few(elements.names, 8)}")
         raise InputError(f"there is no unit, line, load or shunt {name!r}; {hint}")
 
     def read(text: str) -> Setting:

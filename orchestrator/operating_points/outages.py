@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 from orchestrator.operating_points.columns import Elements
 
 INTACT = "intact"  # name of the network without an outage
@@ -98,7 +98,7 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
         load, power_there = weight[k]
         if load > _AUXILIARY * power_there:
             names = ", ".join(name for name in units if part[elements.units[name]] == k)
-            buses = _first([bus for bus in dead if part[bus] == k])
+            buses = few((bus for bus in dead if part[bus] == k), _SHOWN)
             return Remains(f"{buses} cut off, with {load:.4g} MW of load and the units {names}, which may go on alone")
     ties, joined = [], {k: k for k in set(part.values())}
     for name, one, other in branches:
@@ -107,7 +107,7 @@ def what_remains(prepared: PreparedScenario, elements: Elements, out: Sequence[s
             ties.append(name)
             joined = {k: a if at == b else at for k, at in joined.items()}
     if any(joined[part[bus]] != joined[main] for bus in dead):
-        return Remains(f"{_first(dead)} cut off by branches that the case or the point has open")
+        return Remains(f"{few(dead, _SHOWN)} cut off by branches that the case or the point has open")
     opened = set(out) - set(ties)
     return Remains(
         units=tuple(dict.fromkeys((*out_units, *(n for n in units if part[elements.units[n]] != main)))),
@@ -129,11 +129,6 @@ def _parts(buses: Sequence[str], ends: Sequence[Sequence[str]]) -> dict[str, int
     links = coo_array((np.ones(len(ends)), (starts, stops)), shape=(len(row), len(row)))
     _, part_of = connected_components(links, directed=False)
     return {bus: int(part_of[k]) for bus, k in row.items()}
-
-
-def _first(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return f"{', '.join(names[:_SHOWN])}{more}"
 
 
 def _closed(name: str, out: Sequence[str], values: Mapping[str, float | bool]) -> bool:

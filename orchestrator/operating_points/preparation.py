@@ -15,7 +15,7 @@ from orchestrator.cases.schema import Value
 from orchestrator.cases.service import without_units
 from orchestrator.cases.sharing import Dispatch, SharingRule, in_words, load_of, lost_load
 from orchestrator.coupling.system import System
-from orchestrator.errors import CosimError, ErrorKind, InputError, StartError
+from orchestrator.errors import CosimError, ErrorKind, InputError, StartError, few
 from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Item, Status
 from orchestrator.operating_points.outages import Remains, what_remains
@@ -74,7 +74,7 @@ class ItemPreparation:
             fed, drawn = _power_of(units, before), load_of(loads, valued.system.components[self.elements.grid])
             dispatch = Dispatch(self._sharing, before.power_flow.powers, fed - drawn)
         elif new := [bus for bus in remains.dead if bus not in without.dead]:
-            text = f"{', '.join(new[:_SHOWN])} cut off, with neither load nor unit"
+            text = f"{few(new, _SHOWN)} cut off, with neither load nor unit"
         values = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
         found = self._prepare(values, dispatch)
         if dispatch is not None:

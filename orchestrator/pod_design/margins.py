@@ -8,7 +8,6 @@ around the loop is L(s) = −K·Vᵀ·(sI − A_0)⁻¹·U, and its eigenvalues 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import astuple, dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -93,14 +92,13 @@ def _crossings(around: _Loop, grid: Vector, values: Vector) -> Iterator[tuple[fl
     """Frequencies [rad/s] at which an eigenvalue has the size 1, with the eigenvalue."""
     sizes = np.log(np.abs(values))
     for k in range(values.shape[1]):
-        size = partial(_log_size, around, k)
         for i in np.flatnonzero(np.sign(sizes[:-1, k]) != np.sign(sizes[1:, k])):
-            w = float(optimize.brentq(size, grid[i], grid[i + 1], rtol=1e-10))
+            w = float(
+                optimize.brentq(
+                    lambda w, k=k: math.log(abs(around.eigenvalues(w)[k])), grid[i], grid[i + 1], rtol=1e-10
+                )
+            )
             yield w, complex(around.eigenvalues(w)[k])
-
-
-def _log_size(around: _Loop, k: int, w: float) -> float:
-    return math.log(abs(around.eigenvalues(w)[k]))
 
 
 _STRIDE = 2**0.5

@@ -20,8 +20,10 @@ LABELS = {"pod_p": "POD-P", "pod_q": "POD-Q"}
 
 
 def sheet(d: PodDesign) -> Iterable[Table | str]:
+    names = d.target.components
+    components = f"component {names[0]}" if len(names) == 1 else f"{len(names)} components with one setting"
     yield f"[bold]{LABELS[d.request.controller]} design by eigenvalue sensitivity[/bold]: " + escape(
-        f"{d.case}, scenario {d.target.scenario}, mode {d.mode_name}, {_components(d.target.components)}"
+        f"{d.case}, scenario {d.target.scenario}, mode {d.mode_name}, {components}"
     )
     steps = [(str(number), *row) for number, row in enumerate(_steps(d), start=1)]
     yield _table("", "", "Step", "Formula", "Result", rows=steps)
@@ -230,10 +232,6 @@ def _other(mode: Mode | None) -> str:
 
 def percent(ratio: float) -> str:
     return f"{100 * ratio:.2f} %"
-
-
-def _components(names: Sequence[str]) -> str:
-    return f"component {names[0]}" if len(names) == 1 else f"{len(names)} components with one setting"
 
 
 def _table(title: str, *columns: str, rows: Iterable[Sequence[str]] = ()) -> Table:

@@ -69,7 +69,8 @@ class Cells:
             "followed": self.followed,
             "left_out": max(0, len(self.rows) - fit),
             "rows": [asdict(side) for side in self.rows[:fit]], "columns": [asdict(side) for side in self.columns],
-            "cells": [[_told(cell) for cell in row] for row in self.cells[:fit]],
+            "cells": [[c and {n: v for n, v in asdict(c).items() if v not in (None, "")} for c in row]
+                      for row in self.cells[:fit]],
         }  # fmt: skip
         save_json(content, staging / CELLS)
         return staging / CELLS
@@ -99,10 +100,6 @@ def check_case(study: Mapping[str, Any], case: Case, folder: Path) -> None:
             f"{folder / CELLS}: {case.path} is not as it was when the study was computed, or is another file; compute "
             "the study anew, or give the case itself"
         )
-
-
-def _told(cell: Cell | None) -> dict[str, Any] | None:
-    return None if cell is None else {name: value for name, value in asdict(cell).items() if value not in (None, "")}
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,8 @@ class ColumnTable(Generic[Row]):
         return [column for column in self.columns if column.heading]
 
     def __rich__(self) -> PlainTable:
-        cells = [[_on_terminal(column.cell(row)) for column in self.shown] for row in self.rows[: self.most]]
+        rows = [[column.cell(row) for column in self.shown] for row in self.rows[: self.most]]
+        cells = [[c if isinstance(c, str) else Text(c.text, _ON_TERMINALS[c.mark]) for c in row] for row in rows]
         table = make_table(self.title, *(column.heading for column in self.shown), left=self.left, rows=cells)
         table.caption = self._rest or None
         for column, shown in zip(self.shown, table.columns, strict=True):
@@ -96,10 +97,6 @@ class ColumnTable(Generic[Row]):
         """Write a CSV file; truth values are in lower case, as in JSON."""
         plain = [{k: str(v).lower() if isinstance(v, bool) else v for k, v in row.items()} for row in self.records()]
         save_table(plain, path, [column.name for column in self.columns if column.name])
-
-
-def _on_terminal(cell: str | Marked) -> str | Text:
-    return cell if isinstance(cell, str) else Text(cell.text, _ON_TERMINALS[cell.mark])
 
 
 def _on_page(cell: str | Marked) -> str:

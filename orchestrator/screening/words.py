@@ -39,17 +39,15 @@ def by_outage(summary: Summary) -> list[OutageRow]:
     rows = []
     for name, items in groups.items():
         known = [item for item in items if item.record.status is Status.COMPUTED]
-        worst = min(known, key=lambda item: (item.record.stable is not False, _damping(item)), default=None)
+        worst = min(known, key=lambda item: (
+            item.record.stable is not False, one.damping if (one := least_of(item)) else np.inf
+        ), default=None)  # fmt: skip
         least = None if worst is None else least_of(worst)
         unjudged = tuple(item for item in items if item.record.status is not Status.COMPUTED)
         rows.append(OutageRow(name, worst, least, unjudged, len(items)))
     return sorted(rows, key=lambda row: (
         not row.unstable, not row.unjudged, row.least.damping if row.least else np.inf,
     ))  # fmt: skip
-
-
-def _damping(item: ScreenedItem) -> float:
-    return float("inf") if (one := least_of(item)) is None else one.damping
 
 
 def load_of(plan: ScreeningPlan, point: OperatingCase) -> float:

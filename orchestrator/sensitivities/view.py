@@ -12,7 +12,6 @@ from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_json, save_table
 from orchestrator.safe_files import made_folder
-from orchestrator.sensitivities.parameters import Parameter
 from orchestrator.sensitivities.sensitivities import Sensitivity, SensitivityResult
 
 
@@ -72,7 +71,7 @@ def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
     title = f"{result.modes.prepared.title}, {name}, {mode.frequency_hz:.4f} Hz, {mode.damping_percent:.2f} %; {kind}"
     return ColumnTable(title, (
         Column("Parameter", lambda row: row.parameter.name, name="parameter"),
-        Column("Value", lambda row: row.parameter, _value),
+        Column("Value", lambda row: row.parameter, lambda p: f"{p.value:.5g} {p.unit}".removesuffix(" 1")),
         Column("", lambda row: row.parameter.value, name="value"),
         Column("", lambda row: row.parameter.unit, name="unit"),
         Column("", lambda row: "tunable" if row.parameter.tunable else "fixed", name="variability"),
@@ -93,10 +92,6 @@ def sensitivity_table(result: SensitivityResult) -> ColumnTable[Sensitivity]:
 
 def rows_of(result: SensitivityResult) -> list[dict[str, Any]]:
     return sensitivity_table(result).records()
-
-
-def _value(parameter: Parameter) -> str:
-    return f"{parameter.value:.5g}" + ("" if parameter.unit == "1" else f" {parameter.unit}")
 
 
 def _part(value: complex | None, part: str) -> float | None:

@@ -5,16 +5,10 @@ from collections.abc import Iterator
 from rich.console import RenderableType
 from rich.markup import escape
 
-from orchestrator.cases.case import Case
 from orchestrator.errors import NOT_MET
-from orchestrator.points.points import CountReport
 from orchestrator.points.study import StudyAtOnce
 from orchestrator.siting.study import SiteRequest, find_sites
 from orchestrator.siting.view import Siting, ranking_table
-
-
-def _compute(case: Case, request: SiteRequest, report: CountReport) -> Siting:
-    return Siting(find_sites(case, request, report))
 
 
 def _parts(found: Siting) -> Iterator[RenderableType]:
@@ -23,7 +17,8 @@ def _parts(found: Siting) -> Iterator[RenderableType]:
 
 
 STUDY = StudyAtOnce(
-    request=SiteRequest, compute=_compute, prepared=lambda found: [found.result.prepared], parts=_parts,
+    request=SiteRequest, compute=lambda case, request, report: Siting(find_sites(case, request, report)),
+    prepared=lambda found: [found.result.prepared], parts=_parts,
     code=lambda found, _: 0 if found.agrees and not found.result.breaking else NOT_MET,
     counted="places",
     files="site.json, buses.csv and site.html with a map",

@@ -16,7 +16,7 @@ from orchestrator.cases.case import Case
 from orchestrator.cases.names import close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import ComponentTable
-from orchestrator.errors import CosimError, InputError
+from orchestrator.errors import CosimError, InputError, few
 from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import INTACT, read_outages
 from orchestrator.operating_points.preparation import ItemPreparation, failure
@@ -201,7 +201,7 @@ def _candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
     known = list(prepared.network.buses) if prepared.network is not None else []
     found = {name: fnmatch.filter(known, name) or fnmatch.filter(known, f"bus_{name}") for name in wanted}
     if unknown := [name for name, there in found.items() if not there]:
-        hint = close_names(unknown[0], known, f"the buses are {', '.join(known[:8])}")
+        hint = close_names(unknown[0], known, f"the buses are {few(known, 8)}")
         raise InputError(f"--buses {unknown[0]}: there is no such bus; {hint}")
     return [bus for there in found.values() for bus in there] or known
 

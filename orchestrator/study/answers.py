@@ -61,9 +61,9 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
         f"{name}: {m.frequency_hz:.3f} Hz, {m.damping_percent:.2f} %" for name, m in _named_elsewhere(result, mode)
     ]
     told += [f"which mode is {name!r} is not known" for name in result.unnamed]
-    return ScenarioAnswer(
-        result.prepared.title, verdict.stable, verdict.verdict, mode, _with_misfits(result, "; ".join(told))
-    )
+    remark = _with_misfits(result, "; ".join(told))
+    title = ", with ".join(filter(None, (result.prepared.title, result.prepared.changed)))
+    return ScenarioAnswer(title, verdict.stable, verdict.verdict, mode, remark)
 
 
 def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str, Mode]]:

@@ -1,10 +1,15 @@
 """What a device brings: a scenario's damping beside that of another one with the same power flow."""
 
+import math
 from collections.abc import Iterator, Sequence
 
+from orchestrator.analysis import continuation
+from orchestrator.analysis.linear_model import IDENTIFIED
 from orchestrator.analysis.mode_tracking import ModeSet, match
-from orchestrator.analysis.modes import Mode
-from orchestrator.study.modes import ModesResult
+from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_percent
+from orchestrator.errors import AnalysisError, CosimError
+from orchestrator.study.mode_identity import MOST_STATES, damping_gains
+from orchestrator.study.modes import ModesResult, compute_modes
 
 _SAME_VOLTAGE = 1e-4  # between two power flows that are one operating point [pu]
 
@@ -24,12 +29,36 @@ def told(results: Sequence[ModesResult]) -> Iterator[str]:
 
 
 def _compared(result: ModesResult, other: ModesResult, before: Mode) -> str:
+    title = result.prepared.title
     voltages = [{} if (flow := r.prepared.power_flow) is None else flow.voltages for r in (result, other)]
     if not all(abs(v - voltages[1].get(bus, 0.0)) < _SAME_VOLTAGE for bus, v in voltages[0].items()):
-        return f"{result.prepared.title}: not known, as its power flow is another one"
-    sets = [ModeSet.of(r.modes, tuple(r.model.names)) for r in (other, result)]
-    now = next((result.modes[x.target] for x in match(sets[0], sets[1]) if other.modes[x.source] is before), None)
-    if now is None:
-        return f"{result.prepared.title}: not known, as no mode is clearly the same"
-    points = now.damping_percent - before.damping_percent
-    return f"{result.prepared.title} {points:+.2f} points ({now.damping_percent:.2f} %)"
+        return f"{title}: not known, as its power flow is another one"
+    least = min((mode.damping_percent for mode in result.modes), default=math.nan)
+    try:
+        damping = _followed(result, other, before)
+    except CosimError as error:
+        points = least - before.damping_percent
+        return f"{title} at least {points:+.2f} points (least damped: {least:.2f} %), as {error}"
+    weaker = f", and the least damped now {least:.2f} %" if round(least, 2) < round(damping, 2) else ""
+    return f"{title} {damping - before.damping_percent:+.2f} points ({damping:.2f} %{weaker})"
+
+
+def _followed(result: ModesResult, other: ModesResult, before: Mode) -> float:
+    """The damping [%] of another scenario's mode here: first with the gains of damping controllers at 0, by its shape,
+    and then along the gains."""
+    prepared, start = result.prepared, result
+    small = result.model.number_of_states <= MOST_STATES and IDENTIFIED not in result.model.sources.values()
+    if small and prepared.beside and (gains := dict.fromkeys(damping_gains(prepared), 0.0)):
+        rest, seen = prepared.beside(prepared.name, False, gains), result.hidden
+        if rest is not None:
+            start = compute_modes(rest, seen.frequency_range if seen else ELECTROMECHANICAL_HZ)
+    one, two = (ModeSet.of(r.modes, tuple(r.model.names)) for r in (other, start))
+    here = next((start.modes[link.target] for link in match(one, two) if other.modes[link.source] is before), None)
+    way = continuation.between(start.model, result.model)
+    if here is None or way is None:
+        raise AnalysisError("no mode is clearly the same")
+    pair = continuation.pair_of(here, start.model.names)
+    try:
+        return damping_percent(continuation.follow_along(pair, way, 0.0, 1.0, continuation.CAREFUL).eigenvalue)
+    except continuation.ModesMeetError as error:
+        raise AnalysisError(f"the mode meets another one at {error.beyond:.0%} of the controllers' gains") from error

@@ -15,6 +15,7 @@ from typing import Any
 
 from orchestrator.cases.locate import place_in
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import few
 from orchestrator.points.code import code_hash, library_versions
 from orchestrator.points.key import component_content, files_named, sha256_of
 
@@ -92,7 +93,7 @@ def differences(
     found = sorted(_differences(then, now), key=lambda words: not words.startswith(f"{_CASE} "))
     if texts is not None and _digest(texts[0]) == then.get(_CASE) != now.get(_CASE):
         found = [*(_in_the_case(*texts, file) or [f"{_CASE} has its tables in another order"]), *found[1:]]
-    return "; ".join(found[:_SHOWN]) + (f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else "")
+    return few(found, _SHOWN, "; ")
 
 
 def _in_the_case(was: str, is_now: str, file: Path | None) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from orchestrator.analysis.identification import TOLERANCE, IdentifiedMode, identify_modes, sampling
 from orchestrator.analysis.mode_doubts import COARSER, SHORTER, WindowPart, part_of, with_doubts, worth_showing
 from orchestrator.cases.names import close_names
-from orchestrator.errors import AnalysisError, InputError
+from orchestrator.errors import AnalysisError, InputError, few
 from orchestrator.results.comtrade.reading import is_comtrade, read_comtrade
 from orchestrator.results.csv_recording import SUFFIXES, read_table
 from orchestrator.results.manifest import MANIFEST, ResultsWarning, checked
@@ -103,10 +103,9 @@ def recorded(dataset: xr.Dataset, expression: str, label: str) -> xr.DataArray:
     if found is None:
         known = list(map(str, dataset.data_vars))
         hint = close_names(expression, known)
-        some = ", ".join(known[:_SHOWN]) + (f" and {len(known) - _SHOWN} more" if len(known) > _SHOWN else "")
         raise InputError(
-            f"{label}: signal {expression!r} was not recorded; there are: {some}; {hint + ' ' if hint else ''}"
-            "a signal is 'a.b', or the difference 'a.b - c.d' of two"
+            f"{label}: signal {expression!r} was not recorded; there are: {few(known, _SHOWN)}; "
+            f"{hint + ' ' if hint else ''}a signal is 'a.b', or the difference 'a.b - c.d' of two"
         )
     return found
 
@@ -163,7 +162,7 @@ def compare(a: xr.Dataset, b: xr.Dataset, expression: str, start: float, labels:
     difference = y_2 - y_1
     worst = int(np.argmax(np.abs(difference)))
     return Comparison(
-        expression, str(first.attrs.get("units") or _unit(a, expression)),
+        expression, str(first.attrs.get("units") or a[expression.partition(" - ")[0].strip()].attrs.get("units", "")),
         (float(np.abs(y_1 - y_1[0]).max()), float(np.abs(y_2 - y_2[0]).max())), float(abs(difference[worst])),
         float(np.sqrt(np.mean(difference**2))), float(common.times[worst]),
         (_strongest(first, start), _strongest(second, start)),
@@ -184,10 +183,6 @@ def most_different(
 
     common = [str(name) for name in a.data_vars if name in b.data_vars]
     return sorted(common, key=share, reverse=True)[:count]
-
-
-def _unit(dataset: xr.Dataset, expression: str) -> str:
-    return str(dataset[expression.split(" - ", maxsplit=1)[0].strip()].attrs.get("units", ""))
 
 
 def _strongest(curve: xr.DataArray, start: float) -> IdentifiedMode | None:

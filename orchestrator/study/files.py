@@ -19,6 +19,7 @@ from orchestrator.results.signals import relative_difference
 from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
 from orchestrator.safe_files import write_text
+from orchestrator.study import beside
 from orchestrator.study.answers import EarlyEnd, of_run
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation, plot_signals
 from orchestrator.study.modes import ModesResult, modes_json
@@ -64,7 +65,7 @@ def write_modes(results: Sequence[ModesResult], folder: Path) -> list[str]:
     """Write what ``gfor modes --out`` leaves, all of it at once; return the files' names."""
     with staged(folder, new_run_id()) as staging:
         plots = [path.name for path in save_modes(results, staging)]
-        save_json(modes_json(results), staging / "modes.json")
+        save_json(modes_json(results, beside=[*beside.told(results)]), staging / "modes.json")
         flows = sorted(path.name for path in staging.glob("power_flow_*.csv"))
     return ["modes.csv", "participation.csv", "mode_shapes.csv", "modes.json", *flows, *plots]
 
@@ -77,7 +78,8 @@ def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd |
     ended = None if early_end is None else early_end.as_json()
     made_of = {"case": case.name, "case_file": word_of(case, folder.parent)}  # the files are put there at the end
     given = {r.modes.prepared.name: dict(r.modes.prepared.given) for r in results}
-    summary = {**made_of, "ended_early": ended, "given": given, "scenarios": [summary_of(r) for r in results]}
+    summary = {**made_of, "ended_early": ended, "given": given, "scenarios": [summary_of(r) for r in results],
+               "beside": [*beside.told([r.modes for r in results])]}  # fmt: skip
     save_json(summary, folder / "summary.json")
     plots = []
     for table in case.table.plots:

@@ -25,7 +25,7 @@ from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.fmi.instance import is_isolated, is_ours
 
 _STAYS = 1e-6  # A state that changes by less than this part of max(1, |value|) stays where it is
-_MOST_STATES = 600  # of a system that is started on the way, or whose clear names are looked at again
+MOST_STATES = 600  # of a system that is started on the way, or whose clear names are looked at again
 _MOST_STARTS = 12  # systems that are started on one way at most
 _MOST_FITTED = 6  # the same where each of them has a component to identify
 _SAME = 1e-6  # two eigenvalues that differ by less than this part of their size are one, computed in two ways
@@ -164,7 +164,7 @@ class _Others:
         alike = [name for name, table in order.items() if set(table.remove) == set(order[own].remove) and name != own]
         self._earlier = [name for name in alike if list(order).index(name) < here]
         self._later = [name for name in alike if name not in self._earlier]
-        self._small = len(system.model.names) <= _MOST_STATES
+        self._small = len(system.model.names) <= MOST_STATES
         self._without_damping: list[NamedSystem | None] = []
         self.checked, self.lost = False, ""
 
@@ -264,13 +264,7 @@ class _Others:
 
     def _at_rest(self) -> NamedSystem | None:
         prepared = self._system.prepared
-        gains = {
-            f"{component}.{controller}.K": 0.0
-            for component, plan in prepared.system.components.items()
-            for controller in DAMPING_CONTROLLERS
-            if f"{controller}.K" in plan.description.variables and _gain(plan, controller)
-        }
-        if not gains:
+        if not (gains := dict.fromkeys(damping_gains(prepared), 0.0)):
             return None
         try:
             if self._by_gains is not None:
@@ -337,6 +331,17 @@ def _differing(a: PreparedScenario, b: PreparedScenario) -> dict[str, tuple[floa
                 return None
             found[f"{name}.{variable}"] = (p, q)
     return found
+
+
+def damping_gains(prepared: PreparedScenario) -> list[str]:
+    """The gains of the damping controllers that are on, by ``component.variable``."""
+    plans = prepared.system.components.items()
+    return [
+        f"{name}.{controller}.K"
+        for name, plan in plans
+        for controller in DAMPING_CONTROLLERS
+        if _gain(plan, controller)
+    ]
 
 
 def _gain(plan: ComponentPlan, controller: str) -> float:

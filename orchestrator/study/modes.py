@@ -347,7 +347,9 @@ def unknown_modes(prepared: PreparedScenario, reasons: Sequence[str]) -> ModesRe
     )  # fmt: skip
 
 
-def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) -> Mapping[str, Any]:
+def modes_json(
+    results: Sequence[ModesResult], questions: Sequence[str] = (), beside: Sequence[str] = ()
+) -> Mapping[str, Any]:
     """The machine-readable form of `gfor modes`, of scenarios of one case with one communication step."""
     first = results[0].prepared
     asked = [str(question) for result in results for question in result.prepared.questions]
@@ -356,6 +358,7 @@ def modes_json(results: Sequence[ModesResult], questions: Sequence[str] = ()) ->
         "case": first.case.name,
         "step_size_s": first.step_size,
         "facts": None if facts is None else facts.sentence(),
+        "beside": list(beside),
         "questions": list(dict.fromkeys([*asked, *questions])),
         "scenarios": [_scenario_json(r) for r in results],
     }

@@ -17,7 +17,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.short_circuit import ShortCircuit
 from orchestrator.cases.values import convert
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 from orchestrator.fmi.description import VariableInfo
 from orchestrator.units import read_value, to_unit
 
@@ -155,7 +155,7 @@ def _length_axis(vary: Vary, scenarios: Sequence[PreparedScenario]) -> Axis:
     for part in (part.strip() for part in names.split(",")):
         found = fnmatch.filter(lines, part.rpartition(".")[2])
         if not found:
-            hint = close_names(part, lines, f"there are: {', '.join([*lines][:8])}")
+            hint = close_names(part, lines, f"there are: {few(lines, 8)}")
             raise InputError(f"--vary {vary.key}: the network has no line {part!r}; {hint}")
         for line in (lines[name] for name in found):
             for quantity in ("X", "R", "B") if line.B else ("X", "R"):

@@ -70,10 +70,6 @@ def _names(part: str, *names: str) -> tuple[str, ...]:
     return tuple(f"{part}.{name}" for name in names)
 
 
-def _rate(what: str, state: str, high: str, low: str) -> Limit:
-    return Limit(what, f"der({_GOVERNOR}.{state})", f"{_GOVERNOR}.{high}", low=f"{_GOVERNOR}.{low}")
-
-
 def _stabiliser(stage: int, lead: str, lag: str, **further: object) -> Limit:
     state = f"{_PSS}.lead_lag_{stage}"
     output = Lead(state, f"{_PSS}.{lead}", lag=f"{_PSS}.{lag}")
@@ -98,7 +94,7 @@ MACHINE_LIMITS = (
     # TGOV1 and GAST; IEEEG1; HYGOV, whose limited signal is that before the gate's servo.
     _part(_GOVERNOR, "limit of the valve", "valve", "V_MAX", "V_MIN"),
     _part(_GOVERNOR, "limit of the valve", "gate", "P_MAX", "P_MIN"),
-    _rate("limit of the valve's speed", "gate", "U_o", "U_c"),
+    Limit("limit of the valve's speed", f"der({_GOVERNOR}.gate)", f"{_GOVERNOR}.U_o", low=f"{_GOVERNOR}.U_c"),
     _part(_GOVERNOR, "limit of the gate", "gate", "G_MAX", "G_MIN",
           lead=Lead("governor.gate", "governor.T_g")),
     Limit("limit of the gate's speed", "der(governor.gate)", "governor.VELM"),

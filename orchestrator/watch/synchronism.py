@@ -2,12 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
+from orchestrator.errors import few
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.watch.finding import Finding
 from orchestrator.watch.seen import Seen
@@ -175,13 +177,13 @@ def _finding(
     others = [[names[k] for k in pair.other] for pair in pairs]
     verb, whose = ("loses", "its angle is") if len(group) == 1 else ("lose", "their angle is")
     moved = "; ".join(
-        f"{pair.turns:.2f} turns against {_listed(other)}, and {'still slips' if pair.slips else 'holds'}"
+        f"{pair.turns:.2f} turns against {few(other, _NAMED)}, and {'still slips' if pair.slips else 'holds'}"
         + ("" if pair.lasts else " when one of both leaves the grid")
         + (f" (apart from t = {times[pair.row]:.4g} s on)" if pair is not pairs[0] else "")
         for pair, other in zip(pairs, others, strict=True)
     )
     message = (
-        f"{_listed(group)} {verb} synchronism with {_listed([name for other in others for name in other])}: from "
+        f"{few(group, _NAMED)} {verb} synchronism with {few(chain(*others), _NAMED)}: from "
         f"t = {time:.4g} s {whose} more than 180 degrees from theirs; at the end it has moved by {moved}"
     )
     figures = {
@@ -190,10 +192,6 @@ def _finding(
         **({f"turns_against_{o[0]}": pair.turns for pair, o in zip(pairs, others, strict=True)} if pairs[1:] else {}),
     }
     return Finding("loss_of_synchronism", time, group[0], variable, message, None, figures)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:_NAMED]) + (f" and {len(names) - _NAMED} more" if len(names) > _NAMED else "")
 
 
 def slips_at_the_end(relative: Numbers) -> bool:

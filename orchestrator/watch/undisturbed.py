@@ -10,6 +10,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.events import Event, Forcing, WireFault, WireRecovery
 from orchestrator.coupling.imperfections import Imperfection, Noise, Quantisation
 from orchestrator.coupling.system import System
+from orchestrator.errors import few
 from orchestrator.watch.finding import Finding
 from orchestrator.watch.limit import is_inner
 from orchestrator.watch.oscillation import Oscillation, strongest_oscillation
@@ -97,9 +98,7 @@ def not_judged(masked: Mapping[Stretch, Sequence[Unrest]]) -> list[Finding]:
             spans.append((stretch.begin, stretch.end))
     acting = [d for stretch in order for d in masked[stretch]]
     connections = list(dict.fromkeys(d.connection for d in acting))
-    named = ", ".join(connections[:_SHOWN])
-    if len(connections) > _SHOWN:
-        named += f" and {len(connections) - _SHOWN} more"
+    named = few(connections, _SHOWN)
     kinds = " and ".join(dict.fromkeys(d.kind for d in acting))
     when = " and ".join(f"between t = {begin:.4g} s and t = {end:.4g} s" for begin, end in spans)
     message = (

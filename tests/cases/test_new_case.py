@@ -7,9 +7,11 @@ from functools import partial
 
 import pytest
 
+from orchestrator.analysis.continuation import ModesMeetError
 from orchestrator.cases.case import load_case
 from orchestrator.cases.new_case import WantedCase, _switched, read_converter, write_case
-from orchestrator.errors import InputError
+from orchestrator.cases.parameter_files import read_parameter_file
+from orchestrator.errors import CaseError, InputError
 from orchestrator.fmi.description import read_description
 from orchestrator.study import beside
 from orchestrator.study.modes import compute_modes
@@ -61,6 +63,38 @@ def test_the_converter_takes_over_what_the_machine_feeds_less(files):
     held = [abs(x.power_flow.voltages["bus_13"]) for x in (base, converter)]
     assert held[0] == pytest.approx(held[1], abs=1e-5)
     assert compute_modes(converter).stability.stable
+
+
+def test_a_file_of_values_is_for_the_scenario_it_was_made_for(files, tmp_path):
+    case, _ = made(files)
+    (tmp_path / "pod.toml").write_text('[set]\n"gfor.pod_p.enabled" = true\n')
+    file = read_parameter_file(tmp_path / "pod.toml")
+    with pytest.raises(CaseError, match=r"line 2, gfor.pod_p.enabled: it would switch this on in converter too"):
+        case.prepare(["converter", "pod_p"], parameters=[file])
+    case.prepare(["base", "pod_p"], parameters=[file])  # only one of them has the controller
+    (alone,) = case.prepare(["converter"], {"sg1.machine.H": 4.0}, parameters=[file])
+    assert alone.changed == "pod.toml, sg1.machine.H = 4.0"
+    assert case.prepare(["converter"])[0].changed == ""
+
+
+def test_a_mode_is_followed_along_the_gains_to_what_the_device_brings(files, monkeypatch):
+    case, _ = made(files)
+    strong = {"gfor.pod_p.K": 160, "gfor.pod_p.T_S1": 0.22, "gfor.pod_p.T_S2": 0.0485}
+    dispatch, pod = (compute_modes(*case.prepare([name], strong)) for name in ("dispatch", "pod_p"))
+    weakest, same = sorted(pod.modes, key=lambda mode: mode.damping_percent)[:2]
+    assert abs(weakest.frequency_hz - same.frequency_hz) > 0.4  # the POD's own mode is damped least now
+    now = f"({same.damping_percent:.2f} %, and the least damped now {weakest.damping_percent:.2f} %)"
+    (sentence,) = beside.told([dispatch, pod])
+    assert sentence.endswith(now)
+
+    def meets(*_, **__):
+        raise ModesMeetError(1j, 0.7, 1.0)
+
+    monkeypatch.setattr(beside.continuation, "follow_along", meets)
+    (sentence,) = beside.told([dispatch, pod])
+    least = weakest.damping_percent - min(mode.damping_percent for mode in dispatch.modes)
+    assert f"POD-P at least {least:+.2f} points (least damped: {weakest.damping_percent:.2f} %)" in sentence
+    assert sentence.endswith("as the mode meets another one at 70% of the controllers' gains")
 
 
 def test_what_the_device_brings_is_told_apart_from_the_dispatch(files):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.toolchain.extras import require
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 
 MOST_BYTES = 2_000_000_000  # of all profiles together, unpacked: twenty times a national grid of 10,000 buses
 _NEEDED = {"EQ": "EquipmentCore", "SSH": "SteadyStateHypothesis", "TP": "Topology", "SV": "StateVariables"}
@@ -58,7 +58,7 @@ def _profiles(path: Path) -> dict[str, bytes]:
     if missing:
         raise InputError(
             f"{path}: the {'profiles' if len(missing) > 1 else 'profile'} {', '.join(missing)} "
-            f"{'are' if len(missing) > 1 else 'is'} missing among {', '.join([*found][:8])}; export the solved model "
+            f"{'are' if len(missing) > 1 else 'is'} missing among {few(found, 8)}; export the solved model "
             "with EQ, SSH, TP and SV"
         )
     return found

@@ -15,7 +15,7 @@ from orchestrator.cases.cgmes.branches import BASE_MVA, Branch, branch, finite, 
 from orchestrator.cases.cgmes.files import load_cgmes
 from orchestrator.cases.network_sources import SourceTables
 from orchestrator.cases.source_changes import Changes
-from orchestrator.errors import InputError, Problem
+from orchestrator.errors import InputError, Problem, few
 
 _TABLES = {
     "static var compensator": "get_static_var_compensators",
@@ -110,7 +110,7 @@ class _Reading:
             if names and kind not in leaving_out:
                 refused[kind] = names
         if refused:
-            listed = "; ".join(f"{kind} ({', '.join(names[:8])})" for kind, names in refused.items())
+            listed = "; ".join(f"{kind} ({few(names, 8)})" for kind, names in refused.items())
             raise InputError(
                 f"{self._place}: the network has no such elements: {listed}; to go on without them, write leave_out = "
                 f"{[*refused]} in [network], and put what they feed or draw into loads"

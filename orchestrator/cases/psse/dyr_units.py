@@ -57,16 +57,19 @@ def _reason(kind: str, machines: Sequence[UnitRow]) -> str:
 
 
 def missing_records(rows: Sequence[UnitRow], place: str) -> Iterator[UnusualValue]:
-    """Ask about machines without an exciter or a governor where others have one."""
-    for kind, quantity in _CONSTANT.items():
+    """Ask about machines without an exciter or a governor where others have one, or all have the other of both."""
+    for (kind, quantity), other in zip(_CONSTANT.items(), reversed(_CONSTANT), strict=True):
         able = [row for row in rows if _can_have(kind, row)]
         without = [row for row in able if kind not in row.parts and not row.partial]
-        if not without or len(able) - len(without) < _OTHERS:
+        having = len(able) - len(without)
+        all_other = kind == "governor" and len(able) >= _OTHERS and all(other in row.parts for row in able)
+        if not without or not (having >= _OTHERS or (not having and all_other)):
             continue
+        where = f"{having} of {len(able)} machines have one" if having else f"every machine has its {other}'s"
+        chosen = next((row.parts[kind] for row in able if kind in row.parts), {"governor": "tgov1"}.get(kind, "sexs"))
         text = (
-            f"no record of {'an' if kind == 'exciter' else 'a'} {kind}, where {len(able) - len(without)} of "
-            f"{len(able)} machines have one: the {quantity} is constant; add the record, or choose a part in [units], "
-            f"such as {kind} = {next(row.parts[kind] for row in able if kind in row.parts)!r}"
+            f"no record of {'an' if kind == 'exciter' else 'a'} {kind}, where {where}: the {quantity} is constant; add "
+            f"the record, or choose a part in [units], such as {kind} = {chosen!r}"
         )
         yield from (UnusualValue(f"sg{row.label}.{kind}", place, text) for row in without)
 

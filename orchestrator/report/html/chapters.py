@@ -75,8 +75,10 @@ def chapters_of(place: Path) -> list[Chapter]:
     return found
 
 
-def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", kind: str = "") -> Chapter:
-    """Of a run's summary, or the same of `gfor modes`; ``kind``: of the models, such as phasor."""
+def of_run(
+    folder: Path, scenarios: Sequence[Content], content: str = "", kind: str = "", beside: Sequence[str] = ()
+) -> Chapter:
+    """Of a run's summary, or the same of `gfor modes`; ``kind``: of the models; ``beside``: what devices bring."""
     said, open_, sure = [], [], []
     for s in scenarios:
         answer: Content = s.get("answer") or {}
@@ -102,7 +104,8 @@ def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", kind: 
     basis = f"{kind} models; " if kind else ""
     basis += "modes of the FMUs that were simulated; " if any("step_size_s" in s for s in scenarios) else ""
     return Chapter(
-        folder, "Is the network stable, and which swing is damped least?", "; ".join(text for _, text in said), good,
+        folder, "Is the network stable, and which swing is damped least?",
+        "; ".join([*(text for _, text in said), *beside]), good,
         (basis + "; ".join(sure)).strip("; ") or "linear model of the FMUs at the operating point; nothing was run",
         open_, content,
     )  # fmt: skip
@@ -117,7 +120,7 @@ def _modes(file: Path, content: Content) -> Chapter:
     columns = ["Scenario", "f [Hz]", "Damping [%]", "Name", "Who"]
     groups = {s["name"]: s["modes"] for s in content["scenarios"]}
     shown = _map("Modes", groups) + table("Modes", columns, rows)
-    made = of_run(file, content["scenarios"], shown)
+    made = of_run(file, content["scenarios"], shown, beside=content.get("beside", []))
     sure = "; ".join(filter(None, (made.sure, content["facts"], f"steps of {1e3 * content['step_size_s']:g} ms")))
     return replace(made, sure=sure, not_judged=[*made.not_judged, *content.get("questions", [])])
 

@@ -30,6 +30,7 @@ class Results:
     linear: dict[str, xr.Dataset]
     # how and where the study ended before its last scenario, as in ``summary.json``; None where it came to its end
     ended_early: dict[str, Any] | None = None
+    beside: Sequence[str] = ()  # what devices bring, as `gfor modes` says it
 
 
 def read_results(folder: Path) -> Results:
@@ -45,17 +46,15 @@ def read_results(folder: Path) -> Results:
             folder, case, scenarios, _rows(folder / "modes.csv"), _rows(folder / "participation.csv"),
             _rows(folder / "step_size.csv"), dict(_datasets(folder, names, "trajectory.nc")),
             dict(_datasets(folder, names, "linear.nc")), ended_early=content.get("ended_early"),
+            beside=content.get("beside", []),
         )  # fmt: skip
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{folder}: a result file cannot be read: {error}; run the study again") from error
 
 
 def sweeps_of(place: Path) -> list[xr.Dataset]:
-    return [_load(path) for path in _files(place, "sweep.nc")]
-
-
-def _files(place: Path, pattern: str) -> list[Path]:
-    return [place] if place.is_file() and place.match(pattern) else sorted(place.glob(pattern))
+    own = place.is_file() and place.match("sweep.nc")
+    return [_load(path) for path in ([place] if own else sorted(place.glob("sweep.nc")))]
 
 
 def _rows(path: Path) -> list[dict[str, str]]:

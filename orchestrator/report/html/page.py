@@ -77,7 +77,8 @@ def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter,
         for part in within:
             count = len(told)
             if (run := runs.get(part)) is not None:
-                told.append((of_run(part, run.scenarios, kind=run.case.table.models or ""), _of_run(run, figures)))
+                chapter = of_run(part, run.scenarios, kind=run.case.table.models or "", beside=run.beside)
+                told.append((chapter, _of_run(run, figures)))
             for sweep in sweeps_of(part):
                 shown = studies.sweep(sweep, scenarios, figures)
                 told.append((of_sweep(part, sweep), [(f"Trajectories along {studies.axis_of(sweep)}", shown)]))

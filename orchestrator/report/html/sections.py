@@ -1,9 +1,7 @@
 """The sections of the page that a run fills: findings, operating point, modes, responses, provenance."""
 
 import json
-from collections.abc import Mapping
 from html import escape
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -53,7 +51,8 @@ def findings(results: Results) -> str:
         elif s["failure"]:
             items.append(f'{escape(s["title"])}: <span class="bad">the run failed</span>: {escape(s["failure"])}')
         items += [
-            f'{escape(s["title"])}: <span class="{_shade(f)}">{escape(_KINDS.get(f["kind"], f["kind"]))}</span>: '
+            f'{escape(s["title"])}: <span class="{"soft" if f["kind"] == NOT_JUDGED else "bad"}">'
+            f"{escape(_KINDS.get(f['kind'], f['kind']))}</span>: "
             f"{escape(f['message'])}"
             for f in s.get("findings", [])
             if f["message"] != s["failure"]
@@ -90,11 +89,6 @@ def _answers(results: Results) -> str:
         shade = _verdict_shade(answer["stable"])
         rows.append([escape(s["title"]), f'<b class="{shade}">{escape(word)}</b>', escape(answer["remark"]), *figures])
     return table("Verdicts", ["Scenario", "Verdict", "Remark", "Least damped: f [Hz]", "Damping [%]"], rows, left=3)
-
-
-def _shade(finding: Mapping[str, Any]) -> str:
-    """Colour of a finding: what was not judged is no fault, and no health either."""
-    return "soft" if finding["kind"] == NOT_JUDGED else "bad"
 
 
 def _least_damped(results: Results) -> list[tuple[str, dict[str, str]]]:
