@@ -1,6 +1,5 @@
 """GB: the network-frequency-perturbation plot of a converter, and how stiff a source it is; without a verdict."""
 
-import cmath
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,14 +9,11 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.binding.binding import bound_fmu
-from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
-from orchestrator.cases.values import convert
+from orchestrator.black_box.port import bench_at
 from orchestrator.certification.codes.bench_point import STEP
 from orchestrator.certification.codes.programme import RATING_MVA, jumps
 from orchestrator.certification.request import CertificationRequest
-from orchestrator.errors import InputError
-from orchestrator.fmi.description import FmuDescription
 from orchestrator.report.plot_style import STYLE, colour, save_figure
 from orchestrator.results.storage import save_json, save_table
 
@@ -114,26 +110,10 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
 def measure_stiffness(request: CertificationRequest, f_n: float, report: Callable[[str], None]) -> Stiffness:
     """Measure a converter at an ideal bus, at half of its rating and 1 pu."""
     description = bound_fmu(request.fmu, request.binding)
-    values = _values(description, request, f_n)
-    rest = cmath.rect(float(values.get("v_0", 1.0)), float(values.get("theta_0", 0.0)))
-    bench = Bench(description, values, np.array([rest.real, rest.imag]), step_size=STEP)
-    if missing := [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]:
-        raise InputError(f"{request.fmu}: it has no {', '.join(missing)}; map its variables to our port with --binding")
-    return stiffness(measure(bench, EXCITATION, report), rest, 2 * np.pi * f_n)
-
-
-def _values(description: FmuDescription, request: CertificationRequest, f_n: float) -> dict[str, float | bool]:
-    given: dict[str, Any] = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
-    wanted = {name: value for name, value in given.items() if name in description.variables} | dict(request.values)
-    values = {}
-    for name, value in wanted.items():
-        if name not in description.variables:
-            raise InputError(f"--set {name}: {request.fmu} has no such variable; `gfor fmu info` lists them")
-        try:
-            values[name] = convert(description.variables[name], value)
-        except ValueError as error:
-            raise InputError(f"--set {name}: {error}") from error
-    return values
+    given = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
+    known = {name: value for name, value in given.items() if name in description.variables}
+    bench = bench_at(description, known | dict(request.values), STEP)
+    return stiffness(measure(bench, EXCITATION, report), complex(*bench.rest), 2 * np.pi * f_n)
 
 
 def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, Any]:
