@@ -171,7 +171,4 @@ def passivity(response: FrequencyResponse) -> Passivity:
     Y = -response.continuous()
     index = np.linalg.eigvalsh((Y + Y.conj().transpose(0, 2, 1)) / 2)[:, 0]
     size = np.linalg.norm(Y, ord=2, axis=(1, 2))
-    bounds = np.asarray(np.linalg.norm(response.bounds, axis=(1, 2)), dtype=float)
-    return Passivity(
-        response.frequencies, np.asarray(index, dtype=float), np.asarray(index / size, dtype=float), bounds
-    )
+    return Passivity(response.frequencies, index, index / size, np.linalg.norm(response.bounds, axis=(1, 2)))

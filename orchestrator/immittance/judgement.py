@@ -24,8 +24,7 @@ _BEGIN = np.deg2rad(60.0)
 
 _RANGE = (2.0, 400.0)  # what a scan has to hold at least [Hz]: swings, and what filters and delays do
 _SETTLED = 1.5  # growth of det(1 + L) over the last half of the range of models from which on it does not end there
-_INVARIANT = 1e-3
-_FRAMES = 16
+_INVARIANT, _FRAMES = 1e-3, 16
 
 
 class NyquistVerdict(StrEnum):

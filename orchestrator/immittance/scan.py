@@ -139,8 +139,7 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
     f = frequencies[(frequencies >= frequencies[-1] / _TOP) & (frequencies > 2 * rated_hz)]
     f = f[f <= frequencies[-1] - rated_hz]
     a, c = ([np.interp(f + k * rated_hz, frequencies, x) for k in (-1, 1)] for x in (along, cross))
-    size = a[0] + a[1]
-    size = np.where(size == 0, 1e-300, size)
+    size = a[0] + a[1] + 1e-300
     rises, turns = (a[1] - a[0]) / size, (c[1] + c[0]) / size
     coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
     if len(f) < _FEW or not _COIL < np.median(coil.real) < 1 / _COIL:

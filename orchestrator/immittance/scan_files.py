@@ -23,11 +23,6 @@ from orchestrator.safe_files import write_text
 _COLUMNS = ("[kV]", "[MW]", "[MVAr]", "[rad]")
 
 
-def is_ztool(first_line: str) -> bool:
-    names = first_line.split()
-    return len(names) > 1 and names[0] == "f" and any(name.endswith(("_d", "_dc")) for name in names)
-
-
 def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
     first, _, rest = text.partition("\n")
     ports = _ports(path, first.split()[1:])
@@ -125,10 +120,6 @@ _ELEMENTS = ("11", "12", "21", "22")
 _SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
 
 
-def is_imtb(first_line: str) -> bool:
-    return first_line.startswith("f,") and any(f"_{frame}_11_re" in first_line for frame in ("dq", "ab"))
-
-
 def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     """The device of a file, or its network; rows of negative dq frequencies are left out, they mirror the others."""
     rows = list(csv.DictReader(StringIO(text)))
@@ -176,9 +167,9 @@ def read_scan(path: Path, rated_hz: float, *, network: bool = False) -> Scan:
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: it is not a text file; a scan is one of Z-tool's or IMTB's") from error
     first = text.partition("\n")[0].strip()
-    if is_ztool(first):
+    if (names := first.split())[:1] == ["f"] and any(name.endswith(("_d", "_dc")) for name in names):
         return read_ztool(path, text, rated_hz)
-    if is_imtb(first):
+    if first.startswith("f,") and ("_dq_11_re" in first or "_ab_11_re" in first):
         return read_imtb(path, text, rated_hz, network=network)
     raise InputError(
         f"{path}: its first line {first[:60]!r} is of no known form of scans; Z-tool's begins 'f<tab>BUS-1_d<tab>"
