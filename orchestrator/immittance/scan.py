@@ -144,7 +144,7 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
     coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
     if len(f) < _FEW or not _COIL < np.median(coil.real) < 1 / _COIL:
         return 1.0
-    return float((rises.conj() @ turns).real / (rises.conj() @ rises).real)
+    return float(np.vdot(rises, turns).real / np.vdot(rises, rises).real)
 
 
 def is_active(scan: Scan) -> bool:

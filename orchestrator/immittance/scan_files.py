@@ -21,6 +21,8 @@ from orchestrator.immittance.scan import SIEMENS, PortPoint, Scan, checked, in_o
 from orchestrator.safe_files import write_text
 
 _COLUMNS = ("[kV]", "[MW]", "[MVAr]", "[rad]")
+_ELEMENTS = ("11", "12", "21", "22")
+_SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
 
 
 def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
@@ -114,10 +116,6 @@ def write_ztool(scan: Scan, path: Path) -> None:
             for n, p in blocks.items()
         ]
         write_text(path.with_name(f"{root}_power_flow.txt"), "\n".join([heads, *rows]) + "\n")
-
-
-_ELEMENTS = ("11", "12", "21", "22")
-_SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
 
 
 def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
