@@ -124,6 +124,8 @@ class Asked:
         network: Path | PreparedScenario | None = None if self._rest.get("scr") is not None else Path(self._case)
         network = self._prepared(of_case) if self._of_case else network
         of_fmu = {name: v for name, v in values.items() if name not in of_case}
+        if of_fmu and self._device and self._device.suffix.lower() in ENDINGS:
+            raise InputError(f"{self._device}: a scan has no {next(iter(of_fmu))} to be set; give the FMU itself")
         return CutRequest(self._device, network, values=of_fmu, **self._rest)
 
     def _prepared(self, values: Mapping[str, Any]) -> PreparedScenario:
@@ -134,10 +136,14 @@ class Asked:
         asked, names = ScenariosRequest(values=case_values(values)), [self._scenario] if self._scenario else []
         return choose(replace(load_case(self._case, trust_fmus=self._trust), scans=True), names, asked)[0].prepared
 
-    def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
-        """Judge it."""
-        result = study_cut(self._request(), report)
-        return Nyquist(result, lambda values: study_cut(self._request(values)), lambda x: self._settings(result, x))
+    def judged(
+        self, report: Callable[[str], None] | None = None, point: Mapping[str, Any] = MappingProxyType({})
+    ) -> Nyquist:
+        """Judge it, with other values at an operating point."""
+        result = study_cut(self._request(point), report)
+        return Nyquist(
+            result, lambda v: study_cut(self._request(dict(point) | dict(v))), lambda x: self._settings(result, x)
+        )
 
     def _settings(self, result: CutResult, given: Sequence[str]) -> list[Tunable]:
         """Parameters of the device that are not 0: all tunable ones that are not switched off, or those named."""

@@ -52,10 +52,6 @@ class BoxedSystem:
     ) -> list[Mode]:
         return find_spectrum(self.model, lowest_hz, highest_hz).modes
 
-    def participation(self, mode: Mode) -> float:
-        """Participation of the box as a whole; see `component_participation`."""
-        return component_participation(mode, self.component)
-
 
 def is_black_box(component: Component) -> bool:
     """Whether a component does not show its states, so that it cannot be perturbed like the others."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fmus.toolchain.extras import require
-from orchestrator.arrays import Complex, Matrix, Numbers
+from orchestrator.arrays import Complex, Matrix, Numbers, Vector
 from orchestrator.black_box.frequency_response import FrequencyResponse
 from orchestrator.errors import AnalysisError
 
@@ -142,6 +142,12 @@ def _realisation(poles: Complex, residues: Complex, largest: float) -> tuple[Mat
     return A, np.concatenate([b for _, b, _ in parts]), np.concatenate([c for _, _, c in parts], axis=1)
 
 
+def bands_of(f: Numbers, inside: Vector) -> list[tuple[float, float]]:
+    """First and last frequency of each stretch that lies inside."""
+    edges = np.flatnonzero(np.diff(np.r_[False, inside, False].astype(int)))
+    return [(float(f[a]), float(f[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
 @dataclass(frozen=True)
 class Passivity:
     """Whether a device with the admittance Y = −i/v, currents counted into it, can drive an oscillation.
@@ -157,21 +163,13 @@ class Passivity:
 
     def ranges(self) -> list[tuple[float, float]]:
         """Ranges of measured frequencies [Hz] in which the index is negative beyond its bound."""
-        found: list[tuple[float, float]] = []
-        before = False
-        for f, active in zip(self.frequencies.tolist(), (self.index < -self.bounds).tolist(), strict=True):
-            if active:
-                found = [*found[:-1], (found[-1][0], f)] if before else [*found, (f, f)]
-            before = active
-        return found
+        return bands_of(self.frequencies, self.index < -self.bounds)
 
 
 def passivity(response: FrequencyResponse) -> Passivity:
     """Passivity of the device itself, without the communication's hold; its response must be a square admittance."""
     Y = -response.continuous()
-    index = np.linalg.eigvalsh((Y + Y.conj().transpose(0, 2, 1)) / 2)[:, 0]
+    index = np.asarray(np.linalg.eigvalsh((Y + Y.conj().transpose(0, 2, 1)) / 2)[:, 0], dtype=float)
     size = np.linalg.norm(Y, ord=2, axis=(1, 2))
     bounds = np.asarray(np.linalg.norm(response.bounds, axis=(1, 2)), dtype=float)
-    return Passivity(
-        response.frequencies, np.asarray(index, dtype=float), np.asarray(index / size, dtype=float), bounds
-    )
+    return Passivity(response.frequencies, index, index / size, bounds)

@@ -15,7 +15,6 @@ from orchestrator.black_box.fitting import passivity
 from orchestrator.cli.case_arguments import excitation_of, prepare
 from orchestrator.cli.terminal import make_console, print_json, said_stages, warn
 from orchestrator.cli.verdict import exit_code, print_stability
-from orchestrator.errors import InputError
 from orchestrator.report.tables import make_table
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.results.staging import new_run_id, staged
@@ -32,11 +31,6 @@ def run(options: argparse.Namespace) -> int:
     verdicts: dict[str, Stability] = {}
     for prepared in scenarios:
         with running(prepared) as master, said_stages() as report:
-            if options.component not in master.components:
-                known = ", ".join(master.components)
-                raise InputError(
-                    f"--component: scenario {prepared.name!r} has no {options.component!r}; it has: {known}"
-                )
             restore = False if options.no_state else None
             system = linearize_with_box(
                 master, options.component, excitation_of(options), restore=restore, report=report
@@ -66,7 +60,8 @@ def _modes_table(title: str, system: BoxedSystem, white: list[Mode]) -> Table:
     columns += ["with its states: f [Hz]", "Damping [%]", "takes part [%]"] if white else []
     table = make_table(f"{title}: {system.component} as a black box, {fitted}", *columns, left=0)
     for mode in system.modes():
-        row = [f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.3f}", f"{100 * system.participation(mode):.2f}"]
+        share = component_participation(mode, system.component)
+        row = [f"{mode.frequency_hz:.4f}", f"{mode.damping_percent:.3f}", f"{100 * share:.2f}"]
         other = min(white, key=lambda m: abs(m.eigenvalue - mode.eigenvalue), default=None)
         if other is not None:
             share = component_participation(other, system.component)

@@ -20,7 +20,6 @@ _WITHIN, _ENOUGH = 6, 1000  # points between two frequencies at first, unless th
 _FALLS = 0.3  # part to which det(1 + L) of a free angle falls at least from 1e-3 to 1e-4 rad/s
 _ARC = 1e-4  # radius of the way round a pole on the axis, relative to the pole
 
-
 NO_MODES: Complex = np.zeros(0, dtype=complex)
 
 

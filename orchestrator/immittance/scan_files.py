@@ -21,11 +21,8 @@ from orchestrator.immittance.scan import SIEMENS, PortPoint, Scan, checked, in_o
 from orchestrator.safe_files import write_text
 
 _COLUMNS = ("[kV]", "[MW]", "[MVAr]", "[rad]")
-
-
-def is_ztool(first_line: str) -> bool:
-    names = first_line.split()
-    return len(names) > 1 and names[0] == "f" and any(name.endswith(("_d", "_dc")) for name in names)
+_ELEMENTS = ("11", "12", "21", "22")
+_SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
 
 
 def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
@@ -33,8 +30,8 @@ def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
     ports = _ports(path, first.split()[1:])
     frequencies, values = _rows(path, rest, 2 * len(ports))
     questions = checked(path.name, frequencies, values)
-    own = in_own_form(path.name, frequencies, values, rated_hz, q_leads=False)
-    return Scan(path.name, frequencies, own, ports, points=_points(path, ports), questions=questions)
+    own, asked = in_own_form(path.name, frequencies, values, rated_hz, q_leads=False)
+    return Scan(path.name, frequencies, own, ports, points=_points(path, ports), questions=questions + asked)
 
 
 def _ports(path: Path, names: list[str]) -> tuple[str, ...]:
@@ -121,14 +118,6 @@ def write_ztool(scan: Scan, path: Path) -> None:
         write_text(path.with_name(f"{root}_power_flow.txt"), "\n".join([heads, *rows]) + "\n")
 
 
-_ELEMENTS = ("11", "12", "21", "22")
-_SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
-
-
-def is_imtb(first_line: str) -> bool:
-    return first_line.startswith("f,") and any(f"_{frame}_11_re" in first_line for frame in ("dq", "ab"))
-
-
 def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     """The device of a file, or its network; rows of negative dq frequencies are left out, they mirror the others."""
     rows = list(csv.DictReader(StringIO(text)))
@@ -144,8 +133,8 @@ def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     kept = frequencies > 0
     frequencies, Z = frequencies[kept], Z[kept]
     questions = checked(path.name, frequencies, Z)
-    own = in_own_form(path.name, frequencies, np.linalg.inv(Z), rated_hz, q_leads=True)
-    return Scan(path.name, frequencies, own, (wanted[0],), questions=questions)
+    own, asked = in_own_form(path.name, frequencies, np.linalg.inv(Z), rated_hz, q_leads=True)
+    return Scan(path.name, frequencies, own, (wanted[0],), questions=questions + asked)
 
 
 def _numbers(path: Path, rows: list[dict[str, str]], name: str) -> tuple[Numbers, Complex]:
@@ -176,9 +165,9 @@ def read_scan(path: Path, rated_hz: float, *, network: bool = False) -> Scan:
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: it is not a text file; a scan is one of Z-tool's or IMTB's") from error
     first = text.partition("\n")[0].strip()
-    if is_ztool(first):
+    if (names := first.split())[:1] == ["f"] and any(name.endswith(("_d", "_dc")) for name in names):
         return read_ztool(path, text, rated_hz)
-    if is_imtb(first):
+    if first.startswith("f,") and ("_dq_11_re" in first or "_ab_11_re" in first):
         return read_imtb(path, text, rated_hz, network=network)
     raise InputError(
         f"{path}: its first line {first[:60]!r} is of no known form of scans; Z-tool's begins 'f<tab>BUS-1_d<tab>"

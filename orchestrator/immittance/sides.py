@@ -22,16 +22,13 @@ _RESOLVED, _SHARE, _NOISE, _UNRESOLVED = 0.3, 0.5, 1e-3, 6.0
 half of its error is the interpolation's with room to spare. Elsewhere what is seen is noise up to 1e-3 of the value;
 larger, it may be the flank of something that is far larger between the frequencies."""
 
-
 _AT_ONCE = 200  # points whose matrices are held at a time
 
 
 class Side(Protocol):
     """A matrix over the imaginary axis, of which it is known how sure it is and how many unstable poles it has.
 
-    ``name``: For sentences.
-    ``frequencies``: At which it is known best [Hz].
-    ``is_exact``: Whether it is known at every frequency."""
+    ``frequencies``: At which it is known best [Hz]; ``is_exact``: whether at every one."""
 
     @property
     def name(self) -> str: ...

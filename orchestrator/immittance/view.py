@@ -23,7 +23,6 @@ _MARGINS = (
     ("delay, lag", "delay_s", "{:.2e} s"), ("distance from −1", "distance", "{:.3f}"), ("disk", "disk", "{:.3f}"),
 )  # fmt: skip
 
-
 _NAMED, _LITTLE = 4, 5e-3  # buses and devices that take part, in a line, and what is too little for it
 
 Report = Callable[[str], None]

@@ -1,6 +1,7 @@
 """Operating points from a CSV file: one row each."""
 
 import fnmatch
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.errors import InputError, Problem
 from orchestrator.operating_points.columns import ACTIVE, IN_SERVICE, Elements, Reading, Setting, own_power, reading_of
+from orchestrator.units import read_value
 
 _LABELS = ("time", "name")
 _ANOTHER_UNIT = 25.0  # times smaller than the case's own is a whole column of powers that is asked about
@@ -47,6 +49,21 @@ def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> l
         seen[point.name] = point.place
         found.append(point)
     return found
+
+
+def settings_in(path: Path) -> dict[str, dict[str, Value]]:
+    """Values by point, of a file whose columns are variables; an empty cell leaves the variable as it is."""
+    found: dict[str, dict[str, Value]] = {}
+    for row in rows_of(path, ("name",)):
+        name = row["name"].strip()
+        if not name or None in row or folder_of(name) in map(folder_of, found):
+            raise InputError(f"{place_of(row)}: each point needs a name of its own, and no more cells than columns")
+        found[name] = {k: read_value(v.strip()) for k, v in row.items() if k not in ("name", PLACE) and v.strip()}
+    return found
+
+
+def folder_of(point: str) -> str:
+    return re.sub(r"[^\w.+-]", "_", point)
 
 
 def questions_about(path: Path, prepared: PreparedScenario, elements: Elements) -> Iterator[Problem]:
