@@ -220,7 +220,6 @@ def fastest_growth(values: NDArray[np.complex128], *, step_map: bool) -> complex
 
 
 def hidden(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) -> Hidden:
-    """The modes of a spectrum that a frequency range [Hz] does not show."""
     swinging = values[oscillations(values)]
     hertz = swinging.imag / (2 * np.pi)
     outside = swinging[(hertz < lowest_hz) | (hertz > highest_hz)]

@@ -140,7 +140,6 @@ OPTION = "--with-linear-model"
 
 
 def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, bytes]:
-    """Members for the FMU's ``extra/`` folder; nothing without the option."""
     if options.linear_case is None:
         if options.scenario or options.component:
             raise InputError(f"--scenario and --component say more of {OPTION}; add it")

@@ -214,7 +214,6 @@ class WireBank:
         }  # fmt: skip
 
     def restore(self, state: dict[str, NDArray[np.float64]]) -> None:
-        """Go back to a state of the same connections."""
         for wire, row in zip(self._wires, state["wires"], strict=True):
             for name, value in zip((*_SETTING, *_STATE), row.tolist(), strict=True):
                 wire[name] = value
@@ -227,7 +226,6 @@ class WireBank:
 
 
 def whole_steps(seconds: float, step_size: float, where: str) -> int:
-    """A delay [s] in communication steps."""
     steps = round(seconds / step_size)
     if abs(seconds - steps * step_size) > 1e-6 * step_size:
         nearest = max(steps, 0) * step_size

@@ -173,7 +173,6 @@ class BoundDescription(FmuDescription):
 
     @classmethod
     def of(cls, inner: FmuDescription, port: PortMap) -> Self:
-        """Describe an FMU through a port map whose variables were checked."""
         inner_names = {name: m.variable for name, m in port.signals.items()}
         for name in inner.variables:
             if name not in port.taken:

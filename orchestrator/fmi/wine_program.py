@@ -115,7 +115,6 @@ class WineProgram:
         return memory
 
     def attach(self) -> None:
-        """Make the next instance of an FMU in this process one of the library."""
         proxy().wine_attach(self.address, self._process.pid)
 
     def ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:

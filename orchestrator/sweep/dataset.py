@@ -35,7 +35,6 @@ Curve = list[tuple[GridPlace, dict[str, Any]]]  # A trajectory's figures by plac
 
 
 def swing_states(sweep: ScenarioSweep, patterns: list[str]) -> list[str]:
-    """States of a scenario that the case calls its swing states."""
     names = dict.fromkeys(n for record in sweep.points.values() if record.modes for n in record.modes.names)
     return [name for name in names if any(fnmatch.fnmatchcase(name, p) for p in patterns)]
 
@@ -158,7 +157,6 @@ def _attributes(samples: Samples) -> dict[str, Any]:
 
 
 def _asked(samples: Samples) -> dict[str, None]:
-    """What was questioned before the sweep."""
     return {str(question): None for sweep in samples.result.scenarios for question in sweep.prepared.questions}
 
 

@@ -245,7 +245,6 @@ def _claimed(subject: Subject) -> float:
 
 
 def _switching(name: str, signals: list[str], seen: str, **figures: float) -> CheckResult:
-    """What is to be said where only moments of switching follow the step."""
     says = f"{', '.join(signals)} switches at other moments with another step, and nothing else differs; {seen}"
     remedy = "the moments of switching are as exact as the communication step: take a smaller one where they matter"
     return remarked(name, says, remedy, switching=signals, **figures)

@@ -46,7 +46,6 @@ Content = Mapping[str, Any]
 
 
 def chapters_of(place: Path) -> list[Chapter]:
-    """What one JSON, or those of a folder, say."""
     files = [place] if place.is_file() else sorted(place.glob("*.json"))
     if place.is_dir() and (place / "sweep.nc").is_file():
         files = [file for file in files if file.name != "limits.json"]  # `of_sweep` tells of it
@@ -366,7 +365,6 @@ def sections(chapter: Chapter, number: int) -> str:
 
 
 def limits_of(place: Path) -> list[Any]:
-    """What ``--until`` found along with a sweep."""
     file = place / "limits.json"
     return list(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else []
 
