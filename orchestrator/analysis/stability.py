@@ -143,7 +143,8 @@ class Stability:
         if self.mode is None or self.stable is None:
             return self.reason or "there is no eigenvalue but zeros"
         value = self.mode.eigenvalue
-        where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {participants(self.mode)})"
+        states = ", ".join(f"{name} {factor:.2f}" for name, factor in self.mode.participation[:_STATES_NAMED])
+        where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {states})"
         tail = f"; {self.reason}" if self.reason else ""
         if self.zeros > 1:
             tail += f"; {zeros_in_words(self.zeros)}"
@@ -183,10 +184,6 @@ def place(value: complex, step_size: float | None = None) -> str:
     if step_size is not None and hertz > 0.25 / step_size:
         return f"{hertz:.4g} Hz, or an alias of it, as the step shows no more than {0.5 / step_size:.4g} Hz"
     return f"{hertz:.4g} Hz"
-
-
-def participants(mode: Mode) -> str:
-    return ", ".join(f"{name} {factor:.2f}" for name, factor in mode.participation[:_STATES_NAMED])
 
 
 def whole_spectrum(model: LinearModel) -> Spectrum | None:

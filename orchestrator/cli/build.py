@@ -49,7 +49,6 @@ HOSTS = {
     name: Tool(**table | {"platforms": tuple(table["platforms"])})
     for name, table in tomllib.loads(Path(__file__).with_name("build_hosts.toml").read_text(encoding="utf-8")).items()
 }
-"""By the name that ``--for`` takes."""
 
 
 def with_port(name: str, port: Port, known: tuple[str, ...]) -> str:

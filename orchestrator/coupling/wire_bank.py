@@ -144,7 +144,8 @@ class WireBank:
                 keep = 0.0 if band is None else math.exp(-2 * math.pi * band * self._step_size)
                 wire["keep"], wire["fresh"] = keep, math.sqrt(1 - keep * keep)
                 wire["deviation"], wire["started"] = imperfection.deviation, 0
-                self._keys[k] = key_of_noise(imperfection.seed, plan.name)
+                digest = hashlib.sha256(f"{imperfection.seed}\0{plan.name}".encode()).digest()
+                self._keys[k] = int.from_bytes(digest[:16], "little")
             case Quantisation():
                 wire["quantum"] = imperfection.step
             case Delay():
@@ -246,11 +247,6 @@ def _check_bandwidths(plan: WirePlan, step_size: float) -> None:
 
 
 _BLOCK = 1024  # values of one setting of the counter
-
-
-def key_of_noise(seed: int, name: str) -> int:
-    """128 bits from a seed and the name of a connection."""
-    return int.from_bytes(hashlib.sha256(f"{seed}\0{name}".encode()).digest()[:16], "little")
 
 
 def white(key: int, first: int, count: int) -> NDArray[np.float64]:

@@ -33,7 +33,6 @@ _ENDED = os.WEXITED | os.WNOHANG | os.WNOWAIT if hasattr(os, "waitid") else 0
 _FROM_OUTSIDE = tuple(
     -getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT") if hasattr(signal, name)
 )
-"""How a process is ended by others."""
 _TO_END = 2.0  # for a program that no longer answers to end [s]
 _WORDS = 4000  # most bytes of its last words that are read
 _idle: list[tuple[Path, "subprocess.Popen[bytes]"]] = []

@@ -24,7 +24,6 @@ from orchestrator.sweep.trajectories import GridPlace, Trajectory
 
 _FIGURES = ("real", "imag", "frequency", "damping", "similarity")
 _ATTRIBUTES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-"""Unit and long name by the variable's name."""
 
 _IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}  # xarray's own attributes have the short names
 _SEPARATOR = "; "  # between the warnings of one point

@@ -137,7 +137,6 @@ def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
 
 
 def _warned(chapter: Chapter, content: Any) -> Chapter:
-    """With the study's warnings among what was not judged."""
     told = content.get("warnings") if isinstance(content, dict) else None
     more = told if isinstance(told, list) else []
     return replace(chapter, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])))
