@@ -26,7 +26,6 @@ class Stiffness:
     powers: dict[str, Complex]  # P and Q over frequency [pu], angle [rad] and relative magnitude
 
     def least(self, name: str, low: float, high: float) -> tuple[float, float]:
-        """Least size of one of them in a band, and its frequency [Hz]."""
         inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
         if not len(inside):
             raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
