@@ -52,6 +52,12 @@ class Elements:
     def names(self) -> tuple[str, ...]:
         return (*self.units, *self.lines, *self.loads, *self.shunts)
 
+    def give_the_slack(self, column: str) -> bool:
+        """Whether a column gives a power to units at the slack bus."""
+        name, _, quantity = column.rpartition(".")
+        at_slack = [self.slack, *(unit for unit, bus in self.units.items() if bus == self.slack)]
+        return quantity in (ACTIVE, "P_0") and bool(fnmatch.filter(at_slack, name))
+
 
 def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
     """Branches without charging that alone lead to a bus with one unit and nothing else."""
