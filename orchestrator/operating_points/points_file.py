@@ -73,9 +73,9 @@ def questions_about(path: Path, prepared: PreparedScenario, elements: Elements) 
         place, own = f"{path}, line 1: column {column!r}", own_power(column, elements, prepared)
         cells = [text for row in rows if (text := (row[column] or "").strip())]
         most = max((abs(float(text)) for text in cells if own), default=0.0)
-        if cells and elements.give_the_slack(column):
-            left = f"cannot act: {elements.slack} is the slack and feeds what is left"
-            yield Problem(place, f"{left}; leave the column out, or name another slack in [power_flow]")
+        if cells and (units := elements.balancing_in(column)):
+            left = f"cannot act on {', '.join(units)}: {elements.slack} is the slack and feeds what is left"
+            yield Problem(place, f"{left}; leave it out, or name another slack in [power_flow]")
         elif own and 0 < _ANOTHER_UNIT * most < abs(own):
             unit = "MW" if column.endswith(ACTIVE) else "Mvar"
             text = f"at most {most:g} {unit}, where the case itself has {own:.4g} {unit}; are these values in pu?"

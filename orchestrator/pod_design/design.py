@@ -141,7 +141,6 @@ class PodDesign:
     # smallest gain with the design's lead/lag that has the required damping, else that with most; None where refined
     other_gain: Placed | None
     final: Placed  # the closed loop with the final setting: the refined setting, or ``designed`` without refinement
-    # before, after: the other modes without the controller, and with the final setting.
     before: Surroundings
     after: Surroundings
     broken: str | None  # the prohibited effect of the final setting on other modes; empty if there is no such effect
