@@ -12,6 +12,7 @@ _NAMES = {zip_: name for name, zip_ in LAWS.items()}
 @dataclass(frozen=True)
 class Facts:
     sources: tuple[str, ...]  # files, as the case names them
+    phasors: bool  # whether devices give the network an emf behind an admittance; else the models are EMT ones
     frequency_hz: float | None  # rated; None where no component has one
     # buses, machines, converters: how many; units out of service do not count
     buses: int
@@ -27,6 +28,7 @@ class Facts:
         units = [_counted(n, what) for n, what in ((self.machines, "machine"), (self.converters, "converter")) if n]
         slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
         parts = [
+            "phasor models" if self.phasors else "EMT models",
             *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []), _counted(self.buses, "bus"), *units,
             *(["no governor"] if self.machines and not self.governed else []),
             f"{self.load_mw:.5g} MW of load ({self.load_model})", *([f"slack {slack}"] if slack else []),
@@ -54,7 +56,8 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
     loads = [(x, grid.number(f"{x.name}.scale") * grid.number(f"{x.name}.P")) for x in network.loads]
     dyr = [table.units.dyr] if table.units is not None and table.units.dyr is not None else []
     return Facts(
-        (*sources, *dyr), rated_frequency(prepared), len(network.buses), len(machines), len(feeding) - len(machines),
+        (*sources, *dyr), any(name.endswith(".y_re") for name in grid.description.inputs), rated_frequency(prepared),
+        len(network.buses), len(machines), len(feeding) - len(machines),
         any(v.startswith("governor.T_") for n in machines for v in plans[n].description.variables),
         sum(p for _, p in loads if p > 0), _model([load for load, p in loads if p > 0]),
         tuple((n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n")) for n in at_slack),

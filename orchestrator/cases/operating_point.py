@@ -54,9 +54,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         draft.note(draft.given.place("power_flow"), f"scenario {draft.given.name!r}: {error}", kind)
         return None
     question(draft, undecided)
-    draft.found.questions += [
-        *_limit_questions(draft, flow), *_voltage_questions(draft, flow), *_left_over(draft, units, slack, flow),
-    ]  # fmt: skip
+    draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow), *_leftover(draft, flow)]
     return flow
 
 
@@ -65,10 +63,10 @@ def _returning(draft: Draft) -> set[str]:
     return {event.unit for event in events if isinstance(event, UnitReconnectionTable)}
 
 
-def _left_over(draft: Draft, units: Mapping[str, str], slack: str, flow: PowerFlow) -> Iterator[Problem]:
+def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
     """Powers that were asked of units at the slack bus, which feeds what is left."""
-    for name in (unit for unit, bus in units.items() if bus == slack and f"{unit}.P_0" in draft.given.from_outside):
-        fed = f"{slack} is the slack and feeds what is left, here P_0 = {flow.powers[name].real:.4g} pu"
+    for name in (unit for unit in flow.balancing if f"{unit}.P_0" in draft.given.from_outside):
+        fed = f"{flow.slack} is the slack and feeds what is left, here P_0 = {flow.powers[name].real:.4g} pu"
         yield Problem(draft.places.get(f"{name}.P_0", ""), f"{name}.P_0 cannot act: {fed}")
 
 

@@ -47,6 +47,7 @@ class PowerFlow:
     beyond_limits: tuple[Excess, ...] = ()
     lines: tuple[FlowLine, ...] = ()  # what it was solved with; a transformer of three windings is three of them
     slack: str = ""  # bus that feeds what is left
+    balancing: tuple[str, ...] = ()  # units there that do, whatever their P_0
 
 
 def solve_power_flow(
@@ -106,7 +107,8 @@ def solve_power_flow(
     powers = flow.powers | {u.name: complex(u.P_0, u.Q_0) for u in units if u.connected and u.Q_0 is not None}
     powers |= {unit.name: 0j for unit in units if not unit.connected}
     beyond = (*exceeded(final, result.voltages, known), *_fed_beyond(fixed, at_bus, limits or {}, voltages))
-    return PowerFlow(flow.voltages, powers, flow.residual, tuple(at_limits), beyond, tuple(lines), slack_bus)
+    left = tuple(u.name for u in at_bus[slack_bus])
+    return PowerFlow(flow.voltages, powers, flow.residual, tuple(at_limits), beyond, tuple(lines), slack_bus, left)
 
 
 def _left(limits: Limits, fixed: Mapping[str, complex]) -> Limits:

@@ -57,14 +57,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     if options.points is not None:
         _check_over_points(options)
-        out = options.out and _writable(_given(options.out))
+        out = options.out and _writable(options.out)
         return run_over_points(
             options, out or Path(f"{case_of(options).name}_{'_'.join(options.controller)}_points.toml")
         )
     _check_for_one_point(options)
     case, console = case_of(options), make_console(stderr=options.json)
     request = _request(options)
-    path = _writable(_given(options.out) if options.out else Path(f"{case.name}_{request.controller}.toml"))
+    path = _writable(options.out or Path(f"{case.name}_{request.controller}.toml"))
     folder = path.with_suffix(".points")
     with saying_how_it_goes_on(lambda: _how_it_goes_on(folder)):
         try:
@@ -89,19 +89,15 @@ def run(options: argparse.Namespace) -> int:
     )
     print_parts(console, sheet(design))
     warned = "" if design.met else " (the requirement is not met)"
+    emt = "; EMT models may differ: add --set models=emt" if design.prepared.case.table.models == "phasor" else ""
     console.print(escape(f"Parameter file {path}{warned}; use it with: gfor modes {options.case} --scenario "
-                  f"{design.target.scenario} --parameters {path}"), soft_wrap=True, highlight=False)  # fmt: skip
+                  f"{design.target.scenario} --parameters {path}{emt}"), soft_wrap=True, highlight=False)  # fmt: skip
     return ends
-
-
-def _given(out: Path) -> Path:
-    return parameter_file_path(out, "--out")
 
 
 def _check_for_one_point(options: argparse.Namespace) -> None:
     for name in ("controller", "component", "mode"):
-        if len(getattr(options, name)) > 1:
-            times = len(getattr(options, name))
+        if (times := len(getattr(options, name))) > 1:
             raise InputError(f"--{name} is given {times} times; only a design with --points takes several: give one")
     for name in ("outages", "workers", "scheduler", "tls"):
         if getattr(options, name) is not None:
@@ -131,8 +127,9 @@ def _request(options: argparse.Namespace) -> DesignRequest:
     return DesignRequest(**asked_of_case(options, DesignRequest, "design") | first | how)
 
 
-def _writable(path: Path) -> Path:
+def _writable(out: Path) -> Path:
     """The parameter file's path, tried before anything is computed."""
+    path = parameter_file_path(out, "--out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         existed = path.exists()

@@ -26,8 +26,8 @@ def search_settings(
     ``frequency``: the mode's [rad/s], to which the centres of the lead/lag relate."""
     group = PodGroup(request.controller, target.components, target.key, target.stages)
     loops = measure(*loop.opened(), group.places)
-    space = SettingSpace([group], request.gain_bounds, frequency)
-    largest = dict.fromkeys(group.places, request.gain_bounds[1])
+    bounds = request.bounds(search=True)
+    space, largest = SettingSpace([group], bounds, frequency), dict.fromkeys(group.places, bounds[1])
     aims = {f"searched for {mode}": Aim((mode,), request.least_damping, partial(naming_of, case))}
     if request.mode is None:
         aims["searched for all modes"] = Aim((), request.least_damping)

@@ -27,6 +27,7 @@ class Elements:
     loads: tuple[str, ...]
     shunts: tuple[str, ...]
     slack: str
+    balancing: tuple[str, ...] = ()  # units at the slack bus that feed what is left
     step_ups: Mapping[str, str] = field(default_factory=dict)  # branch whose loss is that of a unit alone → the unit
 
     @classmethod
@@ -45,12 +46,18 @@ class Elements:
             table.grid, units, tuple(name for name in branches if f"{name}.connected" in switches),
             tuple(load.name for load in network.loads),
             tuple(x.name for x in network.shunts if f"{x.name}.connected" in switches), units.get(wanted, wanted),
-            _step_ups(prepared, units),
+            prepared.power_flow.balancing if prepared.power_flow else (), _step_ups(prepared, units),
         )  # fmt: skip
 
     @property
     def names(self) -> tuple[str, ...]:
         return (*self.units, *self.lines, *self.loads, *self.shunts)
+
+    def balancing_in(self, column: str) -> list[str]:
+        """Those to which a column gives a power."""
+        name, _, quantity = column.rpartition(".")
+        given = [u for u in self.balancing if name == self.units[u] or fnmatch.fnmatchcase(u, name)]
+        return given if quantity in (ACTIVE, "P_0") else []
 
 
 def _step_ups(prepared: PreparedScenario, units: Mapping[str, str]) -> dict[str, str]:
@@ -161,7 +168,7 @@ def own_power(column: str, elements: Elements, prepared: PreparedScenario) -> fl
 
 
 def _generation(factor: float, elements: Elements, prepared: PreparedScenario) -> Setting:
-    plans = {unit: prepared.system.components[unit] for unit in elements.units}
+    plans = {u: prepared.system.components[u] for u in elements.units if u not in elements.balancing}
     return Setting({f"{unit}.P_0": factor * _dispatched(prepared, unit, plan) for unit, plan in plans.items()})
 
 

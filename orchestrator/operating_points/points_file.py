@@ -67,15 +67,19 @@ def folder_of(point: str) -> str:
 
 
 def questions_about(path: Path, prepared: PreparedScenario, elements: Elements) -> Iterator[Problem]:
-    """Questions about the columns of a file that `read_points` has read: powers that look like those in pu."""
+    """Questions about the columns of a file that `read_points` has read: powers that cannot act, or look like pu."""
     rows = rows_of(path, ())
     for column in rows[0]:
-        own = own_power(column, elements, prepared)
-        most = max((abs(float(text)) for row in rows if own and (text := (row[column] or "").strip())), default=0.0)
-        if own and 0 < _ANOTHER_UNIT * most < abs(own):
+        place, own = f"{path}, line 1: column {column!r}", own_power(column, elements, prepared)
+        cells = [text for row in rows if (text := (row[column] or "").strip())]
+        most = max((abs(float(text)) for text in cells if own), default=0.0)
+        if cells and (units := elements.balancing_in(column)):
+            left = f"cannot act on {', '.join(units)}: {elements.slack} is the slack and feeds what is left"
+            yield Problem(place, f"{left}; leave it out, or name another slack in [power_flow]")
+        elif own and 0 < _ANOTHER_UNIT * most < abs(own):
             unit = "MW" if column.endswith(ACTIVE) else "Mvar"
             text = f"at most {most:g} {unit}, where the case itself has {own:.4g} {unit}; are these values in pu?"
-            yield Problem(f"{path}, line 1: column {column!r}", text)
+            yield Problem(place, text)
 
 
 def _reading(path: Path, column: str, elements: Elements, prepared: PreparedScenario) -> Reading:

@@ -78,8 +78,8 @@ class DesignRequest(OfCase):
         python="required increase of the damping, in points and in the place of ``damping``",
     )  # fmt: skip
     delta_gain: float = asked(GAIN, 50.0, "gain of the finite-difference sensitivity [pu] (default: 50)")
-    gain_bounds: tuple[float, float] = asked(
-        GAIN_BOUNDS, (200.0, 400.0), "bounds of the gain [pu] (default: 200:400; with --points 0:400)"
+    gain_bounds: tuple[float, float] | None = asked(
+        GAIN_BOUNDS, None, "bounds of the gain [pu] (default: 200:400, and 0:400 in a search or with --points)"
     )
     stages: int | None = asked(STAGES, None, "lead/lag stages (default: the component's own)")
     compensated_gain: bool = asked(
@@ -88,9 +88,12 @@ class DesignRequest(OfCase):
     least_damping: float = asked(
         DAMPING, 0.05, "damping below which no other mode may be pushed (default: 5)", option="--min-damping"
     )
-    refine: bool = asked(FLAG, False, "search gain and lead/lag on the closed loop as well")
+    refine: bool = asked(FLAG, False, "search gain and lead/lag on the closed loop (without bounds: where needed)")
     margins: bool = asked(FLAG, True, "compute the margins, which take longest", option=None)
     progress: bool = asked(FLAG, False, "show a line with the stage that the design has come to", option=None)
+
+    def bounds(self, *, search: bool) -> tuple[float, float]:
+        return self.gain_bounds or (0.0 if search else 200.0, 400.0)
 
     @property
     def increment(self) -> float:
@@ -135,17 +138,14 @@ class PodDesign:
     gain: float
     designed: Placed
     refinement: Refinement | None
-    # with the design's lead/lag, the smallest gain within the bounds that has the required damping, else that with
-    # most; None where the design has it, or was refined
+    # smallest gain with the design's lead/lag that has the required damping, else that with most; None where refined
     other_gain: Placed | None
     final: Placed  # the closed loop with the final setting: the refined setting, or ``designed`` without refinement
-    # before, after: the other modes without the controller, and with the final setting.
     before: Surroundings
     after: Surroundings
     broken: str | None  # the prohibited effect of the final setting on other modes; empty if there is no such effect
     margins: Margins | None
-    # examined_before, examined: the verdict over the whole spectrum without the controller and with the final setting,
-    # and what it rests on.
+    # examined_before, examined: verdict over the whole spectrum without the controller and with the final setting.
     examined_before: Examination
     examined: Examination
 
@@ -222,7 +222,7 @@ def design_pod(
         fitting = named_modes(rules, model, modes).fits.get(name)  # with a gain of any size, a tie counts as a change
         return None if fitting is None else fitting[0]
 
-    for value, option in ((request.delta_gain, "--delta-gain"), (request.gain_bounds[1], "--gain-bounds")):
+    for value, option in ((request.delta_gain, "--delta-gain"), (request.bounds(search=True)[1], "--gain-bounds")):
         check_range(prepared.system.components, target.components, f"{request.controller}.K", value, option)
     with running(prepared) as master:
         report("operating point")
@@ -308,23 +308,26 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     turned = loop.place(off, request.delta_gain, filters)
     S_turned = leads.sensitivity(turned.eigenvalue, initial, request.delta_gain)
     gains = [leads.required_gain(predicted, initial, abs(value)) for value in (S, S_turned)]
-    gain = leads.bounded(gains[request.compensated_gain], request.gain_bounds)
+    gain = leads.bounded(gains[request.compensated_gain], request.bounds(search=False))
 
     report("closed loop with the design")
     final = designed = loop.place(off, gain, filters)
-    refinement = None
-    if request.refine:
+    refinement, after = None, around(designed)
+    short = damping_ratio(after.counting(designed.eigenvalue)) < required - _MET
+    broken = breach(before, after, request.least_damping)
+    if request.refine or ((short or broken) and request.gain_bounds is None):
         report("refinement")
-        refinement = refine(
-            loop, off, filters, required, request.gain_bounds, judge, settings, evenly=request.mode is None
-        )
+        bounds, evenly = request.bounds(search=True), request.mode is None
+        refinement = refine(loop, off, filters, required, bounds, judge, settings, evenly=evenly)
         final = refinement.chosen or designed
-    after, examined = around(final), loop.examine(final.setting)
+        after = around(final)
+        broken = breach(before, after, request.least_damping)
+    examined = loop.examine(final.setting)
     other_gain = None
-    if refinement is None and damping_ratio(after.counting(final.eigenvalue)) < required - _MET:
+    if refinement is None and short:
         report("other gains")
         with suppress(AnalysisError):  # the mode cannot be followed
-            other_gain = sweep(loop, off, filters, required, request.gain_bounds, "as designed").chosen
+            other_gain = sweep(loop, off, filters, required, request.bounds(search=False), "as designed").chosen
     margins = None
     if request.margins and final.setting.gain and examined.stability.stable is not False:
         report("margins")
@@ -335,7 +338,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         sensitivities=GainSensitivities(bare.eigenvalue, S, S_turned), filters=filters,
         gain_non_compensated=gains[0], gain_compensated=gains[1], gain=gain, designed=designed, refinement=refinement,
         other_gain=other_gain, final=final, before=before, after=after,
-        broken=breach(before, after, request.least_damping) or _unstable(examined.stability), margins=margins,
+        broken=broken or _unstable(examined.stability), margins=margins,
         examined_before=start.examined, examined=examined,
     )  # fmt: skip
 

@@ -8,7 +8,6 @@ import numpy as np
 from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ, Mode, damping_ratio, find_spectrum, to_continuous
 from orchestrator.analysis.stability import fastest_growth
-from orchestrator.arrays import Vector
 
 Naming = Callable[[LinearModel, list[Mode]], Mode | None]
 
@@ -38,10 +37,6 @@ class Surroundings:
     def worst(self) -> Mode | None:
         """The least damped of the other modes; None where there are no others."""
         return self.others[0] if self.others else None
-
-    @property
-    def is_unstable(self) -> bool:
-        return self.growth > 0
 
     def without(self, mode: Mode) -> "Surroundings":
         return replace(self, others=tuple(m for m in self.others if m is not mode))
@@ -79,7 +74,7 @@ def surroundings(model: LinearModel, target: complex | None, naming: Naming) -> 
 def breach(before: Surroundings, after: Surroundings, least: float) -> str | None:
     """The prohibited effect of a design: the system becomes unstable, or a mode falls below the least damping that was
     above it."""
-    if after.is_unstable and after.growth > (1 + _EQUAL) * before.growth:
+    if after.growth > (1 + _EQUAL) * before.growth:
         return f"the system becomes unstable: an eigenvalue has a real part of {after.growth:+.3g} 1/s"
     worst = after.worst
     if worst is None or worst.damping_ratio >= least:
@@ -97,11 +92,7 @@ def extremes(model: LinearModel) -> tuple[complex, complex | None]:
     """The least damped eigenvalue from 0.1 to 2 Hz (−1 if no eigenvalue lies there), and the fastest growing one
     [rad/s]."""
     values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
-    weakest = min(guarded(values[values.imag >= 0]).tolist(), key=damping_ratio, default=complex(-1))
-    return weakest, fastest_growth(values, step_map=model.step_size is not None)
-
-
-def guarded(values: Vector) -> Vector:
-    hertz = values.imag / (2 * np.pi)
     low, high = ELECTROMECHANICAL_HZ
-    return np.asarray(values[(hertz >= low) & (hertz <= high)])
+    hertz = values.imag / (2 * np.pi)
+    weakest = min(values[(hertz >= low) & (hertz <= high)].tolist(), key=damping_ratio, default=complex(-1))
+    return weakest, fastest_growth(values, step_map=model.step_size is not None)

@@ -91,7 +91,7 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
     used = ("", " (not used)") if not d.request.compensated_gain else (" (not used)", "")
     yield "Gain", "K = |λ_d − λ₀|/|Ŝ_NC|", f"{d.gain_non_compensated:.2f} pu{used[0]}"
     yield "Gain with the lead/lag's own sensitivity", "K = |λ_d − λ₀|/|Ŝ|", f"{d.gain_compensated:.2f} pu{used[1]}"
-    low, high = d.request.gain_bounds
+    low, high = d.request.bounds(search=False)
     bound = f"{d.active_bound} bound active" if d.active_bound else "no bound active"
     yield "Gain within its bounds", f"K ∈ [{low:g}, {high:g}] pu", f"{d.gain:.2f} pu ({bound})"
     yield "Closed loop with this design", "eigenvalue of the coupled FMUs", mode_text(d.designed.eigenvalue)
@@ -169,7 +169,7 @@ def verdict(d: PodDesign) -> str:
         if not d.refinement and d.active_bound == "lower":
             text += (
                 f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "
-                f"--gain-bounds 0:{d.request.gain_bounds[1]:g} --refine finds the least gain that meets it"
+                f"--gain-bounds 0:{d.request.bounds(search=True)[1]:g} --refine finds the least gain that meets it"
             )
         return text
     if d.refinement:
@@ -181,15 +181,10 @@ def _other_gain(d: PodDesign) -> str:
     """What another gain does with the design's lead/lag."""
     if d.other_gain is None:
         return "; use --refine"
-    low, high = d.request.gain_bounds
+    low, high = d.request.bounds(search=False)
     gain, there = f"K = {d.other_gain.setting.gain:.4g} pu", percent(d.other_gain.damping_ratio)
     if d.other_gain.damping_ratio >= d.required_damping:
         return f"; {gain} with the same lead/lag has {there}; or use --refine"
-    if d.active_bound == "upper" and d.other_gain.setting.gain == high:
-        return (
-            f"; the upper bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: raise "
-            "--gain-bounds, choose another controller, or see with --refine what is within reach"
-        )
     return (
         f"; with this lead/lag no gain from {low:g} to {high:g} pu has more than {there}, at {gain}: see with --refine "
         "what another one does"
@@ -200,7 +195,7 @@ def _out_of_reach(d: PodDesign, r: Refinement) -> str:
     """Why the sweeps show that the requirement is out of reach."""
     if not r.sweeps:
         return "; the refinement could not follow the mode with any setting within the bounds"
-    low, high = d.request.gain_bounds
+    low, high = d.request.bounds(search=True)
     text = (
         f"; no setting with K from {low:g} to {high:g} pu was found that meets it, of {len(r.sweeps)} lead/lag "
         "settings swept over the gain"

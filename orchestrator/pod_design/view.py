@@ -130,7 +130,7 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         "achieved_mode": _complex(d.achieved),
         "requirement": {
             "damping_ratio": d.required_damping, "increment": d.required_damping - damping_ratio(d.initial),
-            "gain_bounds": list(d.request.gain_bounds), "delta_gain": d.request.delta_gain,
+            "gain_bounds": list(d.request.bounds(search=d.refinement is not None)), "delta_gain": d.request.delta_gain,
             "least_damping_of_others": d.request.least_damping,
         },
         "met": d.met, "verdict": verdict(d), "target_damping_ratio": damping_ratio(d.initial),

@@ -112,7 +112,6 @@ def test_a_damping_of_a_design_is_in_percent(case, name, given, tmp_path):
         ({"gain_bounds": (200, 0)}, "0 ≤ lowest ≤ highest"),
         ({"gain_bounds": (-5, 10)}, "0 ≤ lowest ≤ highest"),
         ({"gain_bounds": (0, float("nan"))}, "0 ≤ lowest ≤ highest"),
-        ({"gain_bounds": None}, "gain_bounds = None; give the lowest"),
         ({"delta_gain": "1"}, "delta_gain = '1'; give a gain above 0 in pu, such as"),
         ({"delta_gain": None}, "delta_gain = None; give a gain"),
         ({"delta_gain": -1.0}, "delta_gain = -1.0; give a gain"),

@@ -181,6 +181,23 @@ def test_powers_that_look_like_pu_are_asked_about(two_area, tmp_path):
         assert all(name in text and "in pu?" in text for name, text in zip(asked, found, strict=True))
 
 
+@pytest.mark.parametrize("column", ["sg2.P_mw", "{slack}.P_mw", "sg[2].P_0"])
+def test_a_power_of_the_slacks_unit_is_asked_about(two_area, tmp_path, column):
+    _, prepared, elements = two_area
+    path = tmp_path / "points.csv"
+    path.write_text(f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,700,900,1\nb,,,1\n")
+    (found,) = [str(one) for one in questions_about(path, prepared, elements)]
+    assert (
+        f"cannot act on {', '.join(elements.balancing)}: {elements.slack} is the slack and feeds what is left" in found
+    )
+    path.write_text("name,sg2.P_mw,generation\na,,0.9\n")
+    assert not [*questions_about(path, prepared, elements)], "an empty column gives no power"
+    (point,) = read_points(path, prepared, elements)
+    assert {name for name in point.values if name.endswith(".P_0")} == {
+        f"{unit}.P_0" for unit in elements.units if unit not in elements.balancing
+    }
+
+
 def test_a_spreadsheets_mark_is_no_part_of_a_name(two_area, tmp_path):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
