@@ -83,19 +83,9 @@ def _print(report: AcceptanceReport) -> None:
         console.print(f"In force around the FMU's process: {', '.join(in_force)}.")
     if lacking := missing(report.protections):
         console.print(f"Not in force on this system: {', '.join(lacking)}.")
-    if report.trusted:
-        left = f"; not judged: {', and '.join(report.not_judged)}" if report.not_judged else ""
-        console.print(f"{escape(report.fmu.name)}: no check failed{left}.")
-    elif not report.failures:
-        console.print(
-            f"[bold yellow]{escape(report.fmu.name)}: not supported here: {', '.join(report.not_supported)}; "
-            "that says nothing about the FMU[/]"
-        )
-    elif report.binding_fails and report.binding is not None:
-        words = f"{report.binding.name}: mend it and check again; nothing is known yet of {report.fmu.name} behind it"
-        console.print(f"[bold red]{escape(words)}[/]")
-    else:
-        console.print(f"[bold red]{escape(report.fmu.name)}: do not use it as it is: {', '.join(report.faults)}[/]")
+    words = escape(f"{report.fmu.name}: {report.sentence}")
+    colour = "" if report.trusted else "bold red" if report.failures else "bold yellow"
+    console.print(words, style=colour)
 
 
 def _in_one_line(text: str) -> str:

@@ -73,7 +73,7 @@ def _wanted(options: argparse.Namespace) -> WantedCase:
     return WantedCase(
         tuple(options.files), out, None if options.converter is None else read_converter(options.converter), device,
         options.binding, options.dll is not None, options.models, options.frequency, options.slack,
-        tuple(options.leave_out), tuple(options.dyr_leave_out),
+        tuple(options.leave_out), tuple(options.dyr_leave_out), options.reactive_limits,
         f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
     )  # fmt: skip
 
