@@ -30,7 +30,7 @@ SLIGHT = 1e-3  # the same below which nothing is said
 _HELD = 5  # how often a device is held again whose omega still moves, as a meter's does that begins elsewhere, or at 1
 
 REMEDIES: dict[str, str] = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
-_OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit")
+_OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit", "no steady state")
 
 
 @dataclass(frozen=True)
