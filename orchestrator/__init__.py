@@ -47,8 +47,8 @@ class _Package(ModuleType):
     def __call__(self, *_: object, **__: object) -> None:
         name = self.__name__.rpartition(".")[2]
         raise AttributeError(
-            f"{name} is no function: it may be a case's method, as in load('two_area').{name}(…), or for the terminal "
-            f"alone, `gfor {name}`; functions: {', '.join(_HOMES)}"
+            f"{name} is no function: it may be a method of a case, `gfor.load('two_area')`, or for the terminal alone, "
+            f"`gfor {name}`; functions: {', '.join(_HOMES)}"
         )
 
 

@@ -79,6 +79,19 @@ class AcceptanceReport:
     def trusted(self) -> bool:
         return not self.failures and not self.not_supported
 
+    @property
+    def sentence(self) -> str:
+        """The verdict; the frequency that it is made for is told where this shows."""
+        if self.trusted:
+            return f"no check failed; not judged: {', and '.join(self.not_judged)}".removesuffix("; not judged: ")
+        if not self.failures:
+            return f"not supported here: {', '.join(self.not_supported)}; that says nothing about the FMU"
+        if self.binding_fails and self.binding is not None:
+            return f"nothing is known yet of it behind {self.binding.name}: mend it and check again"
+        made = next((r for r in self.failures if "made_for_hz" in r.figures), None)
+        hertz = f" (made for {made.figures['made_for_hz']:.4g} Hz): {made.remedy}" if made else ""
+        return f"do not use it as it is: {', '.join(self.faults)}{hertz}"
+
     def as_dict(self) -> dict[str, Any]:
         return {
             "tool": f"gfor-cosim {version('gfor-cosim')}", "fmu": str(self.fmu),

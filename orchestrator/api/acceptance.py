@@ -70,23 +70,13 @@ class Acceptance:
         write_junit(self.report, Path(path))
         return Path(path)
 
-    def _verdict(self) -> str:
-        if self.trusted:
-            left = self.report.not_judged
-            return f"no check failed; not judged: {', and '.join(left)}" if left else "no check failed"
-        if not self.report.failures:
-            return f"not supported here: {', '.join(self.report.not_supported)}"
-        if self.report.binding_fails:
-            return f"the binding is to be mended: {', '.join(self.faults)}"
-        return f"do not use it as it is: {', '.join(self.faults)}"
-
     def __repr__(self) -> str:
-        return f"<Acceptance of {self.report.fmu.name}: {self._verdict()}>"
+        return f"<Acceptance of {self.report.fmu.name}: {self.report.sentence}>"
 
     def _repr_html_(self) -> str:
         from orchestrator.report.notebook import page  # noqa: PLC0415 - imports pandas
 
-        return page(f"{self.report.fmu.name}: {self._verdict()}", table=self.table())
+        return page(f"{self.report.fmu.name}: {self.report.sentence}", table=self.table())
 
 
 def check(

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, cast
 
 from orchestrator.api.linear import LinearSystem
@@ -157,9 +158,9 @@ class Scenario:
         return self.prepared.title
 
     @property
-    def values(self) -> dict[str, float | bool]:
+    def values(self) -> Mapping[str, float | bool]:
         """Every value that the case, its parameter files or the caller set, by ``component.variable``."""
-        return dict(self.prepared.values)
+        return MappingProxyType(dict(self.prepared.values))
 
     def parameters(self) -> pd.DataFrame:
         """Every parameter of every component by ``component.variable``, as ``values`` and ``--set`` take it.

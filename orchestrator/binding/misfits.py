@@ -25,11 +25,12 @@ axis, gives up to 1.7 at the grid's side of its filter. More must be declared (`
 """
 
 FREQUENCY_APART = 0.02  # deviation of omega at rest from 1 above which a device is made for another frequency
+_HIGHEST = 400.0  # rated frequency of a device [Hz]
 SLIGHT = 1e-3  # the same below which nothing is said
 _HELD = 5  # how often a device is held again whose omega still moves, as a meter's does that begins elsewhere, or at 1
 
 REMEDIES: dict[str, str] = tomllib.loads(Path(__file__).with_name("remedies.toml").read_text(encoding="utf-8"))
-_OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit")
+_OF_RATING = ("wrong base", "power not as asked", "above its current limit", "no current limit", "no steady state")
 
 
 @dataclass(frozen=True)
@@ -69,8 +70,15 @@ def of_frequency(omega: float, f_n: float | None) -> Misfit | None:
     """By what it shows at rest [pu]; ``f_n`` is what is bound, where something is [Hz]."""
     if not abs(omega - 1) > FREQUENCY_APART:
         return None
-    known = f", so it is made for {omega * f_n:.4g} Hz where {f_n:g} Hz is bound" if f_n else ""
-    return Misfit("wrong rated frequency", omega_seen(omega) + known, {"omega": omega})
+    return made_for(omega_seen(omega), omega, f_n, {"omega": omega})
+
+
+def made_for(says: str, part: float, f_n: float | None, figures: Mapping[str, float]) -> Misfit:
+    """By the part [pu, ``f_n``] that shows of its own frequency."""
+    if not f_n or part * f_n > _HIGHEST:
+        return Misfit("wrong rated frequency", says, figures)
+    says += f", so it is made for {part * f_n:.4g} Hz where {f_n:g} Hz is bound"
+    return Misfit("wrong rated frequency", says, {**figures, "made_for_hz": part * f_n})
 
 
 def of_power(asked: complex, found: complex) -> Misfit | None:

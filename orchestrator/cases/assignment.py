@@ -140,7 +140,8 @@ def _check_component(draft: Draft, pattern: str, where: str) -> None:
     if not fnmatch.filter(draft.known, pattern):
         some = ", ".join([*draft.given.case.components, *draft.origins][:12])
         own = {name: plan.description.variables for name, plan in draft.system.components.items()}
-        draft.note(where, f"there is no component {pattern!r}; the case has: {some}{whose(pattern, own)}")
+        hint = f"; the network's are {draft.grid}.…" if pattern == "network" else whose(pattern, own)
+        draft.note(where, f"there is no component {pattern!r}; the case has: {some}{hint}")
 
 
 def _assign(draft: Draft, name: str, variable: str, value: Value, where: str) -> None:

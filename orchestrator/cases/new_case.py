@@ -66,6 +66,7 @@ class WantedCase:
     slack: str | None = None
     leave_out: tuple[str, ...] = ()
     dyr_leave_out: tuple[str, ...] = ()
+    reactive_limits: bool = False
     command: str = "gfor new"
 
     @property
@@ -340,7 +341,7 @@ class _Text:
             step=steps[kind],
             record=', "grid.line_*.p"' * lines + ', "gfor.*"' * (place is not None),
             other=rest + stray[other] if w.device is None else "",
-            slack=f"\nslack = {_quoted(w.slack)}" if w.slack else "",
+            slack=(f"\nslack = {_quoted(w.slack)}" if w.slack else "") + "\nreactive_limits = true" * w.reactive_limits,
             grid="grid" if kind == "emt" else "phasor_grid",
             network=self._tables() or f"{key} = {self._path(self._sources[key])}" + kept * (key == "raw"),
             loads="" if self._tables() else "# ",

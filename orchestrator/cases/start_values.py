@@ -158,7 +158,9 @@ def _start_unit(name: str, plan: ComponentPlan, voltage: complex, power: complex
     for variable in ("P_0", "Q_0"):
         most = plan.description.variables[variable].maximum
         if most is not None and abs(start[variable]) > most:
-            kept = ", or keep its limits with reactive_limits = true in [power_flow]" * (variable == "Q_0")
+            kept = ", or keep its limits ([power_flow] reactive_limits, gfor new --reactive-limits)" * (
+                variable == "Q_0"
+            )
             raise InputError(
                 f"{name} would have to feed {variable} = {start[variable]:.4g} pu of its rating, more than {most:g}; "
                 f"raise its S_n, or move load and generation{kept}",

@@ -11,7 +11,6 @@ from orchestrator.acceptance.runner import AcceptanceReport
 from orchestrator.api.acceptance import check
 from orchestrator.cli.arguments import add_kept_argument, add_options
 from orchestrator.cli.terminal import keep_json, print_json
-from orchestrator.errors import InputError
 from orchestrator.fmi.protection import missing
 
 _COLOURS = {
@@ -29,10 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Check, print, and write what is asked for; 1 if a check failed, 2 if the FMU is not supported here."""
-    if options.component and not options.case:
-        raise InputError("--component names a component of a case; give --case as well")
-    if options.scenario and not options.case:
-        raise InputError("--scenario names a scenario of a case; give --case as well")
     found = check(
         options.file, options.binding, step=options.step, only=options.only, case=options.case or None,
         component=options.component, scenario=options.scenario, seed=options.seed, frequency=options.frequency,
@@ -76,26 +71,14 @@ def _print(report: AcceptanceReport) -> None:
         if result.remedy and result.remedy not in advised:
             console.print(f"{'':<38}[dim]{escape(result.remedy)}[/]")
             advised.add(result.remedy)
-    console.print("")
-    console.print(f"Dips, jumps and points were drawn at random; --seed {report.seed} draws the same ones again.")
+    console.print(f"\nDips, jumps and points were drawn at random; --seed {report.seed} draws the same ones again.")
     if report.protections:
         in_force = [protection.name for protection in report.protections if protection.in_force]
         console.print(f"In force around the FMU's process: {', '.join(in_force)}.")
     if lacking := missing(report.protections):
         console.print(f"Not in force on this system: {', '.join(lacking)}.")
-    if report.trusted:
-        left = f"; not judged: {', and '.join(report.not_judged)}" if report.not_judged else ""
-        console.print(f"{escape(report.fmu.name)}: no check failed{left}.")
-    elif not report.failures:
-        console.print(
-            f"[bold yellow]{escape(report.fmu.name)}: not supported here: {', '.join(report.not_supported)}; "
-            "that says nothing about the FMU[/]"
-        )
-    elif report.binding_fails and report.binding is not None:
-        words = f"{report.binding.name}: mend it and check again; nothing is known yet of {report.fmu.name} behind it"
-        console.print(f"[bold red]{escape(words)}[/]")
-    else:
-        console.print(f"[bold red]{escape(report.fmu.name)}: do not use it as it is: {', '.join(report.faults)}[/]")
+    colour = "" if report.trusted else "bold red" if report.failures else "bold yellow"
+    console.print(escape(f"{report.fmu.name}: {report.sentence}"), style=colour)
 
 
 def _in_one_line(text: str) -> str:

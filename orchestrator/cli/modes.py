@@ -71,12 +71,12 @@ def _compute(
     else:
         prepared = [scenario.prepared for scenario in scenarios]
         results = compute_all_modes(prepared, request.frequencies, request.critical, directional=request.directional)
+    weights = [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
     written = []
     if folder:
         from orchestrator.study.files import write_modes  # noqa: PLC0415 - plots: a second to import
 
-        written = write_modes(results, folder)
-    weights = [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
+        written = write_modes(results, folder, weights)
     if options.json:
         terminal.print_json(modes_json(results, weights, [*beside.told(results)]))
         return exit_code(options, [r.stability for r in results])

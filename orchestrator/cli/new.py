@@ -40,11 +40,9 @@ def run(options: argparse.Namespace) -> int:
     except ResultsError as error:
         raise InputError(f"--out {error}") from error
     console = make_console()
-    console.print(
-        escape(f"{wanted.out}: scenarios {', '.join(p.name for p in made.scenarios)}. Assumed:"), highlight=False
-    )
-    for line in made.assumed:
-        console.print(escape(f"- {line}"), soft_wrap=True, highlight=False)
+    names = ", ".join(prepared.name for prepared in made.scenarios)
+    for line in (f"{wanted.out}: scenarios {names}. Assumed:", *(f"- {line}" for line in made.assumed)):
+        console.print(escape(line), soft_wrap=True, highlight=False)
     for prepared in made.scenarios:
         if prepared.name in ("base", "converter"):
             running(in_service(prepared)).close()  # what cannot start is told at once
@@ -72,7 +70,7 @@ def _wanted(options: argparse.Namespace) -> WantedCase:
     return WantedCase(
         tuple(options.files), out, None if options.converter is None else read_converter(options.converter), device,
         options.binding, options.dll is not None, options.models, options.frequency, options.slack,
-        tuple(options.leave_out), tuple(options.dyr_leave_out),
+        tuple(options.leave_out), tuple(options.dyr_leave_out), options.reactive_limits,
         f"gfor {shlex.join(sys.argv[1:])}" if sys.argv[1:2] == ["new"] else "gfor new",
     )  # fmt: skip
 

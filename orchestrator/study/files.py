@@ -60,11 +60,11 @@ def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
     return plots
 
 
-def write_modes(results: Sequence[ModesResult], folder: Path) -> list[str]:
+def write_modes(results: Sequence[ModesResult], folder: Path, weights: Sequence[str] = ()) -> list[str]:
     """Write what ``gfor modes --out`` leaves, all of it at once; return the files' names."""
     with staged(folder, new_run_id()) as staging:
         plots = [path.name for path in save_modes(results, staging)]
-        save_json(modes_json(results, beside=[*beside.told(results)]), staging / "modes.json")
+        save_json(modes_json(results, weights, [*beside.told(results)]), staging / "modes.json")
         flows = sorted(path.name for path in staging.glob("power_flow_*.csv"))
     return ["modes.csv", "participation.csv", "mode_shapes.csv", "modes.json", *flows, *plots]
 

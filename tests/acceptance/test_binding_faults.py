@@ -41,7 +41,7 @@ def test_what_is_missing_in_the_binding_is_not_the_fmus_fault(old, new, place, c
     assert place in printed
     assert "\\n" not in printed
     assert "modelDescription.xml" not in printed
-    assert "mine.toml: mend it and check again" in printed
+    assert "behind mine.toml: mend it and check again" in printed
     assert "do not use it" not in printed
 
 

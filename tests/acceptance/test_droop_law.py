@@ -77,5 +77,5 @@ def test_a_constant_torque_gives_less_power_at_less_frequency(P, falls, said):
 )  # fmt: skip
 def test_an_omega_of_another_rated_frequency_is_told_as_such(part, said):
     ways = tuple(Way(0j, 0.0, 0.05, 1 - sign * part * FREQUENCY, 0.0, (0.0, 0.0, 0)) for sign in (1, -1))
-    found = signs._wrong_omega(DroopAnswer(0.05, 0.05, 0.05, 0.0, 0.05, ways))
-    assert (found[0] if found else "") == said
+    found = signs._wrong_omega(DroopAnswer(0.05, 0.05, 0.05, 0.0, 0.05, ways), 50.0)
+    assert (found.fault if found else "") == said

@@ -117,6 +117,14 @@ def test_the_verdict_says_what_happened(name, only, words, gallery):
     assert words in found.failures[0].evidence
 
 
+def test_the_frequency_that_a_device_is_made_for_is_in_the_verdict(tmp_path):
+    """Its omega is 1 at rest, and shows it only where the network's frequency moves."""
+    file = build(converter("of_sixty", NOMINAL=60.0), tmp_path)
+    found = check_fmu(file, None, LIMITS, ("rated_frequency", "signs"), run_for=0.3)
+    assert found.results[-1].figures["made_for_hz"] == pytest.approx(60, abs=0.01)
+    assert "wrong rated frequency (made for 60 Hz): give" in found.sentence
+
+
 def test_a_crash_is_told_with_the_checks_that_led_to_it(tmp_path):
     """As an export whose heap is damaged by an earlier call, and which dies in a later instance."""
     lag = small("damaged_by_reset", "LAG", LAG, step_size="1e-3", stop_time="2")

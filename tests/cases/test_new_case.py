@@ -125,6 +125,20 @@ def test_a_case_that_cannot_start_is_said_at_once(gfor, files):
     assert (files[0].parent / "case.toml").exists()
 
 
+def test_limits_of_reactive_power_are_kept_where_asked(gfor, files):
+    text = files[0].read_text(encoding="utf-8")
+    files[0].write_text(text.replace(",300,-300,", ",20,-20,"), encoding="utf-8")
+    out = files[0].parent / "case.toml"
+    flows = []
+    for more in ([], ["--reactive-limits", "--force"]):
+        assert gfor(*files, "--out", out, *more)[0] == 0
+        flows.append(load_case(out).prepare(["base"])[0].power_flow)
+    assert [bool(flow.at_limits) for flow in flows] == [False, True]
+    most = [max(flow.powers[f"sg{n}"].imag * RATINGS[n] for n in range(1, 5)) for flow in flows]
+    assert most[0] > 21
+    assert most[1] == pytest.approx(20)
+
+
 def test_emt_models_come_from_the_same_file(files):
     case, _ = made(files)
     emt = case._of_kind({"models": "emt"}, ()).table

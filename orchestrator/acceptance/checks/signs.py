@@ -13,7 +13,7 @@ from orchestrator.acceptance.checks.port import WHY, cannot_import, of_current
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Complex, Numbers
-from orchestrator.binding.misfits import SLIGHT, at_rest, of_frequency, omega_seen
+from orchestrator.binding.misfits import SLIGHT, Misfit, at_rest, made_for, of_frequency, omega_seen
 from orchestrator.errors import ComponentError
 from orchestrator.fmi.port import BoundDescription
 
@@ -158,6 +158,9 @@ def _at(subject: Subject, steps: int, point: OperatingAt) -> CheckResult:
     if not np.isfinite([voltage.far, frequency.far]).all():
         return failed("signs", "not a number", "its power is no number after small changes, and fmi2DoStep returned OK")
     wrong, unknown = _wrong(point, voltage, frequency), ""
+    if not wrong and (misfit := _wrong_omega(frequency, _rated(subject))):
+        wrong = misfit.fault, misfit.evidence
+        figures |= misfit.figures
     if not wrong:
         wrong, unknown = _wrong_droop(subject, steps, point, voltage, frequency)
     said = f"{_said(point, voltage, frequency)}, {steps * subject.step_size:.2g} s later"
@@ -272,7 +275,7 @@ def _wrong(point: OperatingAt, voltage: droops.DroopAnswer, frequency: droops.Dr
             return "wrong sign", f"its reactive power changes by {by_voltage.power.imag:+.3g} pu with {word} voltage"
         if _rests(by_frequency) and sign * by_frequency.power.real < -_EACH:
             return "wrong sign", f"its active power changes by {by_frequency.power.real:+.3g} pu with {word} frequency"
-    return _wrong_omega(frequency)
+    return None
 
 
 def _least(point: OperatingAt) -> float:
@@ -296,7 +299,7 @@ def _lost(*answers: droops.DroopAnswer) -> str:
     return ""
 
 
-def _wrong_omega(frequency: droops.DroopAnswer) -> tuple[str, str] | None:
+def _wrong_omega(frequency: droops.DroopAnswer, f_n: float) -> Misfit | None:
     """In synchronism its frequency is the network's, which the changes moved."""
     for sign, way in zip(_SIGNS, frequency.ways, strict=True):
         if way.omega is None or not _rests(way) or way.omega_moving > _OMEGA_APART / 10:
@@ -305,9 +308,10 @@ def _wrong_omega(frequency: droops.DroopAnswer) -> tuple[str, str] | None:
         part = (way.omega - 1) / (network - 1)
         if min(abs(part - 1.2), abs(1 / part - 1.2) if part else 1.0) < _OTHER_F_N:
             says = f"omega moves by {part:.4g} times what the network's frequency does"
-            return "wrong rated frequency", f"{says}, so it is made for {1 / part:.4g} times the f_n that is bound"
+            return made_for(says, 1 / part, f_n, {})
         if abs(way.omega - network) > _OMEGA_APART:
-            return "wrong frequency", f"omega settles at {way.omega:.6g} where the network's frequency is {network:.6g}"
+            says = f"omega settles at {way.omega:.6g} where the network's frequency is {network:.6g}"
+            return Misfit("wrong frequency", says)
     return None
 
 

@@ -57,8 +57,7 @@ def chapters_of(place: Path) -> list[Chapter]:
             content = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             if file == place:
-                text = f"{file}: it cannot be read as JSON ({error}): give a study's folder or .json"
-                raise InputError(text) from error
+                raise InputError(f"{file}: it is no study's result; give a study's folder or .json") from error
             continue  # somebody else's
         keys = set(content) if isinstance(content, dict) else set(content[0]) if content and content[0] else set()
         for wanted, make in _KINDS:

@@ -344,7 +344,9 @@ def test_the_question_tells_what_the_load_model_moves_and_facts_come_first(quest
     )
     assert "voltages 0.953 to 1.03 pu" in out.splitlines()[0]
     told = next(line for line in err.splitlines() if "moves the least damped mode" in line)
-    found = json.loads(gfor("modes", tmp_path / "case.toml", "--json")[1])
+    found = json.loads(gfor("modes", tmp_path / "case.toml", "--json", "--out", tmp_path / "m")[1])
+    written = json.loads((tmp_path / "m" / "modes.json").read_text(encoding="utf-8"))
+    assert found["questions"] == written["questions"]
     assert told.removeprefix("question: ") in found["questions"]
     assert found["facts"] == out.splitlines()[0]
     questions(case=CASE.replace("keep_load_parts = true\n", ""))
