@@ -35,10 +35,12 @@ class Admittance:
         Where the device can feed an oscillation.
     rest
         Voltage at the port around which it was measured [pu].
+    rated_hz
+        Rated frequency of the device [Hz].
     """
 
-    def __init__(self, response: Any, rest: complex) -> None:
-        self.response, self.rest = response, rest
+    def __init__(self, response: Any, rest: complex, rated_hz: float = 50.0) -> None:
+        self.response, self.rest, self.rated_hz = response, rest, rated_hz
         self.model, self.passivity = fit(response), passivity(response)
 
     def as_json(self) -> dict[str, Any]:
@@ -119,4 +121,5 @@ def admittance(
     check_port(description, bench)
     excited = Excitation(method, low, high)
     excited = excited if amplitude is None else replace(excited, amplitude=amplitude)
-    return Admittance(measure(bench, excited, report), rest)
+    rated = float(given.get("f_n", start_of(description, "f_n"))) or 50.0
+    return Admittance(measure(bench, excited, report), rest, rated)

@@ -1,6 +1,7 @@
 """Whether a device is stable at a network, by the generalised Nyquist criterion."""
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -124,6 +125,8 @@ class Asked:
         network: Path | PreparedScenario | None = None if self._rest.get("scr") is not None else Path(self._case)
         network = self._prepared(of_case) if self._of_case else network
         of_fmu = {name: v for name, v in values.items() if name not in of_case}
+        if of_fmu and self._device and self._device.suffix.lower() in ENDINGS:
+            raise InputError(f"{self._device}: a scan has no {next(iter(of_fmu))} to be set; give the FMU itself")
         return CutRequest(self._device, network, values=of_fmu, **self._rest)
 
     def _prepared(self, values: Mapping[str, Any]) -> PreparedScenario:
@@ -133,6 +136,14 @@ class Asked:
 
         asked, names = ScenariosRequest(values=case_values(values)), [self._scenario] if self._scenario else []
         return choose(replace(load_case(self._case, trust_fmus=self._trust), scans=True), names, asked)[0].prepared
+
+    def at(self, point: Mapping[str, Any]) -> "Asked":
+        """The same with other values; ``device`` among them is the file of another scan of the device."""
+        found, values = copy(self), dict(point)
+        if self._device is not None and (other := values.pop("device", None)) is not None:
+            found._device = Path(other)
+        found._given = self._given | values
+        return found
 
     def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
         """Judge it."""

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from rich.markup import escape
 
@@ -9,9 +10,11 @@ from orchestrator.api.nyquist import Asked
 from orchestrator.asked import read_part
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.cli.arguments import add_options
+from orchestrator.cli.by_point import by_point
 from orchestrator.cli.terminal import make_console, print_json, print_parts, said_stages, say
 from orchestrator.errors import NOT_MET, InputError
-from orchestrator.immittance.view import GOAL, parts
+from orchestrator.immittance.margins import margins_json
+from orchestrator.immittance.view import GOAL, Nyquist, parts
 from orchestrator.results.staging import new_run_id, staged
 from orchestrator.safe_files import made_folder
 
@@ -36,6 +39,18 @@ def run(options: argparse.Namespace) -> int:
         excitation=Excitation(lowest_hz=options.from_hz, highest_hz=options.to_hz, lines=160),
     )  # fmt: skip
     folder = made_folder(options.out or Path("results") / f"nyquist_{Path(options.device).stem}", "--out")
+    if options.points:
+        rows = by_point(options, folder, lambda values, place: _row(_judged(options, asked.at(values), place)))
+        return NOT_MET if options.fail_unstable and any(row.get("verdict") != "stable" for row in rows) else 0
+    found = _judged(options, asked, folder)
+    if options.json:
+        print_json(found.as_json())
+    else:
+        print_parts(make_console(), [*parts(found), escape(f"Results in {folder}")])
+    return NOT_MET if options.fail_unstable and found.verdict != "stable" else 0
+
+
+def _judged(options: argparse.Namespace, asked: Asked, folder: Path) -> Nyquist:
     with said_stages() as report:
         found = asked.judged(report)
         say("question", found.result.questions)
@@ -43,8 +58,12 @@ def run(options: argparse.Namespace) -> int:
             found.retune(options.parameter, distance=options.distance or GOAL, report=report)
     with staged(folder, new_run_id()) as staging:
         found.save(staging)
-    if options.json:
-        print_json(found.as_json())
-    else:
-        print_parts(make_console(), [*parts(found), escape(f"Results in {folder}")])
-    return NOT_MET if options.fail_unstable and found.verdict != "stable" else 0
+    return found
+
+
+def _row(found: Nyquist) -> dict[str, Any]:
+    m, result = margins_json(found.result.margins), found.result
+    told = {key: (m[key] or {}).get("value") for key in ("distance", "gain", "phase_deg", "delay_s")}
+    at = {"at_hz": (m["distance"] or {}).get("frequency_hz")}
+    ratios = {"scr": result.scr, "lost_below_scr": result.scr_limit}
+    return {"verdict": found.verdict} | at | told | ratios | {"remark": "; ".join(found.reasons)}

@@ -17,6 +17,7 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import InputError
+from orchestrator.immittance.forms import from_sequences
 from orchestrator.immittance.scan import SIEMENS, PortPoint, Scan, checked, in_own_form, other_q_axis
 from orchestrator.safe_files import write_text
 
@@ -122,7 +123,6 @@ def write_ztool(scan: Scan, path: Path) -> None:
 
 
 _ELEMENTS = ("11", "12", "21", "22")
-_SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
 
 
 def is_imtb(first_line: str) -> bool:
@@ -140,7 +140,7 @@ def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     frequencies, Z = _numbers(path, rows, f"{wanted[0]}_{frame}")
     if frame == "ab":
         frequencies = frequencies - rated_hz
-        Z = np.linalg.inv(_SEQUENCES) @ Z @ _SEQUENCES
+        Z = from_sequences(Z)
     kept = frequencies > 0
     frequencies, Z = frequencies[kept], Z[kept]
     questions = checked(path.name, frequencies, Z)

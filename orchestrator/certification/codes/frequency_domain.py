@@ -12,52 +12,34 @@ from orchestrator.arrays import Complex, Numbers
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
-from orchestrator.cases.values import convert
+from orchestrator.black_box.port import check_port, values_for
 from orchestrator.certification.codes.bench_point import STEP
 from orchestrator.certification.codes.programme import RATING_MVA, jumps
 from orchestrator.certification.request import CertificationRequest
-from orchestrator.errors import InputError
-from orchestrator.fmi.description import FmuDescription
+from orchestrator.immittance.forms import powers_over, rows_of
 from orchestrator.report.plot_style import STYLE, colour, save_figure
 from orchestrator.results.storage import save_json, save_table
 
 
 @dataclass(frozen=True)
 class Stiffness:
-    """Powers that a device feeds in, over changes of the voltage at its terminals."""
+    """Powers that a device feeds in, over changes of the voltage at its terminals, at frequencies [Hz]."""
 
-    frequencies: Numbers  # of the change [Hz], shape (f,)
-    # p_theta, q_v: P over the angle [pu/rad], and Q over the relative change of the magnitude [pu], shape (f,)
-    p_theta: Complex
-    q_v: Complex
-    # p_v, q_theta: the same crosswise [pu, pu/rad], shape (f,)
-    p_v: Complex
-    q_theta: Complex
-    p_omega: Complex  # P over the frequency of the voltage [pu/pu], shape (f,)
+    frequencies: Numbers
+    powers: dict[str, Complex]  # as of `powers_over`
 
-    def least(self, values: Complex, low: float, high: float) -> tuple[float, float]:
+    def least(self, name: str, low: float, high: float) -> tuple[float, float]:
         """Least size of one of them in a band, and its frequency [Hz]."""
         inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
         if not len(inside):
             raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
-        at = inside[int(np.argmin(np.abs(values[inside])))]
-        return float(abs(values[at])), float(self.frequencies[at])
+        sizes = np.abs(self.powers[name][inside])
+        return float(sizes.min()), float(self.frequencies[inside[int(np.argmin(sizes))]])
 
 
-def stiffness(response: FrequencyResponse, voltage: complex, omega_b: float) -> Stiffness:
-    """Change the basis of a measured response.
-
-    With S = v·i* and i = Y·v in real and imaginary parts, a change dv gives dS = dv·i* + v·(Y·dv)*. A change of the
-    angle is dv = j·v·dθ, one of the magnitude dv = v·dV/V."""
-    Y = response.continuous()
-    current = complex(*response.operating_point)
-    by_voltage = np.array([[current.real, current.imag], [-current.imag, current.real]])
-    by_current = np.array([[voltage.real, voltage.imag], [voltage.imag, -voltage.real]])
-    powers = by_voltage + by_current @ Y
-    turned, longer = (np.array([change.real, change.imag]) for change in (1j * voltage, voltage))
-    (p_theta, q_theta), (p_v, q_v) = (powers @ turned).T, (powers @ longer).T
-    p_omega = p_theta * omega_b / (2j * np.pi * response.frequencies)
-    return Stiffness(response.frequencies, p_theta, q_v, p_v, q_theta, p_omega)
+def stiffness(response: FrequencyResponse, voltage: complex, f_n: float) -> Stiffness:
+    f, Y, current = response.frequencies, response.continuous(), complex(*response.operating_point)
+    return Stiffness(f, powers_over(f, Y, voltage, current, f_n))
 
 
 FIGURES_CSV, FIGURES_JSON, FIGURES_PNG = "frequency.csv", "frequency.json", "frequency.png"
@@ -108,40 +90,27 @@ def asked_stiffness(found: Stiffness, f_n: float) -> AskedStiffness:
     Z = jumps(SCR, POWER, ()).impedance
     asked = 1 / (JUMP / OPPOSED - abs(Z) ** 2 / Z.imag)
     band = (f_n / (2 * np.pi), float(np.log(10) / (2 * np.pi * LONGEST)))
-    return AskedStiffness(float(asked), band, *found.least(found.p_theta, *band))
+    return AskedStiffness(float(asked), band, *found.least("P/theta", *band))
 
 
 def measure_stiffness(request: CertificationRequest, f_n: float, report: Callable[[str], None]) -> Stiffness:
     """Measure a converter at an ideal bus, at half of its rating and 1 pu."""
     description = bound_fmu(request.fmu, request.binding)
-    values = _values(description, request, f_n)
+    given = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
+    known = {name: value for name, value in given.items() if name in description.variables}
+    values = values_for(description, known | dict(request.values))
     rest = cmath.rect(float(values.get("v_0", 1.0)), float(values.get("theta_0", 0.0)))
     bench = Bench(description, values, np.array([rest.real, rest.imag]), step_size=STEP)
-    if missing := [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]:
-        raise InputError(f"{request.fmu}: it has no {', '.join(missing)}; map its variables to our port with --binding")
-    return stiffness(measure(bench, EXCITATION, report), rest, 2 * np.pi * f_n)
-
-
-def _values(description: FmuDescription, request: CertificationRequest, f_n: float) -> dict[str, float | bool]:
-    given: dict[str, Any] = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
-    wanted = {name: value for name, value in given.items() if name in description.variables} | dict(request.values)
-    values = {}
-    for name, value in wanted.items():
-        if name not in description.variables:
-            raise InputError(f"--set {name}: {request.fmu} has no such variable; `gfor fmu info` lists them")
-        try:
-            values[name] = convert(description.variables[name], value)
-        except ValueError as error:
-            raise InputError(f"--set {name}: {error}") from error
-    return values
+    check_port(description, bench)
+    return stiffness(measure(bench, EXCITATION, report), rest, f_n)
 
 
 def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, Any]:
     least = {
-        name: dict(zip(("value", "at_hz"), found.least(values, *BAND), strict=True))
-        for name, values in (("P/theta [pu/rad]", found.p_theta), ("Q/V [pu/pu]", found.q_v))
+        f"{name} [{unit}]": dict(zip(("value", "at_hz"), found.least(name, *BAND), strict=True))
+        for name, unit in (("P/theta", "pu/rad"), ("Q/V", "pu/pu"))
     }
-    slow, asked = found.p_omega[0], asked_stiffness(found, f_n)
+    slow, asked = found.powers["P/omega"][0], asked_stiffness(found, f_n)
     return {
         "code": "gb", "model": model, "verdict": None, "sentence": NO_VERDICT, "band_hz": list(BAND), "least": least,
         "slow": {"name": "P/omega [pu/pu]", "real": float(slow.real), "imag": float(slow.imag),
@@ -159,14 +128,7 @@ def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
 
 def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> list[Path]:
     table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
-    rows = []
-    for k, f in enumerate(found.frequencies.tolist()):
-        row = {"frequency [Hz]": f}
-        for name, values in (("P/omega", found.p_omega), ("P/theta", found.p_theta), ("Q/V", found.q_v),
-                             ("P/V", found.p_v), ("Q/theta", found.q_theta)):  # fmt: skip
-            row[f"re {name}"], row[f"im {name}"] = float(values[k].real), float(values[k].imag)
-        rows.append(row)
-    save_table(rows, table)
+    save_table(rows_of(found.frequencies, found.powers), table)
     save_json(figures_of_stiffness(found, model, f_n), figures)
     _plot(found, asked_stiffness(found, f_n), picture)
     return [table, figures, picture]
@@ -179,13 +141,13 @@ def _plot(found: Stiffness, asked: AskedStiffness, path: Path) -> None:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 6.4), layout="constrained")
         size, phase, stiff = figure.subplots(3, 1, sharex=True)
-        size.plot(found.frequencies, np.abs(found.p_omega), ".-", ms=3, color=colour(0))
+        size.plot(found.frequencies, np.abs(found.powers["P/omega"]), ".-", ms=3, color=colour(0))
         size.set(xscale="log", yscale="log", ylabel="|P/ω| [pu/pu]")
         size.set_title("Network frequency perturbation, no verdict", loc="left")
-        phase.plot(found.frequencies, np.rad2deg(np.angle(found.p_omega)), ".-", ms=3, color=colour(0))
+        phase.plot(found.frequencies, np.rad2deg(np.angle(found.powers["P/omega"])), ".-", ms=3, color=colour(0))
         phase.set_ylabel("Phase of P/ω [°]")
-        for k, (name, values) in enumerate((("|P/θ| [pu/rad]", found.p_theta), ("|Q/V| [pu/pu]", found.q_v))):
-            stiff.plot(found.frequencies, np.abs(values), ".-", ms=3, color=colour(k), label=name)
+        for k, (name, key) in enumerate((("|P/θ| [pu/rad]", "P/theta"), ("|Q/V| [pu/pu]", "Q/V"))):
+            stiff.plot(found.frequencies, np.abs(found.powers[key]), ".-", ms=3, color=colour(k), label=name)
         stiff.axvspan(*BAND, color="0.9", zorder=0)
         stiff.plot(asked.band, [asked.value] * 2, color="0.3", ls="--", label="asked by 0.2 pu for 10° at SCR 3")
         stiff.set(yscale="log", ylabel="Stiffness", xlabel="Frequency of the change [Hz]")
