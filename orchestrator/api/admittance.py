@@ -1,21 +1,17 @@
 """A device that is known through FMI alone, measured at its port."""
 
-import cmath
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from orchestrator.asked import frequency_range
 from orchestrator.asked import path as path_of
 from orchestrator.binding.binding import bound_fmu
-from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.files import identification_json, save_identification
 from orchestrator.black_box.fitting import fit, passivity, require_fitting
 from orchestrator.black_box.frequency_response import METHODS, Excitation, measure
-from orchestrator.black_box.port import check_port, start_of, values_for
+from orchestrator.black_box.port import bench_at, start_of
 from orchestrator.cases.given import Time, binding_path, in_seconds, plain
 from orchestrator.errors import InputError
 from orchestrator.results.staging import new_run_id, staged
@@ -111,15 +107,8 @@ def admittance(
         raise InputError(f"frequencies = {frequencies!r}; the lowest must be above 0 Hz, such as 0.05")
     require_fitting()
     description = bound_fmu(path_of(fmu, "fmu"), binding_path(binding))
-    given = values_for(description, plain(values))
-    magnitude, angle = (float(given.get(name, start_of(description, name))) for name in ("v_0", "theta_0"))
-    rest = cmath.rect(magnitude, angle)
-    bench = Bench(
-        description, given, np.array([rest.real, rest.imag]), step_size=in_seconds(step, "step") or 1e-4,
-        restore=None if use_state else False,
-    )  # fmt: skip
-    check_port(description, bench)
+    bench = bench_at(description, plain(values), in_seconds(step, "step") or 1e-4, restore=None if use_state else False)
     excited = Excitation(method, low, high)
     excited = excited if amplitude is None else replace(excited, amplitude=amplitude)
-    rated = float(given.get("f_n", start_of(description, "f_n"))) or 50.0
-    return Admittance(measure(bench, excited, report), rest, rated)
+    rated = float(bench.parameters.get("f_n", start_of(description, "f_n"))) or 50.0
+    return Admittance(measure(bench, excited, report), complex(*bench.rest), rated)

@@ -142,6 +142,12 @@ def _realisation(poles: Complex, residues: Complex, largest: float) -> tuple[Mat
     return A, np.concatenate([b for _, b, _ in parts]), np.concatenate([c for _, _, c in parts], axis=1)
 
 
+def bands_of(f: Numbers, inside: Numbers) -> list[tuple[float, float]]:
+    """First and last frequency of each stretch that lies inside."""
+    edges = np.flatnonzero(np.diff(np.r_[False, inside, False].astype(int)))
+    return [(float(f[a]), float(f[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
 @dataclass(frozen=True)
 class Passivity:
     """Whether a device with the admittance Y = −i/v, currents counted into it, can drive an oscillation.
@@ -157,13 +163,7 @@ class Passivity:
 
     def ranges(self) -> list[tuple[float, float]]:
         """Ranges of measured frequencies [Hz] in which the index is negative beyond its bound."""
-        found: list[tuple[float, float]] = []
-        before = False
-        for f, active in zip(self.frequencies.tolist(), (self.index < -self.bounds).tolist(), strict=True):
-            if active:
-                found = [*found[:-1], (found[-1][0], f)] if before else [*found, (f, f)]
-            before = active
-        return found
+        return bands_of(self.frequencies, self.index < -self.bounds)
 
 
 def passivity(response: FrequencyResponse) -> Passivity:

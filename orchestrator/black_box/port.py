@@ -1,7 +1,10 @@
 """The values and the port of an FMU that is to be measured."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from orchestrator.black_box.bench import Bench
 from orchestrator.cases.values import check_system_base, convert
@@ -29,8 +32,14 @@ def start_of(description: FmuDescription, name: str) -> float:
     return info.start_number if info is not None and info.start is not None else float(name == "v_0")
 
 
-def check_port(description: FmuDescription, bench: Bench) -> None:
-    """Refuse an FMU without the voltages and currents of our port."""
+def bench_at(
+    description: FmuDescription, given: Mapping[str, Any], step_size: float, *, restore: bool | None = None
+) -> Bench:
+    """A device at an ideal bus of its own start. Refuses an FMU without the voltages and currents of our port."""
+    values = values_for(description, given)
+    v, angle = (float(values.get(name, start_of(description, name))) for name in ("v_0", "theta_0"))
+    at = v * np.array([math.cos(angle), math.sin(angle)])
+    bench = Bench(description, values, at, step_size=step_size, restore=restore)
     missing = [n for n in (*bench.inputs, *bench.outputs) if n not in description.variables]
     if missing and is_controller_alone(description):
         raise InputError(f"{description.path.name}: it has no {', '.join(missing)}: {NO_BUS}")
@@ -39,3 +48,4 @@ def check_port(description: FmuDescription, bench: Bench) -> None:
             f"{description.path.name}: it has no {', '.join(missing)}; an admittance is measured at our port, to which "
             "a vendor.toml maps another FMU's variables; give it with --binding"
         )
+    return bench

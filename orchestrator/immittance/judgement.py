@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from orchestrator.arrays import Complex, Numbers, Vector
+from orchestrator.black_box.fitting import bands_of
 from orchestrator.immittance.loop import NO_MODES, CutLoop, LoopPath, common_range, nodes_of
 from orchestrator.immittance.margins import Crossing, NyquistMargins, crossings_of, margins_of
 from orchestrator.immittance.scan import block_rotation
@@ -99,8 +100,8 @@ def judge_loop(
         reasons += _frames(loop, nodes, count)
     verdict = NyquistVerdict.NOT_KNOWN if reasons else NyquistVerdict.UNSTABLE if growing else NyquistVerdict.STABLE
     margins = margins_of(path, crossings)
-    active = {"device": _bands(*_active(loop.device)), "network": _bands(*_active(loop.network))}
-    small = _bands(path.hertz, np.linalg.norm(path.L, ord=2, axis=(1, 2)) < 1)
+    active = {"device": bands_of(*_active(loop.device)), "network": bands_of(*_active(loop.network))}
+    small = bands_of(path.hertz, np.linalg.norm(path.L, ord=2, axis=(1, 2)) < 1)
     return CutJudgement(verdict, tuple(reasons), None if reasons else growing, count, by_loci, poles, tuple(crossings),
                      margins, path, (low, high), active, small, buses)  # fmt: skip
 
@@ -205,11 +206,6 @@ def _active(side: Side) -> tuple[Numbers, Numbers]:
     least = np.linalg.eigvalsh((M + M.conj().transpose(0, 2, 1)) / 2)[:, 0] if M.shape[1] == M.shape[2] else np.zeros(1)
     slack = 1e-6 * np.linalg.norm(M, ord=2, axis=(1, 2)) + (side.bounds if isinstance(side, Sampled) else 0.0)
     return f, np.asarray(least < -slack)
-
-
-def _bands(f: Numbers, inside: Numbers) -> list[tuple[float, float]]:
-    edges = np.flatnonzero(np.diff(np.r_[False, inside, False].astype(int)))
-    return [(float(f[a]), float(f[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _frames(loop: CutLoop, nodes: Numbers, count: int) -> list[str]:

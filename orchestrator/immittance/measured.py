@@ -9,10 +9,9 @@ import numpy as np
 from fmus.toolchain.port_variables import SYSTEM_BASE_MVA
 from orchestrator.arrays import Complex, Vector
 from orchestrator.binding.binding import bound_fmu
-from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.fitting import IdentifiedModel, fit, require_fitting
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
-from orchestrator.black_box.port import check_port, start_of, values_for
+from orchestrator.black_box.port import bench_at
 from orchestrator.immittance.scan import PER_UNIT, PortPoint, Scan
 
 
@@ -22,13 +21,8 @@ def scan_fmu(
 ) -> Scan:  # fmt: skip
     """Measure a device at the operating point of its values [pu on the system base of 100 MVA]."""
     require_fitting()
-    description = bound_fmu(path, binding)
-    values = values_for(description, given)
-    magnitude, angle = (float(values.get(name, start_of(description, name))) for name in ("v_0", "theta_0"))
-    rest = cmath.rect(magnitude, angle)
-    bench = Bench(description, values, np.array([rest.real, rest.imag]), step_size=step_size)
-    check_port(description, bench)
-    return as_scan(path.name, measure(bench, excitation, report), rest)
+    bench = bench_at(bound_fmu(path, binding), given, step_size)
+    return as_scan(path.name, measure(bench, excitation, report), complex(*bench.rest))
 
 
 def as_scan(name: str, response: FrequencyResponse, voltage: complex, kilovolt: float = 1.0) -> Scan:

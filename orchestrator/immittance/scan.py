@@ -17,7 +17,9 @@ _TOP = 5.0  # frequencies down to this part of the highest tell signs: there a d
 _ACTIVE = 0.5
 """Part of those frequencies at which both resistances must be negative for the sign to be called the generator's."""
 
-_SURE = 0.3  # part of the other order's misfit from which on that of one order of the axes is the right one
+_SURE, _OFF, _NONE, _COIL, _FEW = 0.3, 2.0, 0.1, 0.3, 8
+"""Parts of the rated frequency that are seen of the other q axis, of rad/s (2.9 to 6.4 of devices and networks; 0.4 to
+1.03 of right ones), and of elements left out; least likeness to a coil, and points, from which on it tells."""
 
 _HOLE, _BESIDE = 3.0, 8
 """A step of the frequency this many times as long as each of so many to either side may be a hole."""
@@ -106,30 +108,44 @@ def checked(source: str, frequencies: Numbers, values: Vector) -> tuple[str, ...
     return (f"{source}: are rows missing from {', '.join(holes[:5])}? the steps beside are shorter",) if holes else ()
 
 
-def in_own_form(source: str, frequencies: Numbers, values: Vector, rated_hz: float, *, q_leads: bool) -> Complex:
-    """Values with the q axis leading; the inductance that every filter and line has at high frequencies must agree."""
+def in_own_form(
+    source: str, frequencies: Numbers, values: Vector, rated_hz: float, *, q_leads: bool
+) -> tuple[Complex, tuple[str, ...]]:
+    """Values with the q axis leading, and what is to be asked; at high frequencies a device is a circuit, which shows
+    how its frame turns."""
     own = values if q_leads else other_q_axis(values)
-    seen = _reactance_sign(frequencies, own, rated_hz)
-    if seen < 0:
+    seen = _rated_seen(frequencies, own, rated_hz)
+    if seen < -_SURE:
         raise InputError(
             f"{source}: by its reactance at high frequencies the q axis {'lags' if q_leads else 'leads'} the d axis, "
             f"where this form has it {'leading' if q_leads else 'lagging'}; turn the sign of the dq and qd elements"
         )
-    return own
+    if seen > _OFF:
+        raise InputError(
+            f"{source}: by its reactance at high frequencies its frame turns {seen:.2g} times as fast as at the rated "
+            f"{rated_hz:g} Hz: are its frequencies in rad/s? Give them in Hz"
+        )
+    none = f"{source}: were dq and qd left at 0, or has one the wrong sign? They show no reactance where dd and qq do"
+    return own, (none,) if abs(seen) < _NONE else ()
 
 
-def _reactance_sign(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
-    """1 for a leading q axis, −1 for a lagging one; 0 if unclear. At high frequencies a device is a circuit Z(jω), that
-    dq shows at ω + ω₀ in the one sequence and at ω − ω₀ in the other: the same 2ω₀ further on."""
+def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
+    """Rated frequency that a scan shows over the one given, negative where the q axis lags; 1 where none is seen.
+
+    At high frequencies a device is a circuit Z(jω), that dq shows at ω + ω₀ in the one sequence and at ω − ω₀ in the
+    other. Half their sum and difference, a and c, then meet a(ω + ω₀) − a(ω − ω₀) = c(ω + ω₀) + c(ω − ω₀)."""
     Z = np.linalg.pinv(values)
     along, cross = (Z[:, 0, 0] + Z[:, 1, 1]) / 2, 0.5j * (Z[:, 1, 0] - Z[:, 0, 1])
-    top = (frequencies >= frequencies[-1] / _TOP) & (frequencies <= frequencies[-1] - 2 * rated_hz)
-    f, found = frequencies[top], []
-    for here, there in ((along + cross, along - cross), (along - cross, along + cross)):
-        apart = np.abs(np.interp(f + 2 * rated_hz, frequencies, there) - here[top])
-        found.append(float(np.median(apart / np.maximum(np.abs(here[top]), 1e-300))) if len(f) else 1.0)
-    leads, lags = found
-    return 1.0 if leads < _SURE * lags else -1.0 if lags < _SURE * leads else 0.0
+    f = frequencies[(frequencies >= frequencies[-1] / _TOP) & (frequencies > 2 * rated_hz)]
+    f = f[f <= frequencies[-1] - rated_hz]
+    a, c = ([np.interp(f + k * rated_hz, frequencies, x) for k in (-1, 1)] for x in (along, cross))
+    size = a[0] + a[1]
+    size = np.where(size == 0, 1e-300, size)
+    rises, turns = (a[1] - a[0]) / size, (c[1] + c[0]) / size
+    coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
+    if len(f) < _FEW or not _COIL < np.median(coil.real) < 1 / _COIL:
+        return 1.0
+    return float((rises.conj() @ turns).real / (rises.conj() @ rises).real)
 
 
 def is_active(scan: Scan) -> bool:

@@ -34,8 +34,8 @@ def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
     ports = _ports(path, first.split()[1:])
     frequencies, values = _rows(path, rest, 2 * len(ports))
     questions = checked(path.name, frequencies, values)
-    own = in_own_form(path.name, frequencies, values, rated_hz, q_leads=False)
-    return Scan(path.name, frequencies, own, ports, points=_points(path, ports), questions=questions)
+    own, asked = in_own_form(path.name, frequencies, values, rated_hz, q_leads=False)
+    return Scan(path.name, frequencies, own, ports, points=_points(path, ports), questions=questions + asked)
 
 
 def _ports(path: Path, names: list[str]) -> tuple[str, ...]:
@@ -144,8 +144,8 @@ def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     kept = frequencies > 0
     frequencies, Z = frequencies[kept], Z[kept]
     questions = checked(path.name, frequencies, Z)
-    own = in_own_form(path.name, frequencies, np.linalg.inv(Z), rated_hz, q_leads=True)
-    return Scan(path.name, frequencies, own, (wanted[0],), questions=questions)
+    own, asked = in_own_form(path.name, frequencies, np.linalg.inv(Z), rated_hz, q_leads=True)
+    return Scan(path.name, frequencies, own, (wanted[0],), questions=questions + asked)
 
 
 def _numbers(path: Path, rows: list[dict[str, str]], name: str) -> tuple[Numbers, Complex]:

@@ -268,3 +268,25 @@ def test_a_mode_of_a_model_that_is_narrower_than_any_grid_is_seen(monkeypatch):
     assert (judge_loop(loop).verdict, judge_loop(loop).growing) == ("unstable", 2)
     monkeypatch.setattr("orchestrator.immittance.loop._NARROW", 0.0)
     assert judge_loop(loop).growing != 2
+
+
+@pytest.mark.parametrize("n", [2, 4])
+def test_loci_are_followed_in_whatever_order_eigenvalues_come(n):
+    rng, t = np.random.default_rng(2), np.linspace(0, 1, 300)[:, None]
+    circles = (1 + np.arange(n)) * np.exp(2j * np.pi * t * (n - np.arange(n)))
+    found = looping.followed(np.array([rng.permutation(row) for row in circles]))
+    assert found[:, np.argsort(np.abs(found[0]))] == pytest.approx(circles)
+
+
+def test_points_are_added_where_the_loop_turns_far_between_the_frequencies():
+    """A narrow mode that encircles −1 between two of 12 frequencies, of which the sides are known much better."""
+    plant, line = narrow(0.01, f_0=31.0, size=10.0), STRONG
+    dense = np.unique(np.concatenate([F, np.linspace(28, 34, 600)]))
+    loop = CutLoop(a_side(plant.admittance(dense), dense), a_side(line.impedance(dense), dense))
+    nodes = np.geomspace(0.1, 1000, 12)
+    path = loop.path(nodes)
+    growing = int((eigenvalues(plant, line).real > 0).sum())
+    assert growing
+    assert judgement.encirclements(path, exact=False) == (growing, growing)
+    assert np.abs(path.turns).max() <= looping._STEP
+    assert len(path.s) < 400

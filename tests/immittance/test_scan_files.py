@@ -11,6 +11,7 @@ from orchestrator.immittance.scan_files import read_scan, write_ztool
 from tests.immittance.plants import Line, constant_power
 
 F = np.geomspace(1, 500, 120)
+NO_CROSS = "were dq and qd left at 0, or has one the wrong sign? They show no reactance where dd and qq do"
 
 
 def write_imtb(scan, path, name="Zdut"):
@@ -40,7 +41,20 @@ def test_a_scan_comes_back_from_a_file_of_z_tool_with_its_operating_point(tmp_pa
     assert back.values == pytest.approx(a_scan().values, rel=1e-15)
     assert back.frequencies == pytest.approx(F, rel=1e-15)
     assert back.points["PCC-1"] == point
-    assert not back.questions
+    assert back.questions == (f"case#Y_AC#PCC-1#.txt: {NO_CROSS}",)  # as its plant is diagonal
+
+
+def test_a_circuit_tells_frequencies_in_rad_s_and_elements_that_say_nothing(tmp_path):
+    Y = np.linalg.inv(Line(0.05, 0.002).impedance(F))
+    alone, one_sign = Y * np.eye(2), Y * np.array([[1, 1], [-1, 1]])
+    for values, asked in ((Y, ()), (alone, (f"a.txt: {NO_CROSS}",)), (one_sign, (f"a.txt: {NO_CROSS}",))):
+        write_ztool(Scan("line", F, values, ("P",)), tmp_path / "a.txt")
+        assert read_scan(tmp_path / "a.txt", 50.0).questions == asked
+    write_ztool(Scan("line", 2 * np.pi * F, Y, ("P",)), tmp_path / "a.txt")
+    with pytest.raises(
+        InputError, match=r"turns 6.3 times as fast as at the rated 50 Hz: are its frequencies in rad/s"
+    ):
+        read_scan(tmp_path / "a.txt", 50.0)
 
 
 def test_several_ports_keep_their_order(tmp_path):

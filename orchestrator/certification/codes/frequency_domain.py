@@ -1,6 +1,5 @@
 """GB: the network-frequency-perturbation plot of a converter, and how stiff a source it is; without a verdict."""
 
-import cmath
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +9,8 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.binding.binding import bound_fmu
-from orchestrator.black_box.bench import Bench
 from orchestrator.black_box.frequency_response import Excitation, FrequencyResponse, measure
-from orchestrator.black_box.port import check_port, values_for
+from orchestrator.black_box.port import bench_at
 from orchestrator.certification.codes.bench_point import STEP
 from orchestrator.certification.codes.programme import RATING_MVA, jumps
 from orchestrator.certification.request import CertificationRequest
@@ -98,11 +96,8 @@ def measure_stiffness(request: CertificationRequest, f_n: float, report: Callabl
     description = bound_fmu(request.fmu, request.binding)
     given = {"S_n": RATING_MVA, "P_0": POWER, "Q_0": 0.0, "v_0": 1.0, "theta_0": 0.0, "f_n": f_n}
     known = {name: value for name, value in given.items() if name in description.variables}
-    values = values_for(description, known | dict(request.values))
-    rest = cmath.rect(float(values.get("v_0", 1.0)), float(values.get("theta_0", 0.0)))
-    bench = Bench(description, values, np.array([rest.real, rest.imag]), step_size=STEP)
-    check_port(description, bench)
-    return stiffness(measure(bench, EXCITATION, report), rest, f_n)
+    bench = bench_at(description, known | dict(request.values), STEP)
+    return stiffness(measure(bench, EXCITATION, report), complex(*bench.rest), f_n)
 
 
 def figures_of_stiffness(found: Stiffness, model: str, f_n: float) -> dict[str, Any]:

@@ -1,6 +1,5 @@
 """The stiffness that a jump of the angle asks for, behind the impedance of a grid."""
 
-import numpy as np
 import pytest
 
 from orchestrator.certification.codes.frequency_domain import JUMP, OPPOSED, POWER, SCR, asked_stiffness
@@ -9,8 +8,6 @@ from orchestrator.certification.codes.programme import jumps
 
 class Flat:
     """A device of the same |P/θ| at all frequencies."""
-
-    p_theta = np.ones(3)
 
     def least(self, values, low, high):
         return 7.0, low
