@@ -17,12 +17,12 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import InputError
+from orchestrator.immittance.forms import from_sequences
 from orchestrator.immittance.scan import SIEMENS, PortPoint, Scan, checked, in_own_form, other_q_axis
 from orchestrator.safe_files import write_text
 
 _COLUMNS = ("[kV]", "[MW]", "[MVAr]", "[rad]")
 _ELEMENTS = ("11", "12", "21", "22")
-_SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
 
 
 def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
@@ -129,7 +129,7 @@ def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     frequencies, Z = _numbers(path, rows, f"{wanted[0]}_{frame}")
     if frame == "ab":
         frequencies = frequencies - rated_hz
-        Z = np.linalg.inv(_SEQUENCES) @ Z @ _SEQUENCES
+        Z = from_sequences(Z)
     kept = frequencies > 0
     frequencies, Z = frequencies[kept], Z[kept]
     questions = checked(path.name, frequencies, Z)
