@@ -36,14 +36,15 @@ def run(options: argparse.Namespace) -> int:
     if options.fmu.suffix.lower() in ENDINGS:
         if not options.form or options.points or options.scan:
             raise InputError(f"{options.fmu}: a scan is no FMU that could be measured; give --form alone")
-        _save_form(read_scan(options.fmu, options.frequency or 50.0), options, options.frequency or 50.0, folder)
+        rated = options.frequency or 50.0
+        files = _save_form(read_scan(options.fmu, rated), options, rated, folder)
     elif options.scan and not options.voltage:
         raise InputError("--scan: a scan is in siemens; give the rated voltage as well, as in --voltage '230 kV'")
     elif options.points:
-        by_point(options, folder, lambda values, place: _row(_measured(options, values, place)))
+        by_point(options, folder, lambda values, place: _row(_measured(options, values, place)[0]))
         return 0
     else:
-        found = _measured(options, {}, folder)
+        found, files = _measured(options, {}, folder)
         if options.json:
             print_json(found.as_json())
             return 0
@@ -51,11 +52,11 @@ def run(options: argparse.Namespace) -> int:
         console.print(_summary(found.as_json()))
         console.print(f"Not passive: {active or 'nowhere in the measured range'}; least relative index "
                       f"{found.passivity.relative.min():.3f}", highlight=False)  # fmt: skip
-    console.print(escape(f"Results in {folder}"), soft_wrap=True, highlight=False)
+    console.print(escape(f"Results in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True, highlight=False)
     return 0
 
 
-def _measured(options: argparse.Namespace, values: dict[str, Any], folder: Path) -> Admittance:
+def _measured(options: argparse.Namespace, values: dict[str, Any], folder: Path) -> tuple[Admittance, list[Path]]:
     """Measure, and write all that is asked for; a scan beside its point's folder bears the point's name."""
     how = excitation_of(options)
     with said_stages() as report:
@@ -64,20 +65,22 @@ def _measured(options: argparse.Namespace, values: dict[str, Any], folder: Path)
             method=how.method, amplitude=how.amplitude, frequencies=(how.lowest_hz, how.highest_hz),
             use_state=not options.no_state, report=report,
         )  # fmt: skip
-    found.save(folder)
+    files = found.save(folder)
     if options.scan or options.form:
         scan = as_scan(options.fmu.stem, found.response, found.rest, options.voltage or 1.0)
         scan = scan.in_siemens(options.voltage) if options.voltage else scan
-        _save_form(scan, options, options.frequency or found.rated_hz, folder)
+        files += _save_form(scan, options, options.frequency or found.rated_hz, folder)
     if options.scan:
         to = options.scan.with_stem(f"{options.scan.stem}_{folder.name}") if options.points else options.scan
         write_ztool(scan, to)
-    return found
+    return found, files
 
 
-def _save_form(scan: Scan, options: argparse.Namespace, rated_hz: float, folder: Path) -> None:
+def _save_form(scan: Scan, options: argparse.Namespace, rated_hz: float, folder: Path) -> list[Path]:
+    path = folder / f"{options.form}.csv"
     if options.form:
-        save_table(rows_in(scan, options.form, rated_hz), folder / f"{options.form}.csv")
+        save_table(rows_in(scan, options.form, rated_hz), path)
+    return [path] if options.form else []
 
 
 def _row(found: Admittance) -> dict[str, Any]:

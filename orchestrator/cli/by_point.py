@@ -29,7 +29,7 @@ def by_point(
             rows.append({"point": name} | found(values, folder / folder_of(name)))
         except CosimError as error:
             rows.append({"point": name, **failed, "remark": str(error)})
-    columns = list(max(rows, key=len))
+    columns = max((list(row) for row in rows), key=len)
     cells = [{column: row.get(column) for column in columns} for row in rows]
     save_table(cells, folder / "points.csv")
     if options.json:
