@@ -18,7 +18,7 @@ from orchestrator.errors import InputError
 from orchestrator.immittance.forms import FORMS, rows_in
 from orchestrator.immittance.measured import as_scan
 from orchestrator.immittance.scan import Scan
-from orchestrator.immittance.scan_files import ENDINGS, read_scan, write_ztool
+from orchestrator.immittance.scan_files import ENDINGS, read_scan, write_imtb, write_ztool
 from orchestrator.report.tables import make_table
 from orchestrator.results.storage import save_table
 from orchestrator.safe_files import made_folder
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     elif options.scan and not options.voltage:
         raise InputError("--scan: a scan is in siemens; give the rated voltage as well, as in --voltage '230 kV'")
     elif options.points:
-        by_point(options, folder, lambda values, place: _row(_measured(options, values, place)[0]))
+        by_point(options, folder, lambda values, place: _row(_measured(options, values, place)[0]), {})
         return 0
     else:
         found, files = _measured(options, {}, folder)
@@ -72,7 +72,7 @@ def _measured(options: argparse.Namespace, values: dict[str, Any], folder: Path)
         files += _save_form(scan, options, options.frequency or found.rated_hz, folder)
     if options.scan:
         to = options.scan.with_stem(f"{options.scan.stem}_{folder.name}") if options.points else options.scan
-        write_ztool(scan, to)
+        write_imtb(scan, to) if to.suffix.lower() == ".csv" else write_ztool(scan, to)
     return found, files
 
 

@@ -1,9 +1,8 @@
 """A command on a device at each operating point of a file."""
 
 import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from rich.markup import escape
@@ -20,7 +19,7 @@ def by_point(
     options: argparse.Namespace,
     folder: Path,
     found: Callable[[dict[str, Value], Path], dict[str, Any]],
-    failed: Mapping[str, Any] = MappingProxyType({}),
+    failed: dict[str, str],
 ) -> list[dict[str, Any]]:
     """Rows of what is found at each point, shown and kept; one that fails says why, and the others go on."""
     rows: list[dict[str, Any]] = []

@@ -11,13 +11,7 @@ FORMS = ("alphabeta", "siso", "jacobian")
 """``alphabeta`` has the sequences as rows and columns, at the frequency of the positive one; the mirrored one is two
 rated frequencies lower. ``siso`` is the positive one alone, with what flows in the mirrored one at an ideal bus."""
 
-
 _SEQUENCES = np.array([[1, 1j], [1, -1j]]) / np.sqrt(2)
-
-
-def in_sequences(values: Vector) -> Complex:
-    """A matrix in dq with the positive sequence and the mirrored one as rows and columns."""
-    return np.asarray(_SEQUENCES @ values @ _SEQUENCES.conj().T)
 
 
 def from_sequences(values: Vector) -> Complex:
@@ -45,7 +39,7 @@ def rows_in(scan: Scan, form: str, rated_hz: float) -> list[dict[str, float]]:
         raise InputError(f"{scan.source} has the ports {', '.join(scan.ports)}; other forms are of a scan of one port")
     if form == "jacobian":
         return rows_of(scan.frequencies, _powers_of(scan, rated_hz))
-    f, Y = scan.frequencies + rated_hz, in_sequences(scan.values)
+    f, Y = scan.frequencies + rated_hz, _SEQUENCES @ scan.values @ _SEQUENCES.conj().T
     if form == "alphabeta":
         return rows_of(f, {f"Y_{i + 1}{j + 1} [{scan.unit}]": Y[:, i, j] for i, j in np.ndindex(2, 2)})
     below = scan.frequencies < rated_hz  # there it is the conjugate of the mirrored one of a frequency above

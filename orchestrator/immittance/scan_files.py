@@ -118,6 +118,17 @@ def write_ztool(scan: Scan, path: Path) -> None:
         write_text(path.with_name(f"{root}_power_flow.txt"), "\n".join([heads, *rows]) + "\n")
 
 
+def write_imtb(scan: Scan, path: Path) -> None:
+    """Write the impedances of one port in dq [Ω]; the form has no place for an operating point."""
+    if scan.unit != SIEMENS or len(scan.ports) > 1:
+        raise InputError(f"{scan.source}: IMTB's form is of one port in ohms; give one port, in siemens")
+    columns = {"f": scan.frequencies}
+    for name, z in zip(_ELEMENTS, scan.impedance.reshape(-1, 4).T, strict=True):
+        columns |= {f"Zdut_dq_{name}_re": z.real, f"Zdut_dq_{name}_im": z.imag}
+    rows = np.array(list(columns.values())).T.tolist()
+    write_text(path, "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n")
+
+
 def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     """The device of a file, or its network; rows of negative dq frequencies are left out, they mirror the others."""
     rows = list(csv.DictReader(StringIO(text)))
