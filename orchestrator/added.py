@@ -10,7 +10,6 @@ _CALLED = {"screening": "screen", "siting": "site", "coordinated_design": "desig
 
 
 def rooms() -> dict[str, str]:
-    """Name of the study → its room."""
     found = sorted(path.parent.name for path in _ROOT.glob("*/command.py"))
     return {_CALLED.get(room, room): room for room in found}
 
@@ -22,5 +21,4 @@ def words_of(room: str) -> str:
 
 
 def study_in(room: str) -> Any:
-    """The study that a room declares."""
     return import_module(f"{__package__}.{room}.command").STUDY

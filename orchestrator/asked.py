@@ -162,7 +162,6 @@ def text_or_none(given: Any, argument: str, rule: str = "give one name, or leave
 
 
 def path(given: Any, argument: str, kind: str = "file") -> Path:
-    """A path of a file, or of another ``kind`` of place."""
     if not isinstance(given, str | Path) or not str(given):
         raise InputError(f"{argument} = {given!r}; give the path of a {kind}")
     _check_length(Path(given), argument)
@@ -290,8 +289,6 @@ def bounds(given: Any, argument: str) -> tuple[float, float]:
 
 
 def read_whole(least: int, most: int, what: str = "a whole number") -> Callable[[str], int]:
-    """What reads a whole number from ``least`` to ``most``."""
-
     def read(text: str) -> int:
         if not text.isdigit() or not least <= int(text) <= most:
             raise ValueError(f"{text!r} is not {what} from {least} to {most}")

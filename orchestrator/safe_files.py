@@ -75,7 +75,6 @@ def flush(path: Path) -> None:
 
 
 def not_written(path: Path, error: OSError) -> ResultsError:
-    """The error of a file that could not be written."""
     remedy = {
         errno.ENOSPC: "make room there, or choose another folder",
         errno.EDQUOT: "make room there, or choose another folder",

@@ -18,7 +18,7 @@ def write_junit(report: AcceptanceReport, path: Path) -> None:
     )  # fmt: skip
     for result in results:
         case = SubElement(suite, "testcase", classname=report.fmu.stem, name=result.check)
-        text = _printable(result.evidence)
+        text = "".join(c if c in "\n\t" or c >= " " else "�" for c in result.evidence)  # XML 1.0 has no others
         if result.verdict is Verdict.FAIL:
             failure = SubElement(case, "failure", message=result.fault, type=result.fault)
             failure.text = f"{text}\nremedy: {result.remedy}"
@@ -34,8 +34,3 @@ def write_junit(report: AcceptanceReport, path: Path) -> None:
         write_bytes(path, b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(suite, encoding="utf-8"))
     except ResultsError as error:
         raise InputError(f"--junit {error}") from error
-
-
-def _printable(text: str) -> str:
-    """Without what XML 1.0 has no place for."""
-    return "".join(c if c in "\n\t" or c >= " " else "�" for c in text)

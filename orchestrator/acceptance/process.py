@@ -138,7 +138,6 @@ class FmuProcess:
         return self.typed(answers.number, self.talk(call, instance, command, *arguments))
 
     def typed(self, form: Callable[..., Form], answer: Any, *wanted: Any) -> Form:
-        """An answer in the form that was asked for."""
         try:
             return form(answer, *wanted)
         except answers.NotAnAnswerError as error:
@@ -264,7 +263,6 @@ class HostedComponent(RemoteCalls):
     # -- all else --------------------------------------------------------------------------------
 
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NoReturn:
-        """Refuse: no check asks for derivatives."""
         raise ComponentError(
             self.name, "fmi2GetDirectionalDerivative", "nothing", "the acceptance tests ask no FMU for derivatives"
         )

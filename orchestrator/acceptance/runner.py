@@ -94,7 +94,6 @@ FILE_CHECKS = {
     "archive": "Can the file be unpacked and read without harm?",
     "binding": "Does the binding fit the file?",
 }
-"""Checks that run before the FMU does: of the archive and the binding."""
 
 
 def question_of(name: str) -> str:

@@ -121,5 +121,4 @@ class Host(Worker):
 
 
 def main(request: dict[str, Any]) -> None:
-    """Answer for the instances of an FMU that is checked."""
     Host(request).serve()

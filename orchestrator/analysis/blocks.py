@@ -120,7 +120,6 @@ class Blocks:
         return found
 
     def renew(self, master: Master, names: Iterable[str]) -> None:
-        """Linearise some components again, whose parameters were changed."""
         self.components = self._anew(master, names)
 
     def with_component(self, master: Master, name: str) -> "Blocks":
@@ -160,7 +159,6 @@ class Blocks:
 
     @property
     def serves_continuous(self) -> bool:
-        """Whether the components were linearised without a communication step."""
         return self._without_step or not self._step_aware
 
     @property
@@ -187,7 +185,6 @@ class Blocks:
         return [f"{name}.{state}" for name, c in self.components.items() for state in c.states]
 
     def state_windows(self) -> dict[str, slice]:
-        """The range of each component's states in the vector of all states."""
         windows, first = {}, 0
         for name, c in self.components.items():
             windows[name] = slice(first, first + len(c.states))

@@ -209,7 +209,6 @@ def _run(
 
 
 def _predicted(model: LinearModel, z: Matrix, every: int, times: int) -> Matrix:
-    """States that the model gives at the same times, shape (times, n)."""
     power = np.linalg.matrix_power(model.A, every) if len(z) <= _DENSE else None
     rows = []
     for _ in range(times):

@@ -92,7 +92,6 @@ def _run(master: Master, name: str, inputs: Numbers) -> Numbers:
 
 
 def _without(blocks: Blocks, master: Master, known: Mapping[str, ComponentLinearization], name: str) -> float:
-    """The growth with one box's answer left out."""
     box = known[name]
     kept, blocks.components[name] = blocks.components[name], _deaf(box)
     try:

@@ -166,15 +166,11 @@ def doubtful_delays(links: Iterable[WireLink], eigenvalues: Iterable[complex], s
     return said
 
 
-def is_memory_of(link: WireLink, name: str) -> bool:
-    return name.startswith(f"{link.name}{DELAYED}")
-
-
 def values_on_the_way(master: Master, names: tuple[str, ...], links: Mapping[Endpoint, WireLink]) -> Vector:
     """The states of all delay lines among the names while everything that is carried is constant."""
     found = []
     for target, link in links.items():
-        count = sum(is_memory_of(link, name) for name in names)
+        count = sum(name.startswith(f"{link.name}{DELAYED}") for name in names)
         line = delay_line(link.delay, master.clock.step_size) if count else None
         if line is not None:
             inputs = master.exchanges[target.component].inputs.names

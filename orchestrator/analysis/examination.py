@@ -128,7 +128,6 @@ def _step_warnings(
 
 
 def _advice(master: Master, system: LinearModel, pairs: Sequence[Pair]) -> str:
-    """The advice for an unstable coupling with resolved modes."""
     short = _short_step(master, system, pairs)
     if short is None:
         return "no shorter step that was tried has a stable coupling; see that the schedule has devices before the grid"

@@ -118,5 +118,4 @@ def sampling(times: NDArray[np.float64], highest_hz: float = 10.0) -> Sampling:
 
 
 def nearest(modes: list[IdentifiedMode], eigenvalue: complex) -> IdentifiedMode | None:
-    """The identified mode closest to an eigenvalue [rad/s]."""
     return min(modes, key=lambda m: abs(m.eigenvalue - eigenvalue), default=None)

@@ -20,7 +20,6 @@ __all__ = ["Blocks", "compose", "continuous", "continuous_model", "linearize", "
 
 
 def linearize(master: Master, step_size: float | None = None, schedule: Schedule | None = None) -> LinearModel:
-    """Linearise the coupled step map around the master's present state."""
     return compose(Blocks(master, step_size), schedule or master.schedule)
 
 

@@ -120,7 +120,6 @@ class _Period:
         return found
 
     def take(self, x: Matrix) -> None:
-        """Stand at another state."""
         self._write(x)
         self.x = x
 

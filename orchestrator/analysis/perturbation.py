@@ -77,7 +77,6 @@ def _take_over(
     kept: Differences, new: Differences, columns: Sequence[int], agreeing: NDArray[np.bool_],
     one_sided: NDArray[np.bool_],
 ) -> None:  # fmt: skip
-    """Put those of the new columns that agree in the place of the old ones."""
     for part in Differences._fields:
         taken = [k for k in range(len(columns)) if agreeing[k]]
         if part.endswith("_up"):

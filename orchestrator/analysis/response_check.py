@@ -219,7 +219,6 @@ class _Comparison:
     step_size: float
 
     def judge(self) -> None:
-        """Raise an error if the responses of the FMU and the model differ."""
         n = len(self.model.states)
         course = self.response.course
         follow = range(n, course.shape[1])

@@ -143,7 +143,8 @@ class Stability:
         if self.mode is None or self.stable is None:
             return self.reason or "there is no eigenvalue but zeros"
         value = self.mode.eigenvalue
-        where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {participants(self.mode)})"
+        states = ", ".join(f"{name} {factor:.2f}" for name, factor in self.mode.participation[:_STATES_NAMED])
+        where = f"{value.real:+.4g} 1/s ({place(value, self.step_size)}; {states})"
         tail = f"; {self.reason}" if self.reason else ""
         if self.zeros > 1:
             tail += f"; {zeros_in_words(self.zeros)}"
@@ -185,10 +186,6 @@ def place(value: complex, step_size: float | None = None) -> str:
     return f"{hertz:.4g} Hz"
 
 
-def participants(mode: Mode) -> str:
-    return ", ".join(f"{name} {factor:.2f}" for name, factor in mode.participation[:_STATES_NAMED])
-
-
 def whole_spectrum(model: LinearModel) -> Spectrum | None:
     """All eigenvalues with the rightmost mode, but no other mode; None for a system too large for that."""
     if len(model.names) > WHOLE:
@@ -220,7 +217,6 @@ def fastest_growth(values: NDArray[np.complex128], *, step_map: bool) -> complex
 
 
 def hidden(values: NDArray[np.complex128], lowest_hz: float, highest_hz: float) -> Hidden:
-    """The modes of a spectrum that a frequency range [Hz] does not show."""
     swinging = values[oscillations(values)]
     hertz = swinging.imag / (2 * np.pi)
     outside = swinging[(hertz < lowest_hz) | (hertz > highest_hz)]

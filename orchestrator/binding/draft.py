@@ -128,7 +128,6 @@ def _matches(
 
 
 def _stem(name: str, part: str) -> str | None:
-    """The name without its last part; None if the name has another ending."""
     match = re.fullmatch(rf"(?P<stem>.*?)[._\[(]?(?:{part})[\])]?", name, re.IGNORECASE)
     return match["stem"].lower() if match else None
 

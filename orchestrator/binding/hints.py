@@ -15,7 +15,6 @@ START_TEXTS = {
     "v_0": re.compile(r"^(?!.*(angle|phase of)).*(voltage.*(start|init)|(start|init)\w* voltage)", re.IGNORECASE),
     "theta_0": re.compile(r"angle.*(start|init)|(start|init)\w* (voltage )?angle", re.IGNORECASE),
 }
-"""Descriptions of parameters that take the power flow's start values."""
 
 _DRAWN = re.compile(r"\b(consum|drawn|draws|absorb|taken|demand)|into the (converter|device|load|unit)", re.IGNORECASE)
 

@@ -8,7 +8,6 @@ from orchestrator.units import to_unit
 PER_UNIT = "pu"
 _NO_UNIT = {"", "1", "-", "pu", "p.u.", "p.u", "PU", "per unit", "per_unit"}
 _VALUES = {"line-to-line rms": 1.0, "line-to-line peak": sqrt(2), "phase rms": 1 / sqrt(3), "phase peak": sqrt(2 / 3)}
-"""Factor of each kind of voltage to the line-to-line rms voltage."""
 
 
 class UnitsDifferError(ValueError):

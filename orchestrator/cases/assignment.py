@@ -90,7 +90,6 @@ def convert_value(draft: Draft, info: VariableInfo, value: Value, where: str) ->
 
 
 def _assign_frequency(draft: Draft) -> None:
-    """Give the network's frequency to every component with a rated frequency."""
     if draft.data is None or draft.data.frequency is None:
         return
     for name, plan in draft.system.components.items():

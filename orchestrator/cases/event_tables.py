@@ -222,7 +222,6 @@ def _grid_or_reference_events(table: schema.EventTable, component: str) -> list[
 
 
 def _fault(table: schema.BusFaultTable, grid: str) -> list[Event]:
-    """The fault, its end, and the opening of the line that clears it."""
     events: list[Event] = [BusFault(table.time, grid, table.bus, True, table.R, table.X)]
     if table.duration is not None:
         end = table.time + table.duration
@@ -267,7 +266,6 @@ def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where
 
 
 def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -> str:
-    """A hint at the grid's elements that an unknown name may mean."""
     names = plan.description.variables
     wanted, kind, known = "", "", list[str]()
     match event:

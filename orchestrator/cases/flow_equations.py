@@ -92,7 +92,6 @@ class FlowEquations:
         return np.concatenate([left.real[self.angle_buses], left.imag[self.free_buses]])
 
     def worst(self, mismatch: np.ndarray) -> tuple[str, float]:
-        """The bus with the largest mismatch, and that mismatch [pu]."""
         k = int(np.argmax(np.abs(mismatch)))
         bus = np.concatenate([self.angle_buses, self.free_buses])[k]
         return self.buses[bus], float(abs(mismatch[k]))

@@ -66,7 +66,6 @@ def grow(equations: FlowEquations) -> tuple[float, NewtonResult | None]:
 
 
 def scaled(equations: FlowEquations, share: float) -> FlowEquations:
-    """The same network with a share of all given powers."""
     return replace(equations, fed=share * equations.fed)
 
 

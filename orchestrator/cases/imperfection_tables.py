@@ -27,7 +27,6 @@ _NUMBERS = {"delay": "s", "bandwidth": "Hz", "value": None, "deviation": None, "
 
 
 def sets_imperfection(key: str) -> bool:
-    """Whether a key reaches an imperfection and no component."""
     return key.partition(".")[0] == KEY
 
 
@@ -136,7 +135,6 @@ def _not_negative(info: VariableInfo, key: str, value: schema.Value) -> float:
 
 
 def signal_info(system: System, connection: Connection) -> VariableInfo:
-    """The variable whose value a connection carries, without its range."""
     source = connection.source
     info = system.components[source.component].description.variables[source.variable]
     return replace(info, minimum=None, maximum=None, start=None)

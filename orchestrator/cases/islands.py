@@ -46,7 +46,6 @@ def question_islands(draft: Draft, events: Sequence[tuple[Event, str]]) -> None:
 
 
 def _without_unit(network: Network, units: Mapping[str, str], values: Mapping[str, object]) -> list[list[str]]:
-    """Buses of each connected part that has a load and no unit."""
     row = {bus: k for k, bus in enumerate(network.buses)}
     ends = [(line.from_bus, line.to_bus) for line in network.lines if values.get(line.variable("connected"), True)]
     for winding in network.transformers:

@@ -156,7 +156,6 @@ _SHOWN = 6  # iterations whose mismatch is told
 
 
 def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable[[float], FlowEquations] | None) -> str:
-    """Sentences about a power flow without a solution."""
     mismatch, bus = failed.history[-1]
     told = [f"{size * SYSTEM_BASE_MVA:.3g}" for size, _ in failed.history]
     left_out = [] if len(told) <= _SHOWN else ["…"]

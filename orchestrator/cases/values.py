@@ -74,4 +74,3 @@ def given_twice(flat: Iterable[tuple[tuple[str, ...], Any]]) -> list[str]:
 
 
 TWICE = "it is given twice, once in quotes and once as a name in a table; keep one of them"
-"""What is wrong with such a name."""

@@ -43,7 +43,6 @@ class DampingControllers:
 
 
 def damping_controllers(description: FmuDescription, request: CertificationRequest) -> DampingControllers:
-    """The damping controllers that a request sets or declares for an FMU."""
     known, settings = {letter: _state(description, request, letter) for letter in "pq"}, dict[str, bool]()
     hidden = "".join(letter for letter, value in known.items() if value is None)
     pod = request.pod

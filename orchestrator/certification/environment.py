@@ -12,7 +12,6 @@ _ROOT = Path(__file__).parents[2]
 
 
 def environment() -> dict[str, str]:
-    """Name and version of each, without libraries that are not installed."""
     known = {"gfor-cosim": version("gfor-cosim"), "Commit": commit(), "Operating system": platform.platform(),
              "Processor": platform.machine(), "Python": platform.python_version()}  # fmt: skip
     return known | versions_of(_LIBRARIES)

@@ -42,7 +42,6 @@ def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
 
 
 def write_sealed(content: Mapping[str, Any], path: Path) -> None:
-    """Write JSON that contains a hash of all its other contents."""
     text = json.dumps({**content, "seal": seal_of(content)}, indent=1, ensure_ascii=False)
     write_text(path, text + "\n")
 

@@ -93,7 +93,6 @@ def _done(words: Sequence[str]) -> int:
 
 
 def _spelt_today(words: Sequence[str]) -> list[str]:
-    """The words with today's name of the command; says so where it was another."""
     place = next((k for k, word in enumerate(words) if not word.startswith("-")), 0)
     today = OLD.get(words[place]) if words else None
     if today is None:

@@ -18,7 +18,6 @@ _ASKED = "asked_"  # before the name of a field whose own name is that of anothe
 
 
 def switch(parser: argparse._ActionsContainer, name: str, text: str) -> None:
-    """An option without a value, such as ``--native``."""
     parser.add_argument(name, action="store_true", help=text)
 
 
@@ -26,14 +25,12 @@ def option(
     parser: argparse._ActionsContainer, name: str, metavar: str, text: str, *, read: Callable[[str], Any] = str,
     default: Any = None,
 ) -> None:  # fmt: skip
-    """An option with one value, which ``read`` makes of the text."""
     parser.add_argument(name, metavar=metavar, help=text, type=read, default=default)
 
 
 def repeatable(
     parser: argparse._ActionsContainer, name: str, metavar: str, text: str, *, read: Callable[[str], Any] = str
 ) -> None:
-    """An option that may be given several times; its values are a list."""
     parser.add_argument(name, metavar=metavar, help=text, type=read, action="append", default=[])
 
 

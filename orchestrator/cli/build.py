@@ -49,7 +49,6 @@ HOSTS = {
     name: Tool(**table | {"platforms": tuple(table["platforms"])})
     for name, table in tomllib.loads(Path(__file__).with_name("build_hosts.toml").read_text(encoding="utf-8")).items()
 }
-"""By the name that ``--for`` takes."""
 
 
 def with_port(name: str, port: Port, known: tuple[str, ...]) -> str:
@@ -140,7 +139,6 @@ OPTION = "--with-linear-model"
 
 
 def extra_members(options: argparse.Namespace, models: list[str]) -> dict[str, bytes]:
-    """Members for the FMU's ``extra/`` folder; nothing without the option."""
     if options.linear_case is None:
         if options.scenario or options.component:
             raise InputError(f"--scenario and --component say more of {OPTION}; add it")

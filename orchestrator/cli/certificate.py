@@ -133,7 +133,6 @@ LISTED = ", ".join(map(in_words, _CODES))  # as the help of ``--code`` names the
 
 
 def read_code(text: str) -> str:
-    """What ``--code`` takes: a code's name, or all of them."""
     if text in (*_CODES, ALL):
         return text
     near = " or ".join(like(text, _CODES))

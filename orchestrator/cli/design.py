@@ -109,7 +109,6 @@ def _check_for_one_point(options: argparse.Namespace) -> None:
 
 
 def _check_over_points(options: argparse.Namespace) -> None:
-    """Refuse what a design over operating points does not take."""
     given = {"--damping-increment": options.damping_increment is not None, "--refine": options.refine,
              "--delta-gain": options.delta_gain is not None, "--no-margins": options.no_margins,
              "--gain-from": options.gain_from != "non-compensated"}  # fmt: skip

@@ -26,7 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve the page until it was closed for a minute, or Ctrl-C."""
     word, case, kind = opened(options.case, trust_fmus=options.trust_fmus)
     if "study" in kind and (options.set or options.range != ELECTROMECHANICAL_HZ or options.save):
         raise InputError(f"{options.case}: a study has its own values and range, and is not saved as a page; --set, "

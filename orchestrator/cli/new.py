@@ -25,7 +25,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the case, and say what was assumed."""
     from orchestrator.cases.service import in_service  # noqa: PLC0415 - these import what a run needs
     from orchestrator.study.modes import running  # noqa: PLC0415
 

@@ -211,7 +211,6 @@ def _save_together(
     results: Sequence[RunResult], folder: Path, run_id: str, stopped: Mapping[str, BaseException],
     early_end: EarlyEnd | None,
 ) -> list[Path]:  # fmt: skip
-    """Write what concerns all scenarios; return the plots."""
     whole = [r for r in results if not isinstance(r.failure, ResultsError)]
     names = [r.modes.prepared.name for r in whole]
     try:
@@ -224,7 +223,6 @@ def _save_together(
 
 
 def _end(stopped: Mapping[str, BaseException], folder: Path) -> int:
-    """Say where a study ended before its time, and what is left of it."""
     where, text = "", ""
     for scenario, error in stopped.items():
         if isinstance(error, ResultsError):

@@ -104,7 +104,6 @@ def asked_by(folder: Path) -> str | None:
 
 
 def keep_request(folder: Path, options: argparse.Namespace) -> None:
-    """Keep the options of `with_request` beside the checkpoints."""
     content = {name: getattr(options, name) for name in _OF_THE_RUN} | {"run": options.run}
     content["case"] = options.case if options.case in built_in_cases() else str(Path(options.case).resolve())
     content["parameters"] = [str(path.resolve()) for path in options.parameters]

@@ -21,7 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compute from the power flow's network, and print the weakest bus first."""
     convention, console = CONVENTION.format(options.converter_current), make_console()
     found = {s: weakest_first(s.strengths(options.converter_current, options.rating)) for s in chosen(options)}
     told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]

@@ -98,14 +98,12 @@ def ask(questions: Iterable[Problem]) -> None:
 
 
 def print_warnings(results: Sequence[ModesResult]) -> None:
-    """Say on standard error what is to be borne in mind of results."""
     for result in results:
         asked = {str(question) for question in (*result.prepared.questions, *result.prepared.about_rows)}
         warn(result.prepared.name, [text for text in result.warnings if text not in asked])
 
 
 def warn(scenario: str, texts: Iterable[str]) -> None:
-    """Say on standard error what is to be borne in mind of a scenario."""
     say("warning", (f"scenario {scenario!r}: {text}" for text in texts))
 
 

@@ -130,7 +130,6 @@ class SettingSearch:
         return [compensation_deg(angle_deg(complex(total))) if total else 0.0 for total in sums.tolist()]
 
     def improved(self, start: Tried) -> Tried:
-        """The vector that linear programs lead to from a start."""
         here, radius, steps = start, _RADIUS, 0
         program = self._program(here.x)
         while radius > _SMALLEST and steps < _STEPS:

@@ -197,7 +197,6 @@ class PointsDesign:
 def design_over_points(
     plan: PointsDesignPlan, work: Work, stage: Callable[[str], None] = lambda text: None
 ) -> PointsDesign:
-    """Find the settings, and compute all modes anew with them."""
     stage("operating points without the controllers")
     before = modes_at(plan, plan.off, plan.candidates, replace(work, report=lambda n, of: work.report(n, 2 * of)))
     usable = [k for k, point in enumerate(before) if point.loops is not None]

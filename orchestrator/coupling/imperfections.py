@@ -50,8 +50,6 @@ class Quantisation:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """The value arrives later, by ``seconds``."""
-
     seconds: float
 
     def __str__(self) -> str:

@@ -210,7 +210,6 @@ class Recorder:
         self._position = None
 
     def _refill(self, times: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-        """Put rows that are kept elsewhere back into the block."""
         count = len(times)
         self._times[:count], self._block[:count] = times, values
         self._filled = count

@@ -78,7 +78,6 @@ class Run:
         return stepper.statistics(stepper.index - first, perf_counter() - start, before.tolist())
 
     def _begin(self, begun: list[Observer], stop: int, kept: RunState | None) -> None:
-        """Have observers look at the beginning, or go on from where a run was kept."""
         if kept is not None:
             resume_observers(self._observers, kept)
         for observer in self._observers:
@@ -170,7 +169,6 @@ def state_of(
 
 
 def take_up(stepper: Stepper, kept: RunState) -> None:
-    """Go to where another run of the same system was."""
     for name, content in kept.components.items():
         try:
             set_state(stepper.components[name], content)

@@ -72,7 +72,6 @@ class _LineLoop:
                 turn.component.step((index * parts + j) * part, part)
 
     def _give(self, turn: Exchange, known: Values) -> None:
-        """Have a component take these inputs, and read its outputs."""
         with self._timed(turn):
             turn.inputs.values[:] = known[turn.delivered]
             turn.inputs.write()

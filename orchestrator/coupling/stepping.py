@@ -71,7 +71,6 @@ class PythonLoop:
                     raise not_finite(exchange.outputs, bad, time + size)
 
     def _interval(self, index: int, step_size: float) -> tuple[float, float]:
-        """Time and size of a step [s]."""
         if self._ticks_per_second is None:
             return index * step_size, step_size
         ticks = round(step_size * self._ticks_per_second)

@@ -116,7 +116,6 @@ class System:
         return self._feeding
 
     def disturb(self, connection: Connection, imperfection: Imperfection) -> None:
-        """Let a connection have an imperfection from t = 0 on."""
         self._wire(connection).disturb(imperfection)
 
     def foresee(self, connection: Connection, imperfection: Imperfection) -> None:

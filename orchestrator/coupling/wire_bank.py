@@ -144,7 +144,8 @@ class WireBank:
                 keep = 0.0 if band is None else math.exp(-2 * math.pi * band * self._step_size)
                 wire["keep"], wire["fresh"] = keep, math.sqrt(1 - keep * keep)
                 wire["deviation"], wire["started"] = imperfection.deviation, 0
-                self._keys[k] = key_of_noise(imperfection.seed, plan.name)
+                digest = hashlib.sha256(f"{imperfection.seed}\0{plan.name}".encode()).digest()
+                self._keys[k] = int.from_bytes(digest[:16], "little")
             case Quantisation():
                 wire["quantum"] = imperfection.step
             case Delay():
@@ -214,7 +215,6 @@ class WireBank:
         }  # fmt: skip
 
     def restore(self, state: dict[str, NDArray[np.float64]]) -> None:
-        """Go back to a state of the same connections."""
         for wire, row in zip(self._wires, state["wires"], strict=True):
             for name, value in zip((*_SETTING, *_STATE), row.tolist(), strict=True):
                 wire[name] = value
@@ -227,7 +227,6 @@ class WireBank:
 
 
 def whole_steps(seconds: float, step_size: float, where: str) -> int:
-    """A delay [s] in communication steps."""
     steps = round(seconds / step_size)
     if abs(seconds - steps * step_size) > 1e-6 * step_size:
         nearest = max(steps, 0) * step_size
@@ -248,11 +247,6 @@ def _check_bandwidths(plan: WirePlan, step_size: float) -> None:
 
 
 _BLOCK = 1024  # values of one setting of the counter
-
-
-def key_of_noise(seed: int, name: str) -> int:
-    """128 bits from a seed and the name of a connection."""
-    return int.from_bytes(hashlib.sha256(f"{seed}\0{name}".encode()).digest()[:16], "little")
 
 
 def white(key: int, first: int, count: int) -> NDArray[np.float64]:

@@ -68,7 +68,6 @@ class Wires:
             index, count = index + part, count - part
 
     def begin(self, target: Endpoint, imperfection: Imperfection) -> None:
-        """From now on the connection into ``target`` has this imperfection."""
         bank, k = self._placed(target)
         bank.begin(k, imperfection)
 
@@ -102,6 +101,5 @@ class Wires:
         return [bank.state() for bank in self._present]
 
     def restore(self, state: Sequence[Mapping[str, NDArray[np.float64]]]) -> None:
-        """Go back to a state that the same system had."""
         for bank, own in zip(self._present, state, strict=True):
             bank.restore(dict(own))

@@ -79,7 +79,6 @@ class Computing:
             self._end("superseded")
 
     def cancel(self, page: str, number: float) -> None:
-        """End all that the page asked before this number of its questions."""
         with self._state:
             self._cancelled[page] = number
             for asker in [one for one in self._newest if one[0] == page]:

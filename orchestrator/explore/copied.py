@@ -52,7 +52,6 @@ def copied(
 
 
 def events_of(file: CaseFile, scenario: str) -> list[dict[str, Any]]:
-    """The events of a scenario, as its file has them."""
     own = _as_written(file, scenario).get("events")
     return list(own if own is not None else _tables(file).get("events", []))
 

@@ -14,7 +14,6 @@ FILES = {
     STYLE: "text/css; charset=utf-8",
     **dict.fromkeys(SCRIPTS, "text/javascript; charset=utf-8"),
 }
-"""By name what each is."""
 
 _PLACE = Path(__file__).parent / "page"
 

@@ -137,7 +137,6 @@ class FederatedComponent(Derived):
         return self.inner is None
 
     def hand_over(self) -> None:
-        """Bring the federate to where the FMU in this process is, and end that one."""
         if self.inner is None or self._remote:
             return
         inner = self.inner

@@ -144,7 +144,6 @@ class OwnFederate:
         self._ended = True
 
     def do_replay(self, calls: list[list[Any]]) -> None:
-        """Make the calls that were made to the same FMU elsewhere."""
         for command, *arguments in calls:
             if command in ("set_real", "get_real"):
                 references, values = arguments
@@ -159,7 +158,6 @@ class OwnFederate:
         self._fmu().free_state(state)
 
     def do_get(self, references: list[int], values: list[list[Any]]) -> list[float]:
-        """Set inputs that came since the last step, and read Real variables."""
         if values:
             self._real("set_real", [r for r, _ in values], [x for _, x in values])
         return self._real("get_real", references, [0.0] * len(references))

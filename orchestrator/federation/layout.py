@@ -43,7 +43,6 @@ class Layout:
 
 
 def make_layout(prepared: PreparedScenario, names: Sequence[str], external: Sequence[str]) -> Layout:
-    """The exchanges of a scenario some of whose components are federates."""
     system, known = prepared.system, prepared.system.components
     for option, given in (("--federate", names), ("--external", external)):
         if wrong := [name for name in given if name not in known]:
@@ -106,7 +105,6 @@ def broker_port(wanted: int | None) -> int:
 
 
 def _taken(port: int, host: str) -> int | None:
-    """The first of a broker's two ports that is taken."""
     with ExitStack() as stack:
         for number in (port, port + 1):
             try:

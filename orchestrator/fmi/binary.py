@@ -137,5 +137,4 @@ class FMU2Tolerant(FMU2Slave):  # type: ignore[misc]
 
 
 def in_words_of_2(absent: set[str]) -> set[str]:
-    """Functions of FMI 2.0 that go to functions of FMI 3.0 which are absent."""
     return {name for name in _FUNCTIONS if in_words_of_3(name) in absent}

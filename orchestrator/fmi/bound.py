@@ -203,7 +203,6 @@ class BoundComponent(Derived):
                 self.inner.set({target.variable: scale * target.factor * value + target.offset})
 
     def save_state(self) -> Any:
-        """The FMU's state together with what the conversion remembers."""
         adapter = self._adapter
         own = (*adapter.v, adapter.time, adapter.angle, float(self._start_is_new), *self._start.values())
         return self.inner.save_state(), own

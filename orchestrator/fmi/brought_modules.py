@@ -74,7 +74,6 @@ class BroughtModules:
         self._note_folders()
 
     def _note_folders(self) -> None:
-        """Note what lies in the folders that the FMU added to the search path."""
         new = [place for place in dict.fromkeys(sys.path) if self.holds(place) and place not in self._places]
         if new or self._names is None:
             self._places += new

@@ -295,7 +295,6 @@ def _describe(
 
 
 def _sampling(path: Path, root: ElementTree.Element, variables: Mapping[str, VariableInfo]) -> dict[str, Any]:
-    """A sampled controller's sample time, and the frequency at which it repeats."""
     listed = root.find(f"{_OURS}/DiscreteStates")
     if listed is None:
         return {}
@@ -324,7 +323,6 @@ def _states(path: Path, md: ModelDescription) -> list[str]:
 
 
 def _events(root: ElementTree.Element, version: str) -> dict[str, Any]:
-    """Declarations of FMI 3.0 on events, early returns and clocks."""
     interface = root.find("CoSimulation")
     if version != "3.0" or interface is None:
         return {}

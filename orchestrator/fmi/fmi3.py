@@ -35,7 +35,6 @@ _DISCRETE_INPUT, _CLOCKED_INPUT, _CLOCKED = range(3)
 
 
 def in_words_of_3(call: str) -> str:
-    """The name of a function or status of FMI 2.0 in FMI 3.0."""
     for old, new in _NAMES.items():
         call = call.replace(old, new)
     return call
@@ -142,7 +141,6 @@ class Fmi3Library:
         table.specials, table.n_specials = ctypes.addressof(self._specials), len(specials)
 
     def prepare(self, adapter: Any) -> None:
-        """Make the adapter's next instance one of this FMU."""
         for place, name in enumerate(FUNCTIONS):
             function = getattr(self._library, f"fmi3{name}", adapter.fmi3_absent)
             self._table.functions[place] = ctypes.cast(function, ctypes.c_void_p)

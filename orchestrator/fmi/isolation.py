@@ -28,8 +28,6 @@ from orchestrator.fmi.remote_calls import Form, RemoteCalls
 
 
 class IsolatedComponent(RemoteCalls):
-    """An instance of an FMU in a process of its own."""
-
     def __init__(
         self, name: str, description: FmuDescription, directory: Path | None = None, limits: Limits | None = None
     ) -> None:
@@ -138,7 +136,6 @@ class IsolatedComponent(RemoteCalls):
         return self._typed(matrix, found, len(unknowns), len(knowns))
 
     def close(self) -> None:
-        """End the process and remove what was written for it."""
         process = self._process
         if process is not None and self._end is None and process.running:
             self._box.client.patience = min(self._box.client.patience, 5.0)

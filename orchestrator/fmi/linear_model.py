@@ -57,7 +57,6 @@ def linear_model_members(model: EmbeddedModel) -> dict[str, bytes]:
 
 
 def read_embedded_model(path: Path) -> EmbeddedModel | None:
-    """The linear model in an FMU; None where it has none."""
     member = f"{FOLDER}/linear_model.json"
     try:
         text = read_member(path, member)

@@ -42,7 +42,6 @@ def on_known_machine() -> bool:
 
 
 def unshare(flags: int) -> None:
-    """Leave the namespaces that are shared with the parent."""
     _done(libc().unshare(flags))
 
 

@@ -21,7 +21,6 @@ PORT = tuple(variable.name for variable in (*INPUTS, *OUTPUTS))
 """Variables of the port; their places are their value references."""
 
 START = tuple(variable.name for variable in START_VALUES)
-"""Its parameters: the rating and the power flow's start values."""
 
 _SAME, _NEAR, _OTHER = 0.01, 1.06, 2.0
 """How far the rating of a binding may be from the FMU's own, and the factors from which on its start is another's: in
@@ -173,7 +172,6 @@ class BoundDescription(FmuDescription):
 
     @classmethod
     def of(cls, inner: FmuDescription, port: PortMap) -> Self:
-        """Describe an FMU through a port map whose variables were checked."""
         inner_names = {name: m.variable for name, m in port.signals.items()}
         for name in inner.variables:
             if name not in port.taken:

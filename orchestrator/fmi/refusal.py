@@ -46,11 +46,9 @@ def _partly(reached: float | None, time: float) -> str:
 
 
 def in_its_words(description: FmuDescription, text: str) -> str:
-    """A call or status by the name that the FMU's own version of FMI has for it."""
     return in_words_of_3(text) if description.fmi_version == "3.0" else text
 
 
 def check_log(name: str, said_by: Said, call: str) -> None:
-    """Refuse a call that returned OK and logged an error all the same."""
     if errors := said_by(ERROR):
         raise ComponentError(name, call, "an error in the log", "; ".join(errors))

@@ -28,7 +28,6 @@ _NEW_NAMESPACES = 0x7E020000
 _CALLS: Mapping[str, Mapping[str, Sequence[int]]] = tomllib.loads(
     Path(__file__).with_name("system_calls.toml").read_text(encoding="utf-8")
 )
-"""Numbers on both architectures, by groups and names."""
 
 _KILL, _TGKILL = (62, 129), (234, 131)
 _SOCKETPAIR, _CLONE, _CLONE3, _PRCTL = (53, 199), (56, 220), (435, 435), (157, 167)

@@ -136,7 +136,6 @@ def _entered() -> str:
 
 
 def _supervise(request: dict[str, Any], told: int, work: Path, means: Means) -> NoReturn:
-    """Wait for the end of the worker or of gfor, whichever comes first."""
     limits, me = Limits(**request["limits"]), os.getpid()
     poll = select.poll()
     poll.register(0, select.POLLIN)

@@ -27,7 +27,6 @@ READER = "orchestrator.fmi.dll_reading"
 
 
 def foreign_platforms(library: Path) -> tuple[str, ...]:
-    """Platforms other than this machine's whose DLLs run here."""
     try:
         with library.open("rb") as file:
             windows = file.read(2) == b"MZ" and sys.platform == "linux"
@@ -44,7 +43,6 @@ def foreign_platforms(library: Path) -> tuple[str, ...]:
 
 
 def is_vendor_file(path: Path) -> bool:
-    """Whether a file is taken for a DLL or a device's file, by its ending."""
     return path.suffix.lower() in (*DLL_ENDINGS, DEVICE_ENDING)
 
 

@@ -191,7 +191,6 @@ class Server:
         return False
 
     def next_shared(self) -> Path:
-        """File for the memory of the next program."""
         if not self.shared:
             raise NoWineError("this process has as many programs under Wine as it may; use fewer instances at once")
         return self.shared.pop()

@@ -33,7 +33,6 @@ _ENDED = os.WEXITED | os.WNOHANG | os.WNOWAIT if hasattr(os, "waitid") else 0
 _FROM_OUTSIDE = tuple(
     -getattr(signal, name) for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT") if hasattr(signal, name)
 )
-"""How a process is ended by others."""
 _TO_END = 2.0  # for a program that no longer answers to end [s]
 _WORDS = 4000  # most bytes of its last words that are read
 _idle: list[tuple[Path, "subprocess.Popen[bytes]"]] = []
@@ -115,7 +114,6 @@ class WineProgram:
         return memory
 
     def attach(self) -> None:
-        """Make the next instance of an FMU in this process one of the library."""
         proxy().wine_attach(self.address, self._process.pid)
 
     def ask(self, command: int, *arguments: int, data: bytes = b"", answer: int = 0) -> tuple[int, bytes]:

@@ -25,7 +25,6 @@ def stand_in_at(place: Place, model: str) -> ComponentTable:
 
 
 def vendors_device_at(place: Place, template: Place) -> ComponentTable:
-    """A vendor's device with its settings from another place, at a place."""
     own = settings_of(template)
     return template.table.model_copy(
         update={
@@ -37,12 +36,10 @@ def vendors_device_at(place: Place, template: Place) -> ComponentTable:
 
 
 def settings_of(place: Place) -> dict[str, Value]:
-    """The values of the device at a place that are its own and not the place's."""
     return {name: value for name, value in place.plan.parameters.items() if name not in _OF_PLACE}
 
 
 def file_at(place: Place, file: Path, binding: Path | None, values: Mapping[str, Value]) -> ComponentTable:
-    """An FMU, a vendor's DLL or a device's file, at a place."""
     if wrong := [name for name in values if name in _OF_PLACE]:
         raise InputError(f"{file}: {', '.join(wrong)} cannot be set, because it is the place's, not the device's")
     return ComponentTable(

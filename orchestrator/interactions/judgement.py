@@ -97,7 +97,6 @@ class JudgedPair:
 
     @property
     def is_known(self) -> bool:
-        """Whether all three systems have a verdict and a damping."""
         return all(one.is_known for one in (self.joint, *self.alone))
 
     @property

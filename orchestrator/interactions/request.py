@@ -73,7 +73,6 @@ class InteractionsRequest(OverPoints):
     black_box: bool = asked(FLAG, False, "identify the components that hide their states from their inputs and outputs")
 
     def given_devices(self) -> tuple[Device, ...]:
-        """The devices that are tried beside those of the case."""
         if self.places and not (self.swap or self.devices):
             raise InputError("--place says where devices are swapped; give --swap or a --device as well")
         if isinstance(self.bindings, Mapping):

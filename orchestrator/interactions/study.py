@@ -77,7 +77,9 @@ def plan_interactions(case: Case, request: InteractionsRequest) -> InteractionsP
             f"{case.path}: scenario {name!r} has no converter: no component with the inputs v_re, v_im and the outputs "
             "i_re, i_im that is no generator; to mark a component as a converter, set 'vendor' in its table"
         )
-    stand_in = request.stand_in or (f"{STAND_IN}_phasor" if _of_phasors(prepared, places) else STAND_IN)
+    sources = (c.source for c in prepared.system.connections)
+    phasors = any(s.component in places and s.variable == "y_re" for s in sources)  # an emf behind an admittance
+    stand_in = request.stand_in or (f"{STAND_IN}_phasor" if phasors else STAND_IN)
     systems, swapped = systems_of_vendors(places, stand_in), tuple[str, ...]()
     devices = request.given_devices()
     if request.swap or devices:
@@ -107,11 +109,6 @@ def _scenario(case: Case, wanted: str | None) -> str:
             f"--scenario: {', '.join(known)}"
         )
     return known[0] if wanted is None else wanted
-
-
-def _of_phasors(prepared: PreparedScenario, places: Mapping[str, Place]) -> bool:
-    """Whether the network takes an emf behind an admittance from its devices."""
-    return any(c.source.component in places and c.source.variable == "y_re" for c in prepared.system.connections)
 
 
 def _swapped(places: Mapping[str, Place], wanted: Sequence[str]) -> tuple[str, ...]:

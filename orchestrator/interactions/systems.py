@@ -49,7 +49,6 @@ Exchanged = dict[str, ComponentTable]  # what stands at a place in place of the 
 
 
 def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemName, Exchanged]:
-    """The case as it is, without any vendor, with each alone and with each pair."""
     vendors = vendors_of(places)
     if len(vendors) > MOST_VENDORS:
         count = len(vendors)
@@ -67,7 +66,6 @@ def systems_of_vendors(places: Mapping[str, Place], model: str) -> dict[SystemNa
 
 
 def assignments(places: Mapping[str, Place], at: Sequence[str], given: Sequence[Device]) -> dict[SystemName, Exchanged]:
-    """Each device at each of some places, in all ways."""
     templates = first_of({name: places[name] for name in at})
     vendors = {place.vendor for place in places.values()}  # those at places that are not swapped as well
     if twice := [device.name for device in given if device.name in vendors]:

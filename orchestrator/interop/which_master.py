@@ -114,7 +114,6 @@ def _is(fit: Candidate, rules: MasterRules) -> bool:
 
 
 def instructions(step_size: float, stop_time: float, platforms: tuple[str, ...]) -> str:
-    """How to couple and run the probe pair in another tool."""
     signals = ", ".join(f"`{signal}`" for signal in SIGNALS)
     usual = (step_size, stop_time) == (STEP_SIZE, STOP_TIME)
     options = "" if usual else f" --step {step_size:g} --stop {stop_time:g}"

@@ -148,7 +148,6 @@ def own_models(models: UnitModels, measured: Measurements, found: SpectralLine, 
 
 
 def _fits(model: UnitModel, place: Site, base: float) -> bool:
-    """Whether a place's power is about that of the model's operating point."""
     wanted = model.voltage * np.conj(model.current)
     return bool(abs(complex(place.p.mean(), place.q.mean()) / base - wanted) < _OTHER_POINT * max(abs(wanted), 0.1))
 

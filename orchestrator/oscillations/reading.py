@@ -29,7 +29,6 @@ CONTEST_FILES = ("BusVolMag.txt", "BusVolAng.txt", "LinCurMag.txt", "LinCurAng.t
 
 
 def measurements_of(dataset: xr.Dataset, label: str) -> Measurements:
-    """A run's record or a measured one."""
     times = np.asarray(dataset["time"].values, dtype=np.float64)
     places, base = (_of_run(dataset), 1.0) if "places" in dataset.attrs else _of_columns(dataset, label)
     if not places:
@@ -93,7 +92,6 @@ def _of_columns(dataset: xr.Dataset, label: str) -> tuple[list[Site], float]:
 
 
 def _in_base(curve: xr.DataArray, what: str, where: str) -> tuple[Numbers, str]:
-    """Values in the first unit that fits."""
     unit = str(curve.attrs.get("units", "")).strip()
     values = np.asarray(curve.values, dtype=np.float64)
     if not unit and what not in ("va", "ia"):

@@ -110,7 +110,6 @@ def _rows(one: Sources) -> Iterator[Sequence[str]]:
 
 
 def opinions_table(head: str, one: Located) -> PlainTable:
-    """What each method says of an oscillation."""
     columns = ("Method", "Applies", "Names", "Places, the largest part first")
     rows = [
         (o.method, "yes" if o.applies else "no", o.place or "–",

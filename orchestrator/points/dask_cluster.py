@@ -50,7 +50,6 @@ class ClusterWatch:
         self._seen = self._looked = time.monotonic()
 
     def look(self) -> None:
-        """Tell which workers are lost."""
         now = time.monotonic()
         if now - self._looked < INTERVAL:
             return

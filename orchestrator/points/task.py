@@ -102,7 +102,6 @@ class Task:
         return plain({name: getattr(self, name) for name in own})
 
     def failed(self, failure: Failure) -> Any:
-        """The record of a point that could not be computed."""
         return self.record(failure=failure)
 
 

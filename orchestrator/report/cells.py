@@ -88,13 +88,11 @@ def found_from(word: str, folder: Path) -> Path | str:
 
 
 def _hash(case: Case) -> str:
-    """Of what a case and its parameter files say."""
     values = [file.values if isinstance(file, ParameterFile) else file for file in case.parameter_files.values()]
     return hashlib.sha256(f"{case.text}{values}".encode()).hexdigest()
 
 
 def check_case(study: Mapping[str, Any], case: Case, folder: Path) -> None:
-    """Refuse a case that is not the one of the study."""
     if study["hash"] != _hash(case):
         raise InputError(
             f"{folder / CELLS}: {case.path} is not as it was when the study was computed, or is another file; compute "

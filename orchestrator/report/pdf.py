@@ -12,7 +12,6 @@ _PATIENCE = 120  # how long the browser may take [s]
 
 
 def find_browser() -> str | None:
-    """Path of a browser that can print without a window."""
     return next((found for name in BROWSERS if (found := shutil.which(name))), None)
 
 

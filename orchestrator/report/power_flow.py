@@ -14,7 +14,6 @@ COLUMNS = {
         "q_from_mvar": "Q from [Mvar]", "p_to_mw": "P to [MW]", "q_to_mvar": "Q to [Mvar]", "losses_mw": "Losses [MW]",
     },
 }  # fmt: skip
-"""Tables, and the heading of each column."""
 
 TEXTS = {"machines": 2, "buses": 1, "branches": 3}  # how many columns at the left of each table hold text
 _DIGITS = {"v_pu": 4, "angle_deg": 2, "rating_mva": None, "losses_mw": 3}

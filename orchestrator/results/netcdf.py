@@ -137,7 +137,6 @@ class ReservedFile(RawIOBase):
 
 
 def _reserve(file: BinaryIO, size: int) -> None:
-    """Have room on the disk, or fail."""
     if hasattr(os, "posix_fallocate"):
         os.posix_fallocate(file.fileno(), 0, size)
         return

@@ -8,5 +8,4 @@ said: list[Callable[[], dict[str, Any]]] = []
 
 
 def as_typed() -> str:
-    """The command in force."""
     return str(said[-1]()["command"])

@@ -33,7 +33,6 @@ def recorded_size(prepared: PreparedScenario, *, csv: bool) -> float:
 
 
 def require_room(scenarios: Sequence[PreparedScenario], folder: Path, *, csv: bool) -> None:
-    """Compare the size of all recordings with what is free."""
     needed, free = sum(recorded_size(prepared, csv=csv) for prepared in scenarios), shutil.disk_usage(folder).free
     if needed <= free:
         return

@@ -72,7 +72,6 @@ def measuring_places(prepared: PreparedScenario) -> dict[str, str]:
 
 
 def versions_of(packages: Iterable[str]) -> dict[str, str]:
-    """Versions of packages, by name, without those whose extra is not installed."""
     found = {}
     for package in packages:
         with suppress(PackageNotFoundError):
@@ -97,7 +96,6 @@ class Recorded(Protocol):
 
 
 def column_attributes(names: Iterable[str], prepared: PreparedScenario) -> dict[str, dict[str, str]]:
-    """Unit and long name of recorded variables and of the time, by name."""
     components = prepared.system.components
     found = {"time": {"units": "s", "long_name": "Time"}}
     for name in names:
@@ -108,7 +106,6 @@ def column_attributes(names: Iterable[str], prepared: PreparedScenario) -> dict[
 
 
 def trajectory_dataset(recorder: Recorded, prepared: PreparedScenario) -> xr.Dataset:
-    """Recorded variables as a labelled dataset over time [s]."""
     attributes = column_attributes(recorder.names, prepared)
     values = recorder.values
     data = {name: ("time", values[:, k].copy(), attributes[name]) for k, name in enumerate(recorder.names)}
@@ -169,7 +166,6 @@ def save_json(content: Any, path: Path) -> None:
 
 
 def save_matrices(content: Mapping[str, Any], path: Path) -> None:
-    """Write matrices in MATLAB's format."""
     from scipy.io import savemat  # noqa: PLC0415 - a tenth of a second that only this format needs
 
     file = io.BytesIO()

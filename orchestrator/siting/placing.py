@@ -41,7 +41,6 @@ def foreign(fmu: Path, binding: Path | None, rating: float | None) -> ComponentT
 
 
 def name_at(bus: str) -> str:
-    """Name of the component that is put at a bus."""
     return f"site_{bus}"
 
 

@@ -130,7 +130,6 @@ def _called(seen: SeenMode) -> str:
 
 
 def sureness(result: SiteResult) -> list[str]:
-    """What the coupled FMUs say of the best places."""
     before = result.intact.modes[0].mode.damping_percent
     return [_confirmed(result, one, before) for one in result.confirmations] or ["not confirmed by coupled FMUs"]
 

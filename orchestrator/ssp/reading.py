@@ -114,7 +114,6 @@ def _converted(value: SspValue, unit: str) -> float | bool | str:
 
 
 def _add_study(tables: dict[str, Any], study: SspStudy, path: Path) -> None:
-    """Add the tables of our annotation to those that SSP itself gives."""
     for name, content in study.tables.items():
         if not isinstance(content, type(tables.get(name, content))):
             raise InputError(f"{path}: the annotation {STUDY_TYPE} gives {name} as {content!r}; export the SSP again")

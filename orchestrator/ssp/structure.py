@@ -171,7 +171,6 @@ class _Reader:
             raise InputError(f"only the type {expected}, with sources relative to the archive, is supported")
 
     def _content(self, element: Element, inline: str, name: str) -> Element:
-        """The content that an element refers to by its source, or holds itself."""
         source = element.get("source")
         if source:
             return self._archive.xml(self._archive.member(source))

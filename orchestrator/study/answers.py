@@ -108,7 +108,6 @@ def of_run(result: RunResult) -> ScenarioAnswer:
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:
-    """A remark behind what does not fit between devices and their bindings."""
     faults = [f"{name}: {', '.join(m.fault for m in found)}" for name, found in result.misfits.items()]
     return short("; ".join([*faults, remark] if remark else faults), _LONGEST)
 

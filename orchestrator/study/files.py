@@ -41,7 +41,6 @@ def save_run(result: RunResult, scenario: ScenarioFolder, *, csv: bool = True) -
 
 
 def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
-    """Write modes, participation and shapes of all scenarios; return the plots."""
     save_table(_mode_rows(results), folder / "modes.csv")
     save_table(_participation_rows(results), folder / "participation.csv")
     save_table(_shape_rows(results), folder / "mode_shapes.csv")
@@ -71,7 +70,6 @@ def write_modes(results: Sequence[ModesResult], folder: Path) -> list[str]:
 
 
 def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd | None = None) -> list[Path]:
-    """Write what concerns all scenarios together; return the plots."""
     case = results[0].modes.prepared.case
     write_text(folder / "case.toml", case.text)
     save_table(_shift_rows(results), folder / "step_size.csv")

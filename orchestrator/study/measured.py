@@ -31,7 +31,6 @@ class CommonTimes:
     _recorded: tuple[Numbers, Numbers]
 
     def values(self, run: int, signal: Numbers) -> Numbers:
-        """Values at the common times, shape (n,)."""
         rows = self._rows[run]
         found = signal[rows] if rows is not None else np.interp(self.times, self._recorded[run], signal)
         return np.asarray(found, dtype=float)
@@ -85,7 +84,6 @@ def is_measured(curve: xr.DataArray) -> bool:
 
 
 def measured_modes(window: xr.DataArray, coarser: float = 1.0) -> list[IdentifiedMode]:
-    """The modes of a measured signal."""
     times, values = window["time"].values, np.asarray(window.values, dtype=float)
     _check(times, values, float(window.coords[LINE_FREQUENCY]))
     deviation = values - float(values.mean())

@@ -43,7 +43,6 @@ class NamedSystem:
 
 
 Computed = Callable[[PreparedScenario], NamedSystem]
-"""Gives the model of a scenario, with the names that its shapes give."""
 
 Undamped = Callable[[Mapping[str, float]], NamedSystem]  # gives the system itself with other gains
 

@@ -139,7 +139,6 @@ class ModesRequest:
     )  # fmt: skip
 
     def check(self) -> None:
-        """Refuse what contradicts itself."""
         if self.critical is not None and not self.frequencies[0] > 0:
             raise InputError("--critical needs --range to begin above 0 Hz, such as 0.1:2")
         if self.black_box and self.directional:

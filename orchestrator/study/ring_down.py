@@ -77,7 +77,6 @@ def _obstacle(modes: ModesResult, times: Numbers, findings: Sequence[Finding]) -
 
 
 def _is_other(finding: Finding, frequency_hz: float) -> bool:
-    """Whether an oscillation was found that does not decay and is not the mode."""
     found = finding.figures.get("frequency_hz")
     lasting = finding.kind in ("growing_oscillation", "sustained_oscillation")
     return lasting and found is not None and abs(found - frequency_hz) > _SAME * frequency_hz

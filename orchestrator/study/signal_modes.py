@@ -108,7 +108,6 @@ def identified_mode_json(mode: IdentifiedMode) -> dict[str, Any]:
 
 
 def doubt_text(mode: IdentifiedMode) -> str:
-    """What is doubtful about a mode, as one clause."""
     return f"{mode.frequency_hz:.4g} Hz is doubtful: {'; '.join(mode.doubts)}"
 
 

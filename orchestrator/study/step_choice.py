@@ -79,7 +79,6 @@ class StepChoice:
 
     @property
     def schedules(self) -> tuple[ScheduleName, ...]:
-        """Those that were tried."""
         return tuple(dict.fromkeys(trial.schedule for trial in self.trials))
 
     def of(self, schedule: ScheduleName) -> list[TriedStep]:

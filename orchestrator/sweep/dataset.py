@@ -24,7 +24,6 @@ from orchestrator.sweep.trajectories import GridPlace, Trajectory
 
 _FIGURES = ("real", "imag", "frequency", "damping", "similarity")
 _ATTRIBUTES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-"""Unit and long name by the variable's name."""
 
 _IN_DATASET = {"real": "eigenvalue_real", "imag": "eigenvalue_imag"}  # xarray's own attributes have the short names
 _SEPARATOR = "; "  # between the warnings of one point
@@ -35,7 +34,6 @@ Curve = list[tuple[GridPlace, dict[str, Any]]]  # A trajectory's figures by plac
 
 
 def swing_states(sweep: ScenarioSweep, patterns: list[str]) -> list[str]:
-    """States of a scenario that the case calls its swing states."""
     names = dict.fromkeys(n for record in sweep.points.values() if record.modes for n in record.modes.names)
     return [name for name in names if any(fnmatch.fnmatchcase(name, p) for p in patterns)]
 
@@ -158,7 +156,6 @@ def _attributes(samples: Samples) -> dict[str, Any]:
 
 
 def _asked(samples: Samples) -> dict[str, None]:
-    """What was questioned before the sweep."""
     return {str(question): None for sweep in samples.result.scenarios for question in sweep.prepared.questions}
 
 

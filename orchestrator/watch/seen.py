@@ -40,7 +40,6 @@ class Seen:
     turns: Mapping[str, Numbers]
 
     def until(self, time: float) -> "Seen":
-        """The part of the data up to a time [s]."""
         count = int(np.searchsorted(self.times, time * (1 + 1e-12), side="right"))
         if count == len(self.times):
             return self

@@ -30,7 +30,6 @@ class Stretch:
     last: bool = False
 
     def parts(self) -> Iterator["Stretch"]:
-        """The parts of the stretch between all events, noticed or not."""
         edges = (self.begin, *self.breaks, self.end)
         for begin, end in pairwise(edges):
             yield Stretch(begin, end, last=self.last and end == self.end)

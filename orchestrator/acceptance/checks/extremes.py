@@ -32,7 +32,6 @@ def nan_input(subject: Subject) -> CheckResult:
 
 
 def _answer(subject: Subject, deviation: Numbers) -> tuple[str, bool]:
-    """What the FMU does, and whether it tells of its inputs."""
     try:
         with subject.running() as running:
             running.record(3, subject.step_size, subject.one_step())

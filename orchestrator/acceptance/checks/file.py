@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.subject import Subject
+from orchestrator.errors import few
 from orchestrator.fmi.archive import MODEL_DESCRIPTION
 from orchestrator.fmi.description import FmuDescription, VariableInfo
 from orchestrator.fmi.port import without_binding
@@ -20,12 +21,6 @@ _PLAIN = ("", "1", "-", "%", "pu", "p.u.", "p.u", "per unit", "per_unit")
 _BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
-def some_of(texts: list[str], between: str = "; ") -> str:
-    """The first few, and how many more there are."""
-    more = f"{between}and {len(texts) - _SOME} more" if len(texts) > _SOME else ""
-    return between.join(texts[:_SOME]) + more
-
-
 @check("fmi_validity", "Does the file keep to FMI 2.0?")
 def fmi_validity(subject: Subject) -> CheckResult:
     grave, harmless = validation_problems(subject.directory)
@@ -33,10 +28,10 @@ def fmi_validity(subject: Subject) -> CheckResult:
     if not identifier.isidentifier():
         harmless.append(f"modelIdentifier {identifier!r} is not a C identifier")
     if grave:
-        return failed("fmi_validity", "invalid FMI", some_of(grave), problems=grave + harmless)
+        return failed("fmi_validity", "invalid FMI", few(grave, _SOME, "; "), problems=grave + harmless)
     if harmless:
         remedy = "breaks the standard without changing an answer here; tell the author"
-        return remarked("fmi_validity", some_of(harmless), remedy, problems=harmless)
+        return remarked("fmi_validity", few(harmless, _SOME, "; "), remedy, problems=harmless)
     return passed("fmi_validity", "FMPy's validator finds no problem")
 
 
@@ -46,14 +41,16 @@ def units(subject: Subject) -> CheckResult:
     bound = described is not subject.description
     wrong = _wrong_definitions(subject.directory) + _wrong_port_units(described, bound=bound)
     if wrong:
-        return failed("units", "wrong units", some_of(wrong))
+        return failed("units", "wrong units", few(wrong, _SOME, "; "))
     open_ends = [
         v.name
         for v in described.variables.values()
         if v.causality in ("input", "output") and v.type == "Real" and not v.unit
     ]
     if open_ends:
-        return remarked("units", f"no unit is declared for {some_of(open_ends)}", "say the unit in the binding")
+        return remarked(
+            "units", f"no unit is declared for {few(open_ends, _SOME, '; ')}", "say the unit in the binding"
+        )
     return passed("units", "every Real input and output has a unit that fits its definition")
 
 
@@ -108,8 +105,8 @@ def declared_starts(subject: Subject) -> CheckResult:
         elif info.type == "Real" and (text := _out_of_bounds(info)):
             wrong.append(text)
     if missing or wrong:
-        texts = wrong + ([f"no start value: {some_of(missing)}"] if missing else [])
-        return failed("declared_starts", "bad start values", some_of(texts))
+        texts = wrong + ([f"no start value: {few(missing, _SOME, '; ')}"] if missing else [])
+        return failed("declared_starts", "bad start values", few(texts, _SOME, "; "))
     return passed("declared_starts", "all have a start value within their bounds")
 
 
@@ -129,6 +126,6 @@ def declared_dependencies(subject: Subject) -> CheckResult:
         return not_applicable("declared_dependencies", "because the FMU has no outputs")
     silent = [name for name in described.outputs if described.output_dependencies.get(name) is None]
     if silent and described.inputs:
-        says = f"nothing is said of {some_of(silent)}, so all inputs are assumed to act at once"
+        says = f"nothing is said of {few(silent, _SOME, '; ')}, so all inputs are assumed to act at once"
         return remarked("declared_dependencies", says, "ask for the dependencies, so that a master can order its calls")
     return passed("declared_dependencies", f"all {len(described.outputs)} outputs say what they depend on")

@@ -54,7 +54,6 @@ def _first_fault(subject: Subject, look: Callable[[Subject, Setting], CheckResul
 
 
 def _independent(subject: Subject, setting: Setting) -> CheckResult:
-    """Look with some parameters set."""
     moved = _idle(subject, setting)
     if moved is not None:
         says = f"{moved} of an instance that stands still moves while another one runs"

@@ -6,13 +6,12 @@ from collections.abc import Callable
 import numpy as np
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, provoked, remarked
-from orchestrator.acceptance.checks.file import some_of
 from orchestrator.acceptance.checks.port import POINTS
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.acceptance.process import HostedComponent, ProcessEndedError
 from orchestrator.arrays import Numbers
-from orchestrator.errors import ComponentError, EndedError, InputError, UnsupportedFmuError
+from orchestrator.errors import ComponentError, EndedError, InputError, UnsupportedFmuError, few
 from orchestrator.fmi.answers import names
 from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.port import without_binding
@@ -39,7 +38,7 @@ def loads(subject: Subject) -> CheckResult:
         return failed("loads", "no instance", str(error))
     clocks = f"; it has {len(described.clocks)} clocks, which tick here" if described.clocks else ""
     if spare:
-        says = f"its binary has no {some_of(spare, ', ')}, which nothing that it declares needs{clocks}"
+        says = f"its binary has no {few(spare, 3)}, which nothing that it declares needs{clocks}"
         remedy = f"FMI {described.fmi_version} asks for all of them; other masters may refuse it, tell the author"
         return remarked("loads", says, remedy)
     return passed("loads", f"its binary loads, has all functions, and gives an instance{clocks}")

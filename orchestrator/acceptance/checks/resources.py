@@ -148,8 +148,6 @@ def _of_so_many_resets(subject: Subject, count: int) -> float | _Unknown:
 
 
 def _of_files(subject: Subject) -> float | _Unknown:
-    """Files that every instance leaves open."""
-
     def count() -> int:
         return subject.process().number("open files", -1, "open_files")
 

@@ -216,7 +216,6 @@ class Running(Closing):
         self.begin()
 
     def begin(self) -> None:
-        """Initialise the instance, new or reset."""
         subject, component = self.subject, self.component
         self.time = subject.start_time
         subject.prepare(component, self.point, self.parameters)
@@ -236,7 +235,6 @@ class Running(Closing):
         return self._out.read().copy()
 
     def step(self, step_size: float) -> None:
-        """Do one communication step [s]."""
         self.component.step(self.time, step_size)
         self.time += step_size
 

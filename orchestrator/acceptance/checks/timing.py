@@ -222,7 +222,8 @@ def step_invariance(subject: Subject) -> CheckResult:
         return remarked("step_invariance", seen, "it converges, but needs a smaller communication step", **figures)
     if breaks and _only_switches(subject, runs, h):
         breaks = False
-    if breaks and h == subject.step_size and 4 * h <= _claimed(subject) * (1 + 1e-9):
+    named = max(subject.description.default_step_size or 0.0, subject.use.step_size or 0.0)
+    if breaks and h == subject.step_size and 4 * h <= named * (1 + 1e-9):
         return failed("step_invariance", "step-dependent answer", f"{seen}, which it declares to bear", **figures)
     if breaks and h == subject.step_size:
         remedy = f"keep to steps of {2 * h:g} s or smaller ones"
@@ -239,13 +240,7 @@ def _only_switches(subject: Subject, runs: tuple[Numbers, Numbers, Numbers], h: 
     return bool(switches_elsewhere(subject.watched, [((double, 2 * h), (fourfold, 4 * h))]))
 
 
-def _claimed(subject: Subject) -> float:
-    """The longest communication step that the file, or whoever uses it, names [s]."""
-    return max(subject.description.default_step_size or 0.0, subject.use.step_size or 0.0)
-
-
 def _switching(name: str, signals: list[str], seen: str, **figures: float) -> CheckResult:
-    """What is to be said where only moments of switching follow the step."""
     says = f"{', '.join(signals)} switches at other moments with another step, and nothing else differs; {seen}"
     remedy = "the moments of switching are as exact as the communication step: take a smaller one where they matter"
     return remarked(name, says, remedy, switching=signals, **figures)

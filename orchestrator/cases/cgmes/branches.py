@@ -36,7 +36,6 @@ def branch(
 
 
 def lines(network: Any, nominal: dict[str, float]) -> Iterator[Branch]:
-    """Lines that are closed at both ends."""
     for row in network.get_lines(all_attributes=True).itertuples():
         ends = row.bus1_id, row.bus2_id
         if row.connected1 and row.connected2 and all(end in nominal for end in ends):

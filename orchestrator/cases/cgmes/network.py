@@ -56,7 +56,6 @@ def _read(path: Path, versions: tuple[tuple[str, int], ...], leaving_out: tuple[
 
 
 def convert(place: str, source: Any, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
-    """Tables of a network that pypowsybl holds."""
     return _Reading(place, source).network(leaving_out)
 
 

@@ -32,7 +32,6 @@ CAPACITANCE = 0.05
 """Capacitance at the connection point [pu of the plant's rating]: a voltage must not jump between two FMUs."""
 
 RECORDED = ("v_re", "v_im", "v", "p", "q", "duplicate.p", "duplicate.q", "source.p", "source.q")
-"""Outputs of the bench that are recorded."""
 
 STEP, INTERVAL = 1e-4, 1e-3  # communication step, and interval of the record [s]
 

@@ -215,8 +215,6 @@ def stays_within(low: float, high: float, longest: float) -> Judge:
 
 
 def frequency_settles() -> Judge:
-    """The frequency stands still at the end of the run."""
-
     def judge(row: MeasuredRow) -> RowFinding:
         end = float(row.times[-1])
         part = row.frequency[row.within(end - LOOK, end - 0.05)]

@@ -27,7 +27,6 @@ class Stiffness:
     powers: dict[str, Complex]  # as of `powers_over`
 
     def least(self, name: str, low: float, high: float) -> tuple[float, float]:
-        """Least size of one of them in a band, and its frequency [Hz]."""
         inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
         if not len(inside):
             raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")

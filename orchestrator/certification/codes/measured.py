@@ -107,7 +107,6 @@ class MeasuredRow:
 
     @property
     def _begun(self) -> bool:
-        """Whether the response reaches the first event."""
         return bool(self.events) and float(self.times[-1]) >= self.events[0]
 
     @cached_property

@@ -39,7 +39,6 @@ class BenchProgramme:
 
     @property
     def times(self) -> tuple[float, ...]:
-        """When something changes [s], each time once."""
         return tuple(dict.fromkeys(change.time for change in self.changes))
 
     def source_angle(self, times: Numbers, f_n: float) -> Numbers | None:

@@ -88,7 +88,6 @@ def _word(verdict: RowVerdict, finding: RowFinding) -> str:
 
 
 LIMIT = "#a11d1d"
-"""Colour of limits."""
 
 BEFORE = 0.25  # so much of the response before an event is shown beside an envelope [s]
 

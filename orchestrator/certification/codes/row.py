@@ -133,7 +133,6 @@ _KINDS: dict[str, tuple[Any, str]] = {
     "title": _TEXT, "source": _TEXT, "date": _TEXT, "where": _TEXT, "f_n": (float, "the rated frequency [Hz], as 50.0"),
     "left_out": _TEXTS, "readings": _TEXTS,
 }  # fmt: skip
-"""Words of a code, each with what it is."""
 
 
 def in_words(key: str) -> str:

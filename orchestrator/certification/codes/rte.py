@@ -31,7 +31,6 @@ DECLARED = (
     Declaration("D", "damping", "pu of power per pu of frequency", 0.1, 2000.0),
     Declaration("H", "inertia constant", "s", 0.05, 50.0),
 )
-"""What the applicant has to declare."""
 
 HORIZON = 5.0  # how long a response has to stay within its envelope [s]
 STRONG, WEAK = 10.0, 2.0  # short-circuit ratios: the largest and the least

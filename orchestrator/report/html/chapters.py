@@ -46,7 +46,6 @@ Content = Mapping[str, Any]
 
 
 def chapters_of(place: Path) -> list[Chapter]:
-    """What one JSON, or those of a folder, say."""
     files = [place] if place.is_file() else sorted(place.glob("*.json"))
     if place.is_dir() and (place / "sweep.nc").is_file():
         files = [file for file in files if file.name != "limits.json"]  # `of_sweep` tells of it
@@ -138,7 +137,6 @@ def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
 
 
 def _warned(chapter: Chapter, content: Any) -> Chapter:
-    """With the study's warnings among what was not judged."""
     told = content.get("warnings") if isinstance(content, dict) else None
     more = told if isinstance(told, list) else []
     return replace(chapter, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])))
@@ -366,7 +364,6 @@ def sections(chapter: Chapter, number: int) -> str:
 
 
 def limits_of(place: Path) -> list[Any]:
-    """What ``--until`` found along with a sweep."""
     file = place / "limits.json"
     return list(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else []
 

@@ -16,8 +16,6 @@ _POINTS = 500  # A curve is drawn with about so many points: more than the page 
 
 @dataclass(frozen=True)
 class ChartCurve:
-    """A line through points, with a name that the legend shows."""
-
     label: str
     colour: str
     x: Numbers
@@ -87,7 +85,6 @@ class Frame:
 
 
 def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurve], height: int = 210) -> str:
-    """Curves over one axis; the pointer shows all values at its x."""
     x_all = np.concatenate([c.x for c in curves])
     y_all = np.concatenate([c.y for c in curves])
     frame = Frame(_span(x_all, 0.0), _span(y_all, 0.06), x_label, y_label, height)

@@ -106,7 +106,6 @@ def _parts(place: Path, depth: int = 2) -> Iterator[Path]:
 
 
 def _name(place: Path) -> str:
-    """The folder's."""
     return (place if place.is_dir() else place.parent).resolve().name
 
 

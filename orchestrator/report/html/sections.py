@@ -22,7 +22,6 @@ _KINDS = {
     "run_away": "run-away", "active_limit": "active limit", "loss_of_synchronism": "loss of synchronism",
     "not_judged": "not judged", "not_finite": "not a number",
 }  # fmt: skip
-"""What a run found, in words."""
 
 
 _NOTHING = (

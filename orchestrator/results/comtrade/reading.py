@@ -171,7 +171,6 @@ def read_comtrade(path: Path) -> xr.Dataset:
 
 
 def _apart(path: Path) -> tuple[str, bytes, tuple[str, str]]:
-    """Text of the configuration, samples, and the two paths."""
     found = []
     for suffix in (".cfg", ".dat"):
         same = [p for p in path.parent.glob(f"{glob.escape(path.stem)}.*") if p.suffix.lower() == suffix]

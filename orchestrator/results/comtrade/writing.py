@@ -62,7 +62,6 @@ def write_comtrade(
 
 
 def _interval(times: Numbers) -> float:
-    """Interval of an even recording [s]."""
     if len(times) < 2:
         raise InputError("a recording in COMTRADE needs two rows or more; record a longer run")
     interval = float(times[-1] - times[0]) / (len(times) - 1)
