@@ -11,7 +11,7 @@ from orchestrator.binding.binding import bound_fmu
 from orchestrator.black_box.files import identification_json, save_identification
 from orchestrator.black_box.fitting import fit, passivity, require_fitting
 from orchestrator.black_box.frequency_response import METHODS, Excitation, measure
-from orchestrator.black_box.port import bench_at
+from orchestrator.black_box.port import bench_at, start_of
 from orchestrator.cases.given import Time, binding_path, in_seconds, plain
 from orchestrator.errors import InputError
 from orchestrator.results.staging import new_run_id, staged
@@ -31,10 +31,12 @@ class Admittance:
         Where the device can feed an oscillation.
     rest
         Voltage at the port around which it was measured [pu].
+    rated_hz
+        Rated frequency of the device [Hz].
     """
 
-    def __init__(self, response: Any, rest: complex) -> None:
-        self.response, self.rest = response, rest
+    def __init__(self, response: Any, rest: complex, rated_hz: float = 50.0) -> None:
+        self.response, self.rest, self.rated_hz = response, rest, rated_hz
         self.model, self.passivity = fit(response), passivity(response)
 
     def as_json(self) -> dict[str, Any]:
@@ -108,4 +110,5 @@ def admittance(
     bench = bench_at(description, plain(values), in_seconds(step, "step") or 1e-4, restore=None if use_state else False)
     excited = Excitation(method, low, high)
     excited = excited if amplitude is None else replace(excited, amplitude=amplitude)
-    return Admittance(measure(bench, excited, report), complex(*bench.rest))
+    rated = float(bench.parameters.get("f_n", start_of(description, "f_n"))) or 50.0
+    return Admittance(measure(bench, excited, report), complex(*bench.rest), rated)

@@ -1,6 +1,7 @@
 """Whether a device is stable at a network, by the generalised Nyquist criterion."""
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -136,14 +137,18 @@ class Asked:
         asked, names = ScenariosRequest(values=case_values(values)), [self._scenario] if self._scenario else []
         return choose(replace(load_case(self._case, trust_fmus=self._trust), scans=True), names, asked)[0].prepared
 
-    def judged(
-        self, report: Callable[[str], None] | None = None, point: Mapping[str, Any] = MappingProxyType({})
-    ) -> Nyquist:
-        """Judge it, with other values at an operating point."""
-        result = study_cut(self._request(point), report)
-        return Nyquist(
-            result, lambda v: study_cut(self._request(dict(point) | dict(v))), lambda x: self._settings(result, x)
-        )
+    def at(self, point: Mapping[str, Any]) -> "Asked":
+        """The same with other values; ``device`` among them is the file of another scan of the device."""
+        found, values = copy(self), dict(point)
+        if self._device is not None and (other := values.pop("device", None)) is not None:
+            found._device = Path(other)
+        found._given = self._given | values
+        return found
+
+    def judged(self, report: Callable[[str], None] | None = None) -> Nyquist:
+        """Judge it."""
+        result = study_cut(self._request(), report)
+        return Nyquist(result, lambda values: study_cut(self._request(values)), lambda x: self._settings(result, x))
 
     def _settings(self, result: CutResult, given: Sequence[str]) -> list[Tunable]:
         """Parameters of the device that are not 0: all tunable ones that are not switched off, or those named."""

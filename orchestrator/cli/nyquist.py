@@ -7,17 +7,15 @@ from typing import Any
 from rich.markup import escape
 
 from orchestrator.api.nyquist import Asked
-from orchestrator.asked import Value, read_part
+from orchestrator.asked import read_part
 from orchestrator.black_box.frequency_response import Excitation
 from orchestrator.cli.arguments import add_options
+from orchestrator.cli.by_point import by_point
 from orchestrator.cli.terminal import make_console, print_json, print_parts, said_stages, say
-from orchestrator.errors import NOT_MET, CosimError, InputError
+from orchestrator.errors import NOT_MET, InputError
 from orchestrator.immittance.margins import margins_json
 from orchestrator.immittance.view import GOAL, Nyquist, parts
-from orchestrator.operating_points.points_file import folder_of, settings_in
-from orchestrator.report.tables import make_table
 from orchestrator.results.staging import new_run_id, staged
-from orchestrator.results.storage import save_table
 from orchestrator.safe_files import made_folder
 
 _SHARE = "a share in percent from 0 to below 100, such as '32 %'"
@@ -40,8 +38,10 @@ def run(options: argparse.Namespace) -> int:
     )  # fmt: skip
     folder = made_folder(options.out or Path("results") / f"nyquist_{Path(options.device).stem}", "--out")
     if options.points:
-        return _over_points(options, asked, folder)
-    found = _judged(options, asked, folder, {})
+        judged = lambda values, place: _row(_judged(options, asked.at(values), place))  # noqa: E731
+        rows = by_point(options, folder, judged, {"verdict": "not known"})
+        return NOT_MET if options.fail_unstable and any(row["verdict"] != "stable" for row in rows) else 0
+    found = _judged(options, asked, folder)
     if options.json:
         print_json(found.as_json())
     else:
@@ -49,9 +49,9 @@ def run(options: argparse.Namespace) -> int:
     return NOT_MET if options.fail_unstable and found.verdict != "stable" else 0
 
 
-def _judged(options: argparse.Namespace, asked: Asked, folder: Path, point: dict[str, Value]) -> Nyquist:
+def _judged(options: argparse.Namespace, asked: Asked, folder: Path) -> Nyquist:
     with said_stages() as report:
-        found = asked.judged(report, point)
+        found = asked.judged(report)
         say("question", found.result.questions)
         if options.retune:
             found.retune(options.parameter, distance=options.distance or GOAL, report=report)
@@ -60,25 +60,9 @@ def _judged(options: argparse.Namespace, asked: Asked, folder: Path, point: dict
     return found
 
 
-_COLUMNS = ("point", "verdict", "distance", "gain", "phase_deg", "scr_limit", "remark")
-
-
-def _over_points(options: argparse.Namespace, asked: Asked, folder: Path) -> int:
-    """Judge at each point, in a folder of its own; one that cannot be judged says why, and the others go on."""
-    rows: list[dict[str, Any]] = []
-    for name, values in settings_in(options.points).items():
-        try:
-            found = _judged(options, asked, folder / folder_of(name), values)
-        except CosimError as error:
-            rows.append(dict.fromkeys(_COLUMNS) | {"point": name, "verdict": "not known", "remark": str(error)})
-            continue
-        m = {key: (margin or {}).get("value") for key, margin in margins_json(found.result.margins).items()}
-        told = {"point": name, "verdict": found.verdict, "scr_limit": found.result.scr_limit}
-        rows.append({key: (m | told | {"remark": "; ".join(found.reasons)})[key] for key in _COLUMNS})
-    save_table(rows, folder / "points.csv")
-    if options.json:
-        print_json(rows)
-    else:
-        cells = [[f"{x:.4g}" if isinstance(x, float) else str(x or "") for x in row.values()] for row in rows]
-        print_parts(make_console(), [make_table("Operating points", *_COLUMNS, rows=cells), f"Results in {folder}"])
-    return NOT_MET if options.fail_unstable and any(row["verdict"] != "stable" for row in rows) else 0
+def _row(found: Nyquist) -> dict[str, Any]:
+    m, result = margins_json(found.result.margins), found.result
+    told = {key: (m[key] or {}).get("value") for key in ("distance", "gain", "phase_deg", "delay_s")}
+    at = {"at_hz": (m["distance"] or {}).get("frequency_hz")}
+    ratios = {"scr": result.scr, "lost_below_scr": result.scr_limit}
+    return {"verdict": found.verdict} | at | told | ratios | {"remark": "; ".join(found.reasons)}

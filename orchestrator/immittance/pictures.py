@@ -56,17 +56,15 @@ def _retuned(shown: Sequence[Retuned], goal: float, scr: float | None) -> Figure
 
 def _eigenloci(judgement: CutJudgement, title: str) -> Figure:
     figure = Figure(figsize=(9.0, 4.6), layout="constrained")
-    path, m = judgement.path, judgement.margins
+    path, m, count = judgement.path, judgement.margins, judgement.path.loci.shape[1]
     nearest = sorted(judgement.crossings, key=lambda c: abs(1 + c.real))[:_NAMED]
     near = 1.2 * max([1.5, *(min(abs(c.real), 3.0) for c in judgement.crossings)])
     for axes, reach, name in zip(
         figure.subplots(1, 2), (near, 3 * near), (title, "the same, further off"), strict=True
     ):
-        for k in range(path.loci.shape[1]):
+        for k in range(count):
             z = path.loci[:, k]
-            label = (
-                f"locus {k + 1}" if path.loci.shape[1] <= _NAMED else f"{path.loci.shape[1]} loci" if not k else None
-            )
+            label = f"locus {k + 1}" if count <= _NAMED else None if k else f"{count} loci"
             axes.plot(z.real, z.imag, color=colour(k + 1), label=label)
             axes.plot(z.real, -z.imag, color=colour(k + 1), linestyle=":", linewidth=0.8)
         turn = np.exp(2j * np.pi * np.linspace(0, 1, 200))

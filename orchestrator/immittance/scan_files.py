@@ -17,12 +17,12 @@ import numpy as np
 
 from orchestrator.arrays import Complex, Numbers
 from orchestrator.errors import InputError
+from orchestrator.immittance.forms import from_sequences
 from orchestrator.immittance.scan import SIEMENS, PortPoint, Scan, checked, in_own_form, other_q_axis
 from orchestrator.safe_files import write_text
 
 _COLUMNS = ("[kV]", "[MW]", "[MVAr]", "[rad]")
 _ELEMENTS = ("11", "12", "21", "22")
-_SEQUENCES = np.array([[1, 1j], [1, -1j]]) / math.sqrt(2)
 
 
 def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
@@ -118,6 +118,17 @@ def write_ztool(scan: Scan, path: Path) -> None:
         write_text(path.with_name(f"{root}_power_flow.txt"), "\n".join([heads, *rows]) + "\n")
 
 
+def write_imtb(scan: Scan, path: Path) -> None:
+    """Write the impedances of one port in dq [Ω]; the form has no place for an operating point."""
+    if scan.unit != SIEMENS or len(scan.ports) > 1:
+        raise InputError(f"{scan.source}: IMTB's form is of one port in ohms; give one port, in siemens")
+    columns = {"f": scan.frequencies}
+    for name, z in zip(_ELEMENTS, scan.impedance.reshape(-1, 4).T, strict=True):
+        columns |= {f"Zdut_dq_{name}_re": z.real, f"Zdut_dq_{name}_im": z.imag}
+    rows = np.array(list(columns.values())).T.tolist()
+    write_text(path, "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n")
+
+
 def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     """The device of a file, or its network; rows of negative dq frequencies are left out, they mirror the others."""
     rows = list(csv.DictReader(StringIO(text)))
@@ -129,7 +140,7 @@ def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     frequencies, Z = _numbers(path, rows, f"{wanted[0]}_{frame}")
     if frame == "ab":
         frequencies = frequencies - rated_hz
-        Z = np.linalg.inv(_SEQUENCES) @ Z @ _SEQUENCES
+        Z = from_sequences(Z)
     kept = frequencies > 0
     frequencies, Z = frequencies[kept], Z[kept]
     questions = checked(path.name, frequencies, Z)

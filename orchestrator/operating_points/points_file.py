@@ -31,14 +31,7 @@ def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> l
 
     Raises an `InputError` with file and line: if a column or a cell has no meaning, a name is missing or repeated, two
     columns set one value or switch one element, or there is no row."""
-    rows = rows_of(path, ())
-    if not rows:
-        raise InputError(f"{path}: it has no row; give one for each operating point, with a column 'time' or 'name'")
-    columns = [name for name in rows[0] if name and name != PLACE]
-    label = next((name for name in _LABELS if name in columns), None)
-    if label is None:
-        raise InputError(f"{path}: column 'time' or 'name' is missing; it names the operating points")
-    meant = [name for name in columns if name not in (label, "hours")]
+    rows, label, meant = _labelled(path)
     readings = {name: _reading(path, name, elements, prepared) for name in meant}
     seen: dict[str, str] = {}
     found = []
@@ -53,17 +46,38 @@ def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> l
 
 def settings_in(path: Path) -> dict[str, dict[str, Value]]:
     """Values by point, of a file whose columns are variables; an empty cell leaves the variable as it is."""
+    rows, label, columns = _labelled(path)
     found: dict[str, dict[str, Value]] = {}
-    for row in rows_of(path, ("name",)):
-        name = row["name"].strip()
-        if not name or None in row or folder_of(name) in map(folder_of, found):
-            raise InputError(f"{place_of(row)}: each point needs a name of its own, and no more cells than columns")
-        found[name] = {k: read_value(v.strip()) for k, v in row.items() if k not in ("name", PLACE) and v.strip()}
+    for row in rows:
+        name = _name_of(row, label)
+        if folder_of(name) in map(folder_of, found):
+            raise InputError(f"{place_of(row)}: {label} = {name!r} stands in an earlier row, or shares its folder")
+        found[name] = {column: read_value(text) for column in columns if (text := row[column].strip())}
     return found
 
 
 def folder_of(point: str) -> str:
     return re.sub(r"[^\w.+-]", "_", point)
+
+
+def _labelled(path: Path) -> tuple[list[Row], str, list[str]]:
+    """Rows, the column that names them, and those with what differs."""
+    rows = rows_of(path, ())
+    if not rows:
+        raise InputError(f"{path}: it has no row; give one for each operating point, with a column 'time' or 'name'")
+    columns = [name for name in rows[0] if name and name != PLACE]
+    label = next((name for name in _LABELS if name in columns), None)
+    if label is None:
+        raise InputError(f"{path}: column 'time' or 'name' is missing; it names the operating points")
+    return rows, label, [name for name in columns if name not in (label, "hours")]
+
+
+def _name_of(row: Row, label: str) -> str:
+    if row.get(None):  # type: ignore[call-overload]
+        raise InputError(f"{place_of(row)}: the row has more cells than the first line has columns")
+    if not (name := (row[label] or "").strip()):
+        raise InputError(f"{place_of(row)}: {label} is empty; it names the operating point")
+    return name
 
 
 def questions_about(path: Path, prepared: PreparedScenario, elements: Elements) -> Iterator[Problem]:
@@ -93,11 +107,7 @@ def _point(
     row: Row, label: str, readings: dict[str, Reading], elements: Elements, prepared: PreparedScenario
 ) -> OperatingCase:
     place = place_of(row)
-    if row.get(None):  # type: ignore[call-overload]
-        raise InputError(f"{place}: the row has more cells than the first line has columns")
-    name = (row[label] or "").strip()
-    if not name:
-        raise InputError(f"{place}: {label} is empty; it names the operating point")
+    name = _name_of(row, label)
     settings: dict[str, Setting] = {}
     for column, reading in readings.items():
         text = (row[column] or "").strip()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import InputError
+from orchestrator.immittance import scan_files
 from orchestrator.immittance.scan import PortPoint, Scan, check_sign, other_q_axis
 from orchestrator.immittance.scan_files import read_scan, write_ztool
 from tests.immittance.plants import Line, constant_power
@@ -55,6 +56,18 @@ def test_a_circuit_tells_frequencies_in_rad_s_and_elements_that_say_nothing(tmp_
         InputError, match=r"turns 6.3 times as fast as at the rated 50 Hz: are its frequencies in rad/s"
     ):
         read_scan(tmp_path / "a.txt", 50.0)
+
+
+def test_a_scan_comes_back_from_a_file_of_imtb_as_another_writes_it(tmp_path):
+    line = Scan("line", F, np.linalg.inv(Line(0.05, 0.002).impedance(F)), ("P",))
+    scan_files.write_imtb(line, tmp_path / "a.csv")
+    write_imtb(line, tmp_path / "b.csv")
+    ours, other = (read_scan(tmp_path / name, 50.0) for name in ("a.csv", "b.csv"))
+    assert ours.values == pytest.approx(line.values, rel=1e-12)
+    assert (ours.values == other.values).all()
+    for wrong in (line.scaled(1.0, "pu"), a_scan(ports=("A", "B"))):
+        with pytest.raises(InputError, match="IMTB's form is of one port in ohms"):
+            scan_files.write_imtb(wrong, tmp_path / "c.csv")
 
 
 def test_several_ports_keep_their_order(tmp_path):

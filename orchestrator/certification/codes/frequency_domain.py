@@ -14,6 +14,7 @@ from orchestrator.black_box.port import bench_at
 from orchestrator.certification.codes.bench_point import STEP
 from orchestrator.certification.codes.programme import RATING_MVA, jumps
 from orchestrator.certification.request import CertificationRequest
+from orchestrator.immittance.forms import powers_over, rows_of
 from orchestrator.report.plot_style import STYLE, colour, save_figure
 from orchestrator.results.storage import save_json, save_table
 
@@ -23,28 +24,19 @@ class Stiffness:
     """Powers that a device feeds in, over changes of the voltage at its terminals, at frequencies [Hz]."""
 
     frequencies: Numbers
-    powers: dict[str, Complex]  # P and Q over frequency [pu], angle [rad] and relative magnitude
+    powers: dict[str, Complex]  # as of `powers_over`
 
     def least(self, name: str, low: float, high: float) -> tuple[float, float]:
         inside = np.flatnonzero((self.frequencies >= low) & (self.frequencies <= high))
         if not len(inside):
             raise ValueError(f"no frequency was measured from {low:g} to {high:g} Hz")
-        at = inside[int(np.argmin(np.abs(self.powers[name][inside])))]
-        return float(abs(self.powers[name][at])), float(self.frequencies[at])
+        sizes = np.abs(self.powers[name][inside])
+        return float(sizes.min()), float(self.frequencies[inside[int(np.argmin(sizes))]])
 
 
 def stiffness(response: FrequencyResponse, voltage: complex, f_n: float) -> Stiffness:
-    """Change the basis of a measured response.
-
-    With S = v·i* and i = Y·v in real and imaginary parts, a change dv gives dS = dv·i* + v·(Y·dv)*. A change of the
-    angle is dv = j·v·dθ, one of the magnitude dv = v·dV/V."""
-    current, f = complex(*response.operating_point), response.frequencies
-    by_voltage = np.array([[current.real, current.imag], [-current.imag, current.real]])
-    by_current = np.array([[voltage.real, voltage.imag], [voltage.imag, -voltage.real]])
-    changes = np.array([[-voltage.imag, voltage.real], [voltage.real, voltage.imag]])
-    J = (by_voltage + by_current @ response.continuous()) @ changes
-    return Stiffness(f, {"P/omega": J[:, 0, 0] * f_n / (1j * f), "P/theta": J[:, 0, 0], "Q/V": J[:, 1, 1],
-                         "P/V": J[:, 0, 1], "Q/theta": J[:, 1, 0]})  # fmt: skip
+    f, Y, current = response.frequencies, response.continuous(), complex(*response.operating_point)
+    return Stiffness(f, powers_over(f, Y, voltage, current, f_n))
 
 
 FIGURES_CSV, FIGURES_JSON, FIGURES_PNG = "frequency.csv", "frequency.json", "frequency.png"
@@ -130,10 +122,7 @@ def stiffness_in_words(figures: dict[str, Any]) -> list[str]:
 
 def save_stiffness(found: Stiffness, model: str, f_n: float, folder: Path) -> list[Path]:
     table, figures, picture = (folder / name for name in (FIGURES_CSV, FIGURES_JSON, FIGURES_PNG))
-    columns = {"frequency [Hz]": found.frequencies}
-    for name, values in found.powers.items():
-        columns |= {f"re {name}": values.real, f"im {name}": values.imag}
-    save_table((dict(zip(columns, row, strict=True)) for row in np.array(list(columns.values())).T.tolist()), table)
+    save_table(rows_of(found.frequencies, found.powers), table)
     save_json(figures_of_stiffness(found, model, f_n), figures)
     _plot(found, asked_stiffness(found, f_n), picture)
     return [table, figures, picture]

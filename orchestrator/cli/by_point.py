@@ -1,0 +1,44 @@
+"""A command on a device at each operating point of a file."""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+
+from orchestrator.asked import Value
+from orchestrator.cli.terminal import make_console, print_json, print_parts
+from orchestrator.errors import CosimError
+from orchestrator.operating_points.points_file import folder_of, settings_in
+from orchestrator.report.tables import make_table
+from orchestrator.results.storage import save_table
+
+
+def by_point(
+    options: argparse.Namespace,
+    folder: Path,
+    found: Callable[[dict[str, Value], Path], dict[str, Any]],
+    failed: dict[str, str],
+) -> list[dict[str, Any]]:
+    """Rows of what is found at each point, shown and kept; one that fails says why, and the others go on."""
+    rows: list[dict[str, Any]] = []
+    for name, values in settings_in(options.points).items():
+        try:
+            rows.append({"point": name} | found(values, folder / folder_of(name)))
+        except CosimError as error:
+            rows.append({"point": name, **failed, "remark": str(error)})
+    columns = max((list(row) for row in rows), key=len)
+    cells = [{column: row.get(column) for column in columns} for row in rows]
+    save_table(cells, folder / "points.csv")
+    if options.json:
+        print_json(rows)
+    else:
+        shown = [tuple(_cell(value) for value in row.values()) for row in cells]
+        table = make_table("Operating points", *(column.replace("_", " ") for column in columns), rows=shown)
+        print_parts(make_console(), [table, escape(f"Results in {folder}")])
+    return rows
+
+
+def _cell(value: Any) -> str:
+    return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
