@@ -46,8 +46,8 @@ def test_another_network_is_made(name, content):
 @pytest.mark.parametrize("library", LIBRARIES)
 def test_another_version_makes_the_tables_anew(monkeypatch, library):
     kept_tables("net", b"", lambda: TABLES)
-    versions = module._versions()
-    monkeypatch.setattr(module, "_versions", lambda: versions | {library: "0.0.1"})
+    installed = module.installed_version
+    monkeypatch.setattr(module, "installed_version", lambda name: "0.0.1" if name == library else installed(name))
     with pytest.raises(AssertionError):
         kept_tables("net", b"", never)
 

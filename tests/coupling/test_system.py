@@ -3,6 +3,7 @@
 import pytest
 
 from orchestrator.coupling.system import ComponentPlan
+from orchestrator.errors import InputError
 from tests.coupling.small_fmus import small_fmu
 
 
@@ -28,5 +29,5 @@ def test_an_output_without_a_start_value_has_none_and_counts_as_zero():
 
 
 def test_an_unknown_name_is_no_value():
-    with pytest.raises(KeyError, match="KK"):
+    with pytest.raises(InputError, match="KK"):
         ComponentPlan(small_fmu("gain")).value("KK")

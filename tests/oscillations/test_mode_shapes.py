@@ -26,7 +26,7 @@ def test_the_mode_at_the_frequency_that_was_found_is_taken(frequency, place):
 def test_an_oscillation_that_begins_later_is_measured_from_its_begin_on():
     t = np.arange(0, 60, 0.05)
     values = np.where(t >= 20, np.sin(2 * np.pi * 0.5 * t), 0.0)[:, None]
-    found = _described(Signals(t, ("x",), values), 0.5)
+    found = _described(Signals(t, ("x",), values), 0.5, {})
     assert found.begin == pytest.approx(20, abs=3)
     assert t[found.first] == found.begin
 

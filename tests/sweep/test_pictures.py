@@ -52,7 +52,7 @@ def test_participation_begins_at_0(drawn, states):
 @pytest.mark.parametrize("beyond", [0, 1])
 def test_failures_are_listed_up_to_a_number_and_the_rest_is_counted(monkeypatch, beyond):
     monkeypatch.setattr(tables, "place_text", lambda samples, place: str(place))
-    monkeypatch.setattr(tables, "_warnings", lambda samples: [])
+    monkeypatch.setattr(tables, "warned", lambda result: [])
     sweep = SimpleNamespace(prepared=SimpleNamespace(name="base"))
     failed = [(sweep, place, "no power flow") for place in range(tables._FAILURES_SHOWN + beyond)]
     result = SimpleNamespace(plan=SimpleNamespace(idle=(), number_of_points=99), limits=(), scenarios=(), refined=0,
