@@ -22,7 +22,8 @@ def test_modes_say_in_the_first_line_what_grows_outside_of_the_range(capsys, mor
     code, text = output(capsys, "modes", "two_area", *FAST, *more)
     assert code == 0
     assert re.search(
-        r"SG \+ GFOR, with gfor.droop.R_f = 10.0.* +│ UNSTABLE .* grows at \+123 1/s at 37.86 Hz: gfor.droop.theta", text.splitlines()[3]
+        r"SG \+ GFOR, with gfor.droop.R_f = 10.0.* +│ UNSTABLE .* grows at \+123 1/s at 37.86 Hz: gfor.droop.theta",
+        text.splitlines()[3],
     )
     assert "a mode grows" not in text
     _, text = output(capsys, "modes", "two_area", *FAST, *more, "--details")
@@ -46,7 +47,9 @@ def test_json_has_the_verdict_and_fail_unstable_the_exit_code(capsys):
 def test_a_run_says_it_in_terminal_summary_plots_and_report(tmp_path, capsys):
     code, text = output(capsys, "run", "two_area", *FAST, "--stop", "0.02", "--out", tmp_path, "--fail-unstable")
     assert code == 1
-    assert re.search(r"SG \+ GFOR, with gfor.droop.R_f = 10.0.* +│ UNSTABLE .* grows at \+123 1/s", text.splitlines()[3])
+    assert re.search(
+        r"SG \+ GFOR, with gfor.droop.R_f = 10.0.* +│ UNSTABLE .* grows at \+123 1/s", text.splitlines()[3]
+    )
     (scenario,) = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["scenarios"]
     assert scenario["stable"] is False
     assert scenario["largest_growth_rate"] == pytest.approx(123.0, abs=0.1)
