@@ -46,9 +46,9 @@ class _Package(ModuleType):
 
     def __call__(self, *_: object, **__: object) -> None:
         name = self.__name__.rpartition(".")[2]
+        method = f"gfor.load('two_area').{name}(…), or " if hasattr(__getattr__("Case"), name) else ""
         raise AttributeError(
-            f"{name} is no function: it may be a method of a case, `gfor.load('two_area')`, or for the terminal alone, "
-            f"`gfor {name}`; functions: {', '.join(_HOMES)}"
+            f"{name} is no function: use {method}`gfor {name}` at the terminal; functions: {', '.join(_HOMES)}"
         )
 
 

@@ -1,7 +1,7 @@
 """What the check of memory does where a block misleads, where a call is refused, and where nothing can be measured."""
 
 from contextlib import contextmanager
-from itertools import accumulate
+from itertools import accumulate, combinations
 
 import pytest
 
@@ -24,18 +24,19 @@ class Memory:
         return next(self._sizes)
 
 
-@pytest.mark.parametrize("place", range(6))
+@pytest.mark.parametrize("places", combinations(range(8), 2))
 @pytest.mark.parametrize("other", [-40_000, 40_000])
-def test_what_happens_in_one_block_hides_no_leak_and_makes_none(place, other):
-    """Growths of six blocks; the first fills what fills once."""
+def test_what_happens_in_two_blocks_hides_no_leak_and_makes_none(places, other):
+    """Growths of eight blocks; the first fills what fills once."""
     for leak in (0, 3000):
-        growths = [leak] * 6
-        growths[place] += other
+        growths = [leak] * 8
+        for place in places:
+            growths[place] += other
         assert _growth(Memory(*growths), lambda: None, 6) == leak / 6
 
 
 def test_memory_that_is_no_longer_told_is_no_growth_of_zero():
-    subject = Memory(0, 0, 0, 0, 0, 0)
+    subject = Memory(*8 * [0])
     subject.memory_in_use = lambda: 0
     assert isinstance(_growth(subject, lambda: None, 6), _Unknown)
 
@@ -116,9 +117,9 @@ class Counted:
         return 1
 
 
-@pytest.mark.parametrize(("ends", "steps"), [(None, 100), (1000.0, 100), (0.6, 100), (0.3, 50)])
+@pytest.mark.parametrize(("ends", "steps"), [(None, 100), (1000.0, 100), (0.8, 100), (0.4, 50)])
 def test_fewer_steps_are_looked_at_only_where_the_experiment_ends(ends, steps):
     subject = Counted(ends)
     assert resources._of_steps(subject, 100) == 0
-    assert subject.blocks == [steps] * 6
+    assert subject.blocks == [steps] * 8
     assert isinstance(resources._of_steps(Counted(0.1), 100), _Unknown)

@@ -41,10 +41,13 @@ def test_a_name_that_does_not_exist_is_refused_with_those_that_do():
 
 
 def test_a_study_that_is_called_without_a_case_is_told_where_it_is():
+    import orchestrator.report  # noqa: PLC0415 - one that is for the terminal alone
     import orchestrator.sweep  # noqa: PLC0415 - the package, which hides that there is no such name
 
-    with pytest.raises(AttributeError, match=r"load\('two_area'\).sweep\(…\), or .*`gfor sweep`; functions: .*load"):
+    with pytest.raises(AttributeError, match=r"use gfor.load\('two_area'\).sweep\(…\), or `gfor sweep` at .*: .*load"):
         orchestrator.sweep("two_area")
+    with pytest.raises(AttributeError, match=r"use `gfor report` at the terminal; functions: .*load"):
+        orchestrator.report("results")
     assert {"sweep", "screen"} <= {*dir(orchestrator.load("two_area"))}
 
 

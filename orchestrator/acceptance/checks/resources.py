@@ -11,10 +11,10 @@ from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.subject import Subject, saved
 from orchestrator.errors import ComponentError
 
-_BLOCKS, _BLOCK = 6, 0.2  # parts of a measurement, and the longest time of one with instances [s]
+_BLOCKS, _BLOCK = 8, 0.2  # parts of a measurement, and the longest time of one with instances [s]
 
 _LEAST = 4.0  # bytes kept by each step that count as a leak
-_RESETS, _FEW = 6, 4  # resets in a block, and instances between two counts of open files
+_RESETS, _FEW = 5, 4  # resets in a block, and instances between two counts of open files
 _INSTANCE = 120.0  # bytes kept by each instance, or each saved state
 _SLIGHT = 4096.0
 """Bytes kept by each instance that no study notices: some tools never free an instance's name or its log's."""
@@ -73,7 +73,7 @@ def memory(subject: Subject) -> CheckResult:
 def _growth(subject: Subject, block: Callable[[], None], count: int) -> float | _Unknown:
     """Bytes kept by every repetition: the lower median of the later blocks.
 
-    What fills within some blocks, and what something else takes or frees in one of them, does not count."""
+    What fills within some blocks, and what something else takes or frees in two of them, does not count."""
     sizes = []
     for _ in range(_BLOCKS):
         block()
