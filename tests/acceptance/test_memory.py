@@ -24,7 +24,7 @@ class Memory:
         return next(self._sizes)
 
 
-@pytest.mark.parametrize("places", combinations(range(8), 2))
+@pytest.mark.parametrize("places", [*combinations(range(8), 2)])
 @pytest.mark.parametrize("other", [-40_000, 40_000])
 def test_what_happens_in_two_blocks_hides_no_leak_and_makes_none(places, other):
     """Growths of eight blocks; the first fills what fills once."""
