@@ -133,18 +133,19 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
     """Rated frequency that a scan shows over the one given, negative where the q axis lags; 1 where none is seen.
 
     At high frequencies a device is a circuit Z(jω), that dq shows at ω + ω₀ in the one sequence and at ω − ω₀ in the
-    other. Half their sum and difference, a and c, then meet a(ω + ω₀) − a(ω − ω₀) = c(ω + ω₀) + c(ω − ω₀)."""
-    Z = np.linalg.pinv(values)
-    along, cross = (Z[:, 0, 0] + Z[:, 1, 1]) / 2, 0.5j * (Z[:, 1, 0] - Z[:, 0, 1])
+    other. Half their sum and difference, a and c, then meet a(ω + ω₀) − a(ω − ω₀) = c(ω + ω₀) + c(ω − ω₀). So do those
+    of its admittance, which rises where it ends in a capacitor."""
     f = frequencies[(frequencies >= frequencies[-1] / _TOP) & (frequencies > 2 * rated_hz)]
     f = f[f <= frequencies[-1] - rated_hz]
-    a, c = ([np.interp(f + k * rated_hz, frequencies, x) for k in (-1, 1)] for x in (along, cross))
-    size = a[0] + a[1] + 1e-300
-    rises, turns = (a[1] - a[0]) / size, (c[1] + c[0]) / size
-    coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
-    if len(f) < _FEW or not _COIL < np.median(coil.real) < 1 / _COIL:
-        return 1.0
-    return float(np.vdot(rises, turns).real / np.vdot(rises, rises).real)
+    for Z in (np.linalg.pinv(values), values) if len(f) >= _FEW else ():
+        along, cross = (Z[:, 0, 0] + Z[:, 1, 1]) / 2, 0.5j * (Z[:, 1, 0] - Z[:, 0, 1])
+        a, c = ([np.interp(f + k * rated_hz, frequencies, x) for k in (-1, 1)] for x in (along, cross))
+        size = a[0] + a[1] + 1e-300
+        rises, turns = (a[1] - a[0]) / size, (c[1] + c[0]) / size
+        coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
+        if _COIL < np.median(coil.real) < 1 / _COIL:
+            return float(np.vdot(rises, turns).real / np.vdot(rises, rises).real)
+    return 1.0
 
 
 def is_active(scan: Scan) -> bool:
