@@ -73,9 +73,9 @@ def fit(response: FrequencyResponse, largest_error: float = 0.01) -> IdentifiedM
         if best is not None and best.error <= wanted:
             break
     if best is None or best.error > largest_error:
-        reached = "no stable model" if best is None else f"{best.error:.2g}, more than {largest_error:g}"
+        why = "none is stable" if best is None else f"the best has an error above {largest_error:g}: {best.error:.2g}"
         raise AnalysisError(
-            f"no rational model fits the measured response: the best has an error of {reached}; measure more lines, "
+            f"no rational model fits the measured response: {why}; measure more lines, "
             "or take a smaller amplitude if the bounds are wide"
         )
     return best

@@ -71,8 +71,8 @@ def _judged_again(folder: Path, content: dict[str, Any]) -> list[str]:
             again = json.loads(json.dumps(figures_of(rebuilt(folder, content, data))))
             return [*faults_of(content, again), *parts_of(content).again.faults(folder, content, data)]
     except (InputError, OSError, KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
-        return [f"the certificate cannot be judged again from {FMU}, its case files and {RESPONSES}: "
-                f"{type(error).__name__}: {error}"]  # fmt: skip
+        kind = "" if isinstance(error, InputError) else f"{type(error).__name__}: "
+        return [f"the certificate cannot be judged again from {FMU}, its case files and {RESPONSES}: {kind}{error}"]
 
 
 def _compare_file(folder: Path, name: str, wanted: str | None, found: Verification) -> None:

@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from orchestrator.asked import Value
 from orchestrator.cli.terminal import make_console, print_json, print_parts
-from orchestrator.errors import CosimError
+from orchestrator.errors import CosimError, InputError
 from orchestrator.operating_points.points_file import folder_of, settings_in
 from orchestrator.report.tables import make_table
 from orchestrator.results.storage import save_table
@@ -21,13 +21,17 @@ def by_point(
     found: Callable[[dict[str, Value], Path], dict[str, Any]],
     failed: dict[str, str],
 ) -> list[dict[str, Any]]:
-    """Rows of what is found at each point, shown and kept; one that fails says why, and the others go on."""
+    """Rows of what is found at each point, shown and kept; one that fails says why, and the others go on.
+
+    Raises an `InputError` where all of them fail."""
     rows: list[dict[str, Any]] = []
+    lost = 0
     for name, values in settings_in(options.points).items():
         try:
             rows.append({"point": name} | found(values, folder / folder_of(name)))
         except CosimError as error:
             rows.append({"point": name, **failed, "remark": str(error)})
+            lost += 1
     columns = max((list(row) for row in rows), key=len)
     cells = [{column: row.get(column) for column in columns} for row in rows]
     save_table(cells, folder / "points.csv")
@@ -37,6 +41,8 @@ def by_point(
         shown = [tuple(_cell(value) for value in row.values()) for row in cells]
         table = make_table("Operating points", *(column.replace("_", " ") for column in columns), rows=shown)
         print_parts(make_console(), [table, escape(f"Results in {folder}")])
+    if lost == len(rows):
+        raise InputError(f"{options.points}: no point could be computed; the remark of each says why")
     return rows
 
 

@@ -21,6 +21,8 @@ _SURE, _OFF, _NONE, _COIL, _FEW = 0.3, 2.0, 0.1, 0.3, 8
 """Parts of the rated frequency that are seen of the other q axis, of rad/s (2.9 to 6.4 of devices and networks; 0.4 to
 1.03 of right ones), and of elements left out; least likeness to a coil, and points, from which on it tells."""
 
+_CLEAR = 0.35  # most that an admittance may miss the relation by: resonances between coarse rows miss it by more
+
 _HOLE, _BESIDE = 3.0, 8
 """A step of the frequency this many times as long as each of so many to either side may be a hole."""
 
@@ -133,18 +135,21 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
     """Rated frequency that a scan shows over the one given, negative where the q axis lags; 1 where none is seen.
 
     At high frequencies a device is a circuit Z(jω), that dq shows at ω + ω₀ in the one sequence and at ω − ω₀ in the
-    other. Half their sum and difference, a and c, then meet a(ω + ω₀) − a(ω − ω₀) = c(ω + ω₀) + c(ω − ω₀)."""
-    Z = np.linalg.pinv(values)
-    along, cross = (Z[:, 0, 0] + Z[:, 1, 1]) / 2, 0.5j * (Z[:, 1, 0] - Z[:, 0, 1])
+    other. Half their sum and difference, a and c, then meet a(ω + ω₀) − a(ω − ω₀) = c(ω + ω₀) + c(ω − ω₀). So do those
+    of its admittance, which rises where it ends in a capacitor."""
     f = frequencies[(frequencies >= frequencies[-1] / _TOP) & (frequencies > 2 * rated_hz)]
     f = f[f <= frequencies[-1] - rated_hz]
-    a, c = ([np.interp(f + k * rated_hz, frequencies, x) for k in (-1, 1)] for x in (along, cross))
-    size = a[0] + a[1] + 1e-300
-    rises, turns = (a[1] - a[0]) / size, (c[1] + c[0]) / size
-    coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
-    if len(f) < _FEW or not _COIL < np.median(coil.real) < 1 / _COIL:
-        return 1.0
-    return float(np.vdot(rises, turns).real / np.vdot(rises, rises).real)
+    for Z, most in ((np.linalg.pinv(values), np.inf), (values, _CLEAR)) if len(f) >= _FEW else ():
+        along, cross = (Z[:, 0, 0] + Z[:, 1, 1]) / 2, 0.5j * (Z[:, 1, 0] - Z[:, 0, 1])
+        a, c = ([np.interp(f + k * rated_hz, frequencies, x) for k in (-1, 1)] for x in (along, cross))
+        size = a[0] + a[1] + 1e-300
+        rises, turns = (a[1] - a[0]) / size, (c[1] + c[0]) / size
+        coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
+        if _COIL < np.median(coil.real) < 1 / _COIL:
+            seen = float(np.vdot(rises, turns).real / np.vdot(rises, rises).real)
+            unlike = np.linalg.norm(turns - seen * rises) / np.linalg.norm(rises)
+            return seen if unlike < most else 1.0
+    return 1.0
 
 
 def is_active(scan: Scan) -> bool:

@@ -5,7 +5,9 @@ a scan may stand the angles of its ports and the power flow, in files that begin
 
 Energinet's IMTB has CSV with impedances [Ω] in dq, or in αβ at the frequency of the network. One file may hold a device
 (Zdut) and a network (Znet). The αβ form has the sequences as rows and columns: the second is the mirrored one, two
-rated frequencies lower."""
+rated frequencies lower.
+
+Rows of direct current and of negative dq frequencies are left out: those mirror the others."""
 
 import csv
 import math
@@ -29,6 +31,8 @@ def read_ztool(path: Path, text: str, rated_hz: float) -> Scan:
     first, _, rest = text.partition("\n")
     ports = _ports(path, first.split()[1:])
     frequencies, values = _rows(path, rest, 2 * len(ports))
+    kept = ~(frequencies <= 0)  # as of IMTB's form; what is no number is told
+    frequencies, values = frequencies[kept], values[kept]
     questions = checked(path.name, frequencies, values)
     own, asked = in_own_form(path.name, frequencies, values, rated_hz, q_leads=False)
     return Scan(path.name, frequencies, own, ports, points=_points(path, ports), questions=questions + asked)
@@ -130,7 +134,7 @@ def write_imtb(scan: Scan, path: Path) -> None:
 
 
 def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
-    """The device of a file, or its network; rows of negative dq frequencies are left out, they mirror the others."""
+    """The device of a file, or its network."""
     rows = list(csv.DictReader(StringIO(text)))
     frame = "dq" if "_dq_11_re" in text.partition("\n")[0] else "ab"
     quantities = list(dict.fromkeys(n.partition(f"_{frame}_")[0] for n in rows[0] if f"_{frame}_" in n)) if rows else []
@@ -141,7 +145,7 @@ def read_imtb(path: Path, text: str, rated_hz: float, *, network: bool) -> Scan:
     if frame == "ab":
         frequencies = frequencies - rated_hz
         Z = from_sequences(Z)
-    kept = frequencies > 0
+    kept = ~(frequencies <= 0)
     frequencies, Z = frequencies[kept], Z[kept]
     questions = checked(path.name, frequencies, Z)
     own, asked = in_own_form(path.name, frequencies, np.linalg.inv(Z), rated_hz, q_leads=True)

@@ -45,13 +45,16 @@ def read_points(path: Path, prepared: PreparedScenario, elements: Elements) -> l
 
 
 def settings_in(path: Path) -> dict[str, dict[str, Value]]:
-    """Values by point, of a file whose columns are variables; an empty cell leaves the variable as it is."""
+    """Values by point, of a file whose columns are variables; an empty cell leaves the variable as it is. A device,
+    which is no variable, stands in each row or in none."""
     rows, label, columns = _labelled(path)
     found: dict[str, dict[str, Value]] = {}
     for row in rows:
         name = _name_of(row, label)
         if folder_of(name) in map(folder_of, found):
             raise InputError(f"{place_of(row)}: {label} = {name!r} stands in an earlier row, or shares its folder")
+        if "device" in columns and not row["device"].strip():
+            raise InputError(f"{place_of(row)}: device is empty; name the scan that is judged at {name}")
         found[name] = {column: read_value(text) for column in columns if (text := row[column].strip())}
     return found
 

@@ -110,6 +110,14 @@ def a_column_of_a_known_name(content):
     (content.get("points") or content["rows"])[0]["details"] = "approved"
 
 
+def a_value(content):
+    content["values"]["current_limit.kind"] = 0
+
+
+def another_code(content):
+    content["code"] = "nogrr245"
+
+
 def files_of_a_row(content):
     content["rows"][0]["files"] = "approved"
 
@@ -125,6 +133,8 @@ def a_verdict(content):
      ("nts631_pod_p", a_column, "remark"), ("nts631_of_0_2", an_excuse, "a mode without the converter is none"),
      ("fingrid", a_column_of_a_known_name, "details"), ("fingrid", files_of_a_row, "files"),
      ("nts631_of_0_2", a_verdict, "verdict"),
+     ("fingrid", a_value, "not what the table of fingrid and the certified values give"),
+     ("fingrid", another_code, "the table of nogrr245 has none of the rows"),
      ("fingrid", a_margin, "margin"), ("fingrid", a_text, "0.987 pu"), ("fingrid", a_column, "remark"),
      ("fingrid", a_verdict, "verdict")],
 )  # fmt: skip

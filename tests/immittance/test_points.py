@@ -28,6 +28,7 @@ def test_a_file_sets_variables_by_point_and_an_empty_cell_none(tmp_path):
         (("P_0", "1"), "column 'time' or 'name' is missing"),
         (("name,P_0", "a/b,1", "a:b,2"), "stands in an earlier row, or shares its folder"),
         (("name,P_0", "a,1,2"), "more cells than the first line"),
+        (("name,device", "a,x.txt", "b,"), "line 3: device is empty"),
     ):
         with pytest.raises(InputError, match=said):
             settings_in(written(tmp_path / "bad.csv", *lines))
@@ -53,7 +54,8 @@ def test_a_verdict_by_point_of_scans_and_what_cannot_be_judged(tmp_path, capsys)
     assert found["less"]["lost_below_scr"] == alone["strength"]["scr_limit"]
     assert json.loads((tmp_path / "out" / "less" / "nyquist.json").read_text())["margins"] == alone["margins"]
     written(points, "name,P_0", "now,0.5")
-    assert main(common) == 0
+    assert main(common) == 2
+    assert "no point could be computed" in capsys.readouterr().err
     with (tmp_path / "out" / "points.csv").open() as file:
         assert "a scan has no P_0 to be set" in next(csv.DictReader(file))["remark"]
 

@@ -114,6 +114,33 @@ def test_the_axes_are_known_behind_a_filter_that_resonates(tmp_path):
         read_scan(tmp_path / "wrong.txt", 50.0)
 
 
+def test_rows_of_direct_current_and_mirrored_ones_are_left_out(tmp_path):
+    write_ztool(a_scan(), tmp_path / "a.txt")
+    head, first, *others = (tmp_path / "a.txt").read_text().splitlines()
+    values = first.partition("\t")[2]
+    more = [f"(-1+0j)\t{values}", f"(0+0j)\t{values}", first, *others]
+    (tmp_path / "b.txt").write_text("\n".join([head, *more]) + "\n")
+    one, other = (read_scan(tmp_path / name, 50.0) for name in ("a.txt", "b.txt"))
+    assert (one.frequencies == other.frequencies).all()
+    assert (one.values == other.values).all()
+
+
+def test_the_axes_are_known_of_a_device_that_ends_in_a_capacitor(tmp_path):
+    f, J = np.geomspace(1, 1500, 300), np.array([[0, -1], [1, 0]])
+    capacitor = 0.5 * (1j * f[:, None, None] / 50 * np.eye(2) + J)
+    Y = constant_power(T=0.004).admittance(f) + 0.4 * np.eye(2) + capacitor
+    write_ztool(Scan("filter", f, Y, ("P",)), tmp_path / "right.txt")
+    right = read_scan(tmp_path / "right.txt", 50.0)
+    assert right.values == pytest.approx(Y, rel=1e-9)
+    assert not right.questions
+    write_ztool(Scan("filter", f, other_q_axis(Y), ("P",)), tmp_path / "wrong.txt")
+    with pytest.raises(InputError, match="q axis leads the d axis"):
+        read_scan(tmp_path / "wrong.txt", 50.0)
+    write_ztool(Scan("filter", 2 * np.pi * f, Y, ("P",)), tmp_path / "radians.txt")
+    with pytest.raises(InputError, match="are its frequencies in rad/s"):
+        read_scan(tmp_path / "radians.txt", 50.0)
+
+
 def test_alpha_beta_impedances_are_those_of_the_sequences(tmp_path):
     """Z₊₊ at f + 50 Hz and Z₋₋ at f − 50 Hz, from the definitions of both sequences."""
     f = np.linspace(1, 300, 90)

@@ -40,6 +40,8 @@ def rebuilt(folder: Path, content: dict[str, Any], responses: xr.Dataset) -> Cer
     code, request = _table(content), request_of(folder, content)
     stated = {row["row"]: row for row in content["rows"]}
     rows = [row for row in code.rows if row.name in stated or f"time_{row.name}" in responses.coords]
+    if not rows:
+        raise InputError(f"the table of {code.key} has none of the rows that the record and {RESPONSES} have")
     results = {row.name: _response(row.name, stated.get(row.name), responses) for row in rows}
     verdicts = [
         judge_row(row, results[row.name], content["f_n"], stated.get(row.name, {}).get("criteria")) for row in rows
@@ -77,7 +79,19 @@ def faults(folder: Path, content: dict[str, Any], data: xr.Dataset) -> list[str]
     )
     strangers = sorted(path.name for path in folder.glob("row_*.toml") if path.name not in own)
     faults = [f"{what}: {', '.join(names)}" for what, names in compared if names]
-    return [*faults, *(f"{name}: the record does not know it; take it away, or certify anew" for name in strangers)]
+    faults += [f"{name}: the record does not know it; take it away, or certify anew" for name in strangers]
+    return faults + [f"{case_name(name)}: it is not what the table of {code.key} and the certified values give"
+                     for name in _otherwise(folder, content, code)]  # fmt: skip
+
+
+def _otherwise(folder: Path, content: Content, code: GridCode[CodeRow]) -> list[str]:
+    """Rows whose case file is not the one that the code's table and the certificate's values give."""
+    request, f_n = request_of(folder, content), content["f_n"]
+    rows = [row for row in code.rows if (folder / case_name(row.name)).is_file()]
+    with TemporaryDirectory(prefix="verify_") as place:
+        lay_files(request, Path(place))
+        made = {row.name: write_row(request, row.name, row.title, row.programme(f_n), f_n, Path(place)) for row in rows}
+        return [name for name, path in made.items() if path.read_bytes() != (folder / path.name).read_bytes()]
 
 
 def choose(content: Content, wanted: Sequence[str] = (), *, every: bool = False) -> list[str]:
@@ -100,24 +114,8 @@ def choose(content: Content, wanted: Sequence[str] = (), *, every: bool = False)
     return narrowest + random.SystemRandom().sample(others, min(DRAWN, len(others)))
 
 
-def tasks(folder: Path, content: Content, names: Sequence[str], found: Verification) -> list[Any]:
-    """Rows whose case file is the one that the code's table and the certificate's values give."""
-    code = code_for(content["code"], content["declared"])
-    rows = {row.name: row for row in code.rows}
-    chosen = [name for name in names if _as_the_table(folder, content, code, rows[name], found)]
-    return [BenchTask(StudyCase.of(load_case(folder / case_name(name)).prepare()[0]), name) for name in chosen]
-
-
-def _as_the_table(folder: Path, content: Content, code: GridCode[CodeRow], row: CodeRow, found: Verification) -> bool:
-    request = request_of(folder, content)
-    with TemporaryDirectory(prefix="verify_") as place:
-        lay_files(request, Path(place))
-        made = write_row(request, row.name, row.title, row.programme(content["f_n"]), content["f_n"], Path(place))
-        same = made.read_text(encoding="utf-8") == (folder / case_name(row.name)).read_text(encoding="utf-8")
-    if not same:
-        found.faults.append(f"{case_name(row.name)}: it is not what the table of {code.key} and the certified values "
-                            "give")  # fmt: skip
-    return same
+def tasks(folder: Path, _content: Content, names: Sequence[str], _found: Verification) -> list[Any]:
+    return [BenchTask(StudyCase.of(load_case(folder / case_name(name)).prepare()[0]), name) for name in names]
 
 
 def compare(content: Content, task: BenchTask, again: BenchResult, data: xr.Dataset) -> Compared:
