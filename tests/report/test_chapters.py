@@ -122,7 +122,7 @@ def test_provenance_names_command_code_and_date(gfor, tmp_path):
     manifest = json.loads((tmp_path / "modes" / "manifest.json").read_text())
     assert manifest["command"].startswith("gfor modes two_area_rms --scenario gfor --out ")
     assert manifest["code"][:12] in text
-    assert "gfor: stable, least damped 0.581 Hz, 10.63 %" in text
+    assert "SG + GFOR: stable, least damped 0.581 Hz, 10.63 %" in text
     assert "nothing was run" in text
 
 
