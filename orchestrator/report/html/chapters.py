@@ -73,9 +73,7 @@ def chapters_of(place: Path) -> list[Chapter]:
     return found
 
 
-def of_run(
-    folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()
-) -> Chapter:
+def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()) -> Chapter:
     """Of a run's summary, or the same of `gfor modes`; ``beside``: what devices bring."""
     said, open_, sure = [], [], []
     for s in scenarios:
