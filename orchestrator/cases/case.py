@@ -124,7 +124,7 @@ class Case(CaseDefinition):
         ready = [p for p in prepared if p is not None]
         idle = idle_values.idle_everywhere([p.idle for p in ready])
         given = [file.values for file in parameters if not file.text] + [overrides or {}]
-        changed = [file.path.name for file in parameters if file.text]
+        changed = [*self.events_given, *(file.path.name for file in parameters if file.text)]
         changed += [f"{key} = {value}" for values in given for key, value in values.items()]
         return [replace(p, beside=beside, questions=(*p.questions, *idle), changed=few(changed, _NAMED)) for p in ready]
 

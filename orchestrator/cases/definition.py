@@ -41,6 +41,7 @@ class CaseDefinition:
     # None.
     sharing: SharingRule | None = None
     scans: bool = False  # whether a component may be a scan: only for what needs neither its states nor a run
+    events_given: tuple[str, ...] = ()  # in words, by the caller, in the place of the file's
     injections: bool = False  # whether the grid takes a current besides at every bus; see `Network.injections`
 
     @property

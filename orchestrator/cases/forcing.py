@@ -31,7 +31,8 @@ def with_events(case: Case, forcings: Sequence[str], faults: Sequence[str]) -> C
     events = [*(event_of("force", text) for text in forcings), *(event_of("fault", text) for text in faults)]
     scenarios = {name: table.model_copy(update={"events": None}) for name, table in case.table.scenarios.items()}
     table: CaseTable = case.table.model_copy(update={"events": events, "scenarios": scenarios})
-    return replace(case, table=table)
+    said = [f'{option} "{text}"' for option, texts in (("force", forcings), ("fault", faults)) for text in texts]
+    return replace(case, table=table, events_given=tuple(said))
 
 
 def event_of(option: str, text: str) -> ForcingTable | BusFaultTable:

@@ -40,6 +40,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     note_contradictions(draft, units)
     if draft.found.problems:
         return None
+    intact = slack
     if draft.dispatch is not None:
         slack = _reference(draft, units, slack, table.grid)
     undecided = list(undecided_units(draft, units, slack))
@@ -54,7 +55,8 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         draft.note(draft.given.place("power_flow"), f"scenario {draft.given.name!r}: {error}", kind)
         return None
     question(draft, undecided)
-    draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow), *_leftover(draft, flow)]
+    draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
+    draft.found.questions += _leftover(draft, flow) if slack == intact else []  # else what it fed before is shared
     return flow
 
 

@@ -77,6 +77,11 @@ class PreparedScenario:
     not_reached: tuple[float, ...] = ()  # times of events for which the run stops too early [s]
 
     @property
+    def subject(self) -> str:
+        """The title, with what parameter files and the caller set."""
+        return ", with ".join(filter(None, (self.title, self.changed)))
+
+    @property
     def grid(self) -> str:
         return self.case.table.power_flow.grid if self.case.table.power_flow else ""
 

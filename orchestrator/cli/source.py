@@ -1,14 +1,16 @@
 """``gfor signal source``: where the oscillations of a run or a recording come from."""
 
 import argparse
+from warnings import catch_warnings, simplefilter
 
 from rich.console import RenderableType
 from rich.markup import escape
 
 from orchestrator.api.case import load
+from orchestrator.api.scenario import UnusualDataWarning
 from orchestrator.api.source import contest_sources, source
 from orchestrator.cli.arguments import add_json_argument, add_kept_argument, add_options
-from orchestrator.cli.terminal import keep_json, make_console, print_json, print_parts, saying_warnings
+from orchestrator.cli.terminal import keep_json, make_console, print_json, print_parts, print_questions, saying_warnings
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
 from orchestrator.oscillations.view import Sources, opinions_table, sources_table
@@ -30,11 +32,13 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("give a run or a recording, or --contest FOLDER; not both")
     if options.scenario and not options.case:
         raise InputError("--scenario: it is one of a case; give --case as well")
-    with saying_warnings():
+    with saying_warnings(), catch_warnings():
+        simplefilter("ignore", UnusualDataWarning)  # they are printed
         if options.contest is not None:
             found = contest_sources(options.contest)
         else:
             scenario = load(options.case).scenario(options.scenario) if options.case else None
+            print_questions([scenario.prepared] if scenario else [], as_json=options.json)
             found = [source(options.run, options.start, options.stop, scenario)]
     records = [one.as_json() for one in found]
     keep_json(records, options.out, "source")

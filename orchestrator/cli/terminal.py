@@ -99,8 +99,7 @@ def ask(questions: Iterable[Problem]) -> None:
 
 def print_warnings(results: Sequence[ModesResult]) -> None:
     for result in results:
-        asked = {str(question) for question in (*result.prepared.questions, *result.prepared.about_rows)}
-        warn(result.prepared.name, [text for text in result.warnings if text not in asked])
+        warn(result.prepared.name, result.unasked)
 
 
 def warn(scenario: str, texts: Iterable[str]) -> None:

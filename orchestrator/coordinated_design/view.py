@@ -116,6 +116,7 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "astray": [_where(point) | {"difference": point.astray} for point in verdict.astray],
         "unforeseen": [_where(point) for point in verdict.unforeseen],
         "warnings": remarks(verdict),
+        "questions": [*map(str, plan.prepared.questions)],
         "settings": [
             {
                 "controller": group.controller, "components": list(group.components), "K": setting.gain,

@@ -32,8 +32,8 @@ def measurements_of(dataset: xr.Dataset, label: str) -> Measurements:
     times = np.asarray(dataset["time"].values, dtype=np.float64)
     places, base = (_of_run(dataset), 1.0) if "places" in dataset.attrs else _of_columns(dataset, label)
     if not places:
-        more = "; record what is needed: 'record = [\"*\"]' in [solver], or run with --force"
-        raise InputError(f"{label}: no place has voltage, P and Q; {_FORM}{more if 'places' in dataset.attrs else ''}")
+        more = "run again with 'record = [\"*\"]' in [solver], or with --force, which records what is needed"
+        raise InputError(f"{label}: no place has voltage, P and Q; {more if 'places' in dataset.attrs else _FORM}")
     return replace(made_ready(label, times, places), base=base)
 
 

@@ -36,9 +36,12 @@ class Sources:
         Names of the places whose power and voltage were used.
     """
 
-    def __init__(self, measured: Measurements, oscillations: Sequence[Located]) -> None:
+    def __init__(
+        self, measured: Measurements, oscillations: Sequence[Located], prepared: PreparedScenario | None = None
+    ) -> None:
         self.label, self.remarks, self.oscillations = measured.label, measured.remarks, list(oscillations)
         self.places, self._measured = [place.name for place in measured.places], measured
+        self._questions = [*map(str, prepared.questions)] if prepared else []
 
     def __iter__(self) -> Iterator[Located]:
         return iter(self.oscillations)
@@ -49,7 +52,8 @@ class Sources:
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor signal source --json`` prints, as JSON's types."""
         found = [one.as_json() for one in self.oscillations]
-        return {"record": self.label, "places": self.places, "remarks": list(self.remarks), "oscillations": found}
+        said = {"remarks": list(self.remarks), "questions": self._questions}
+        return {"record": self.label, "places": self.places, **said, "oscillations": found}
 
     def table(self) -> pd.DataFrame:
         """One row for each oscillation: frequency [Hz], kind, source, what drives, begin [s] and the reason."""
@@ -89,7 +93,7 @@ def sources_of(
         from orchestrator.oscillations.levers import with_levers  # noqa: PLC0415 - only where there is a case
 
         located = [with_levers(prepared, x) for x in located]
-    return Sources(measured, located)
+    return Sources(measured, located, prepared)
 
 
 def sources_table(found: Sequence[Sources]) -> PlainTable:

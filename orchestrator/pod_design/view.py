@@ -140,6 +140,7 @@ def design_json(d: PodDesign) -> dict[str, Any]:
         "worst_other_mode": {"before": _other_json(d.before.worst), "after": _other_json(d.worst_other)},
         "stable": after.stable, "largest_growth_rate": after.largest_growth_rate,
         "stability": {"before": before.as_json(), "after": after.as_json()}, "warnings": list(d.warnings),
+        "questions": [*map(str, d.prepared.questions)],
         "largest_real_part": {"before": before.largest_growth_rate, "after": after.largest_growth_rate},
         "margins": _margins_json(d.margins) if d.margins else None,
         "refinement": _refinement_json(d) if d.refinement else None, "case": d.case, "scenario": d.target.scenario,

@@ -245,6 +245,7 @@ def as_json(summary: Summary) -> dict[str, Any]:
     return {
         "case": result.plan.case.name,
         "scenario": result.plan.prepared.name,
+        "questions": [*map(str, result.plan.prepared.questions)],
         "points": len(result.plan.points),
         "outages": len(result.plan.outages) - 1,
         "items": len(result.items),

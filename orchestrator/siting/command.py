@@ -23,5 +23,5 @@ STUDY = StudyAtOnce(
     counted="places",
     files="site.json, buses.csv and site.html with a map",
     warnings=lambda found: [f"scenario {found.result.prepared.name!r}: {text}"
-                            for text in found.result.intact.found.warnings],
+                            for text in found.result.intact.found.unasked],
 )  # fmt: skip

@@ -62,8 +62,7 @@ def of_modes(result: ModesResult) -> ScenarioAnswer:
     ]
     told += [f"which mode is {name!r} is not known" for name in result.unnamed]
     remark = _with_misfits(result, "; ".join(told))
-    title = ", with ".join(filter(None, (result.prepared.title, result.prepared.changed)))
-    return ScenarioAnswer(title, verdict.stable, verdict.verdict, mode, remark)
+    return ScenarioAnswer(result.prepared.subject, verdict.stable, verdict.verdict, mode, remark)
 
 
 def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str, Mode]]:

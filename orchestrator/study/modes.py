@@ -78,6 +78,12 @@ class ModesResult:
         return f"{self.prepared.title}: UNSTABLE, {rate:+.3g} 1/s"
 
     @property
+    def unasked(self) -> list[str]:
+        """The warnings without the questions, which are asked before anything is computed."""
+        asked = {str(question) for question in (*self.prepared.questions, *self.prepared.about_rows)}
+        return [text for text in self.warnings if text not in asked]
+
+    @property
     def electromechanical(self) -> spectra.Mode | None:
         return next(iter(self.named.values()), None)
 
@@ -367,7 +373,8 @@ def modes_json(
 def _scenario_json(r: ModesResult) -> dict[str, Any]:
     named = {table.name: r.named.get(table.name) for table in r.prepared.case.table.analysis.modes}
     return {
-        "name": r.prepared.name, "residual": r.operating_point.residual, "states": r.model.number_of_states,
+        "name": r.prepared.name, "subject": r.prepared.subject, "residual": r.operating_point.residual,
+        "states": r.model.number_of_states,
         "stable": r.stability.stable, "largest_growth_rate": r.stability.largest_growth_rate,
         "stability": r.stability.as_json(), "outside_range": None if r.hidden is None else r.hidden.as_json(),
         "power_flow": power_flow_json(r.prepared), "linearised": r.linearised, "fit_errors": r.fit_errors,

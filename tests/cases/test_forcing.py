@@ -133,8 +133,9 @@ def test_a_fault_without_its_parts_is_refused(text):
 
 def test_a_fault_takes_the_place_of_all_events():
     case = gfor.load("two_area_rms")
-    events = case.scenario("gfor", fault="bus_2, 150 ms, from 2 s").prepared.events
-    assert [event.time for event in events] == [2.0, 2.15]
+    prepared = case.scenario("gfor", {"grid.X_L": 0.2}, fault="bus_2, 150 ms, from 2 s").prepared
+    assert [event.time for event in prepared.events] == [2.0, 2.15]
+    assert prepared.subject == 'SG + GFOR, with fault "bus_2, 150 ms, from 2 s", grid.X_L = 0.2'
     with pytest.raises(
         CaseError, match=r"fault 'bus_4, 150 ms': component 'grid' has no bus 'bus_4'; did you mean bus_3 or bus_2"
     ):

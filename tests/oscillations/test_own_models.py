@@ -150,6 +150,10 @@ def test_a_table_of_phasors_is_compared_with_a_case(run, gfor, tmp_path):
     (other,) = json.loads(out)["oscillations"]
     assert "is not what the case has there" in other["reason"]
     assert other["methods"][-1]["applies"] is False
+    own, text = tmp_path / "own.toml", gfor_api.load("two_area_rms").file.text
+    own.write_text(text.replace('"5000 MVA",', '"5000 MVA", "machine.H" = 30.0,'))
+    code, out, err = gfor("signal", "source", file, "--case", own, "--scenario", "gfor", "--json")
+    assert err.count("question: ") == len(json.loads(out)["questions"]) == 1
     code, _, error = gfor("signal", "source", file, "--scenario", "gfor")
     assert code == 2
     assert "--case" in error

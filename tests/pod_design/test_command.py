@@ -29,9 +29,12 @@ def design(gfor):
 
 @pytest.mark.parametrize(("controller", "T_S1", "T_S2"), [("pod_p", 0.20, 0.37), ("pod_q", 0.26, 0.29)])
 def test_json_has_the_design(gfor, controller, T_S1, T_S2):
-    code, out, _ = gfor("design", "two_area", "--controller", controller, "--json", "--set", "grid.X_L=0.1")
+    idle = {"pod_p": "pod_q", "pod_q": "pod_p"}[controller]
+    values = ("--set", "grid.X_L=0.1", "--set", f"gfor.{idle}.K=100")
+    code, out, _ = gfor("design", "two_area", "--controller", controller, "--json", *values)
     assert code == 0
     d = json.loads(out)
+    assert d["questions"] == [f"--set gfor.{idle}.K: gfor.{idle}.K cannot act: gfor.{idle}.enabled is false"]
     assert list(d)[:10] == ["controller", "target_mode", "sensitivity", "T_S1", "T_S2", "N_S", "K", "K_unbounded",
                             "predicted_mode", "achieved_mode"]  # fmt: skip
     assert (d["controller"], d["N_S"], d["K"]) == (controller, 2, 200.0)

@@ -18,8 +18,10 @@ SHEET = {
     "T_S2": 0.1, "N_S": 2, "K": 200.0, "K_unbounded": 150.0, "met": False, "verdict": "not met: <b>20 %</b> are wanted",
     "target_damping_ratio": 0.106, "achieved_damping_ratio": 0.18, "requirement": {"damping_ratio": 0.2},
     "mode": "electromechanical", "warnings": ["two modes are close"],
+    "questions": ["what are its loads?"],
 }  # fmt: skip
 SCREENING = {
+    "questions": ["no governor?"],
     "points": 2, "outages": 3, "items": 8, "stable": None, "counted_at_all_frequencies": False,
     "modes": [{"worst": {"point": "mon", "outage": "line_1", "frequency_hz": 0.93, "damping_percent": 3.8}}],
     "failures": [{"point": "mon", "outage": "sg3", "status": "no power flow", "why": "sg5 would need 129 %"}],
@@ -52,7 +54,7 @@ INTERACTIONS = {
     "pairs": [{"vendors": ["A", "B"], "stable": True, "sentence": "A and B agree"}], "warnings": [],
     "as_in_the_case": {"stable": False},
 }  # fmt: skip
-SOURCE = [{"record": "ring", "places": ["N", "S"], "remarks": ["a gap"], "oscillations": [
+SOURCE = [{"record": "ring", "places": ["N", "S"], "remarks": ["a gap"], "questions": ["is H meant?"], "oscillations": [
     {"frequency_hz": 0.8, "kind": "forced", "source": "sg2", "reason": "it feeds", "advice": "look there"},
     {"frequency_hz": 1.1, "kind": "not known", "source": None, "reason": "too short", "advice": "record longer"},
 ]}]  # fmt: skip
@@ -91,6 +93,7 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
         "vendor.fmu: wrong rated frequency", "anything after it", "It passes at all.", "judged: 9 of 9",
         "what dips leave behind", "1.2 pu at X_L = 0.1",
         "sg1.omega differs most, by 0.5 pu at 1.200 s", "two modes are close", "strongest: 0.923 Hz, 5.20 %",
+        "what are its loads?", "is H meant?", "no governor?",
         "0.900 Hz, 4.20 %: most by gfor.b (-0.2), gfor.a (+0.01) points for 1 % more", "it holds no steady state",
         "0.923 Hz: it is at the window's edge".replace("'", "&#x27;"), "beyond its rating: gfor",
         "0.800 Hz: forced, from sg2; 1.100 Hz: not known", "1.100 Hz: too short", "a gap",
@@ -122,8 +125,17 @@ def test_provenance_names_command_code_and_date(gfor, tmp_path):
     manifest = json.loads((tmp_path / "modes" / "manifest.json").read_text())
     assert manifest["command"].startswith("gfor modes two_area_rms --scenario gfor --out ")
     assert manifest["code"][:12] in text
-    assert "gfor: stable, least damped 0.581 Hz, 10.63 %" in text
+    assert "SG + GFOR: stable, least damped 0.581 Hz, 10.63 %" in text
     assert "nothing was run" in text
+
+
+def test_a_runs_row_says_what_was_given_and_which_models_were_run(gfor, tmp_path):
+    given = ("--set", "models=emt", "--step", "100 us", "--stop", "10 ms", "--fault", "bus_2, 5 ms, from 2 ms")
+    assert gfor("run", "two_area_rms", "--scenario", "gfor", *given, "--out", tmp_path)[0] == 0
+    text = write_report(tmp_path, short=True).read_text(encoding="utf-8")
+    assert "SG + GFOR, with fault &quot;bus_2, 5 ms, from 2 ms&quot;, models = emt: not known" in text
+    assert "<td>emt models; modes of the FMUs that were simulated" in re.sub("<td[^>]*>", "<td>", text)
+    assert "phasor models; modes" not in text
 
 
 def test_what_changed_since_an_older_page(folders, tmp_path):

@@ -251,6 +251,12 @@ def test_what_hangs_on_a_branch_is_lost_with_it(five, tmp_path):
     assert not items["line_11_12"].record.text
 
 
+def test_a_power_that_sharing_replaces_is_not_scolded_where_the_slack_is_lost(five, tmp_path):
+    (_, item) = screened(five, tmp_path, "sg5", "name,generation\nonly,1.0\n")
+    assert item.record.status is Status.COMPUTED
+    assert not any("cannot act" in text for text in item.record.warnings)
+
+
 def test_nothing_remains_without_a_unit(five):
     (prepared,) = five.prepare(["base"])
     elements = Elements.of(prepared)
@@ -282,6 +288,7 @@ def test_without_points_the_case_itself_is_the_only_one(gfor, five, tmp_path):
     assert code == 0
     found = json.loads(out)
     assert (found["points"], found["outages"], found["counts"]) == (1, 1, {"computed": 2})
+    assert any("the load model is open" in text for text in found["questions"])
     with (tmp_path / "out" / "items.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == ["point", "outage", "hours", "status", "stable", "counted", "least_damping_percent",

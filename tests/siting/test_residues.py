@@ -15,6 +15,7 @@ from orchestrator.siting.placing import ideal_support
 from orchestrator.siting.study import SiteRequest, find_sites
 from orchestrator.siting.view import answer, remarks
 from orchestrator.study.modes import running
+from tests.screening.five_machines import five_machines
 
 
 def sites(case, device, **asked):
@@ -48,6 +49,11 @@ def test_only_the_buses_asked_for_are_places():
     assert answer(found).startswith("bus_3 is the best place for POD-P of those asked for: ")
     with pytest.raises(gfor_api.CosimError, match=r"buses bus3: there is no such bus; did you mean bus_3"):
         sites("two_area_rms", "pod_p", confirm=0, buses=("2", "bus3"))
+
+
+def test_a_question_is_asked_once(gfor, tmp_path):
+    code, _, err = gfor("site", five_machines(tmp_path).path, "--device", "droop", "--confirm", "0")
+    assert (code, err.count("the load model is open")) == (0, 1)
 
 
 def test_a_wrong_sign_at_the_bus_is_caught(gfor, monkeypatch):

@@ -73,10 +73,8 @@ def chapters_of(place: Path) -> list[Chapter]:
     return found
 
 
-def of_run(
-    folder: Path, scenarios: Sequence[Content], content: str = "", kind: str = "", beside: Sequence[str] = ()
-) -> Chapter:
-    """Of a run's summary, or the same of `gfor modes`; ``kind``: of the models; ``beside``: what devices bring."""
+def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", beside: Sequence[str] = ()) -> Chapter:
+    """Of a run's summary, or the same of `gfor modes`; ``beside``: what devices bring."""
     said, open_, sure = [], [], []
     for s in scenarios:
         answer: Content = s.get("answer") or {}
@@ -84,7 +82,7 @@ def of_run(
         listed: Any = s.get("modes")
         stable = answer.get("stable", stability.get("stable", s.get("stable")))
         word = answer.get("verdict") or _STABLE[stable]
-        title = s.get("title", s["name"])
+        title = s.get("subject") or s.get("title", s["name"])
         modes = [m for m in (listed if isinstance(listed, list) else [answer]) if m]
         least = min((m for m in modes if m.get("damping_percent") is not None), key=lambda m: m["damping_percent"],
                     default=None)  # fmt: skip
@@ -99,7 +97,8 @@ def of_run(
     open_ += dict.fromkeys(text for s in scenarios for text in s.get("warnings", []))
     verdicts = [stable for stable, _ in said]
     good = False if False in verdicts else None if None in verdicts else True
-    basis = f"{kind} models; " if kind else ""
+    kinds = ", ".join(dict.fromkeys(s["models"] for s in scenarios if s.get("models")))
+    basis = f"{kinds} models; " if kinds else ""
     basis += "modes of the FMUs that were simulated; " if any("step_size_s" in s for s in scenarios) else ""
     return Chapter(
         folder, "Is the network stable, and which swing is damped least?",
@@ -120,7 +119,7 @@ def _modes(file: Path, content: Content) -> Chapter:
     shown = _map("Modes", groups) + table("Modes", columns, rows)
     made = of_run(file, content["scenarios"], shown, beside=content.get("beside", []))
     sure = "; ".join(filter(None, (made.sure, content["facts"], f"steps of {1e3 * content['step_size_s']:g} ms")))
-    return replace(made, sure=sure, not_judged=[*made.not_judged, *content.get("questions", [])])
+    return replace(made, sure=sure)
 
 
 def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
@@ -136,8 +135,9 @@ def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
 
 
 def _warned(chapter: Chapter, content: Any) -> Chapter:
-    told = content.get("warnings") if isinstance(content, dict) else None
-    more = told if isinstance(told, list) else []
+    records = [one for one in (content if isinstance(content, list) else [content]) if isinstance(one, dict)]
+    told = (one.get(key) for one in records for key in ("warnings", "questions"))
+    more = chain(*(texts for texts in told if isinstance(texts, list)))
     return replace(chapter, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])))
 
 

@@ -77,7 +77,7 @@ def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter,
         for part in within:
             count = len(told)
             if (run := runs.get(part)) is not None:
-                chapter = of_run(part, run.scenarios, kind=run.case.table.models or "", beside=run.beside)
+                chapter = of_run(part, run.scenarios, beside=run.beside)
                 told.append((chapter, _of_run(run, figures)))
             for sweep in sweeps_of(part):
                 shown = studies.sweep(sweep, scenarios, figures)

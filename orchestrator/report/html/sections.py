@@ -86,7 +86,8 @@ def _answers(results: Results) -> str:
         ]  # fmt: skip
         word = answer.get("verdict") or {True: "stable", False: "UNSTABLE"}.get(answer["stable"], "not known")
         shade = _verdict_shade(answer["stable"])
-        rows.append([escape(s["title"]), f'<b class="{shade}">{escape(word)}</b>', escape(answer["remark"]), *figures])
+        told = [escape(s.get("subject", s["title"])), f'<b class="{shade}">{escape(word)}</b>']
+        rows.append([*told, escape(answer["remark"]), *figures])
     return table("Verdicts", ["Scenario", "Verdict", "Remark", "Least damped: f [Hz]", "Damping [%]"], rows, left=3)
 
 
