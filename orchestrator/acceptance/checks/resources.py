@@ -114,7 +114,7 @@ def _of_instances(subject: Subject) -> float | _Unknown:
     if isinstance(quick, float) and quick <= _INSTANCE:
         return quick
     each = (perf_counter() - clock) / (_BLOCKS * few)
-    return _of_so_many(subject, max(5, min(steps // 30, int(_BLOCK / each))))
+    return _of_so_many(subject, max(10, min(steps // 30, int(_BLOCK / each))))
 
 
 def _of_so_many(subject: Subject, count: int) -> float | _Unknown:
