@@ -22,7 +22,9 @@ def compare(master, prepared, excitation, restore, hertz, points):
         same = min(found, key=lambda m: abs(m.eigenvalue - mode.eigenvalue))
         assert same.frequency_hz == pytest.approx(mode.frequency_hz, abs=hertz)
         assert same.damping_percent == pytest.approx(mode.damping_percent, abs=points)
-        assert component_participation(same, boxed.component) == pytest.approx(component_participation(mode, "gfor"), abs=0.01)
+        assert component_participation(same, boxed.component) == pytest.approx(
+            component_participation(mode, "gfor"), abs=0.01
+        )
 
 
 def test_without_its_slow_part_measured_the_mode_is_still_there():
