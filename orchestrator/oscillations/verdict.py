@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -30,6 +31,7 @@ off, must not fall by more than the factor, as it does beside a mode with next t
 
 _SHOCK = 6.0  # deviation at the begin, in amplitudes, that a forcing's own transient does not reach
 _COHERENT = 0.975
+_PAIR = 0.87  # part of the envelope's power from which on two sines explain it; of a mode of 3 % in noise 0.4 to 0.87
 _CHANGE = 0.25  # change of the amplitude over the window from which on an oscillation decays or grows
 
 
@@ -66,13 +68,15 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         change = np.expm1(slope * (late[-1] - late[0])) if explained > _TREND else 0.0
         wave = np.real(z * np.exp(2j * np.pi * f * late))
         kurtosis = (wave**4).mean() / (wave**2).mean() ** 2
-        seen.append([size.std() / size.mean(), kurtosis, abs(z.mean()) / size.mean(), slope, change])
+        spread = size.std() / size.mean()
+        pair = _pair(late, z) if spread > _RESTLESS else 0.0
+        seen.append([spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair])
     skirt = float(np.median([_skirt(t, signals.values[used, k], f) for k in columns]))
-    spread, kurtosis, coherence, slope, change = np.median(seen, axis=0).tolist()
+    spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
     disturbed = _disturbed(signals, found)
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
     figures = Evidence("not known", damping, spread, kurtosis, coherence, skirt, periods, disturbed, ())
-    kind, reasons = _judged(figures, change, found)
+    kind, reasons = _judged(figures, change, pair, found)
     return replace(figures, kind=kind, reasons=tuple(reasons))
 
 
@@ -82,7 +86,7 @@ def forced_frequencies(times: Numbers, names: Sequence[str], values: Numbers) ->
     return [one.frequency for one in find_oscillations(signals) if evidence_of(signals, one).kind == "forced"]
 
 
-def _judged(seen: Evidence, change: float, found: SpectralLine) -> tuple[OscillationKind, list[str]]:
+def _judged(seen: Evidence, change: float, pair: float, found: SpectralLine) -> tuple[OscillationKind, list[str]]:
     harmonics = ", ".join(f"{order} x ({100 * part:.0f} %)" for order, part in found.harmonics.items())
     sharp = seen.envelope_spread <= _CLEAN or seen.skirt <= _SKIRT or bool(harmonics)
     steady = seen.envelope_spread < _STEADY and seen.kurtosis < _SINE and seen.coherence > _COHERENT
@@ -101,9 +105,24 @@ def _judged(seen: Evidence, change: float, found: SpectralLine) -> tuple[Oscilla
         said = [f"it is steady over {seen.periods:.0f} periods ({figures}): noise would make a mode's amplitude wander"]
         said += [f"multiples of its frequency: {harmonics}, as of a limit or a switch"] if harmonics else []
         return "forced", said
-    if seen.envelope_spread > _RESTLESS and seen.kurtosis > _SINE and seen.coherence < 0.9:
+    restless = seen.envelope_spread > _RESTLESS
+    if restless and pair > _PAIR:
+        return "not known", [f"it swells and fades as two steady sines at close frequencies would ({figures})"]
+    if restless and seen.kurtosis > _SINE and seen.coherence < 0.9:
         return "mode", [f"its amplitude and phase wander as noise makes them ({figures})"]
     return "not known", [f"neither steady nor restless: {figures}"]
+
+
+def _pair(times: Numbers, z: Numbers) -> float:
+    """Part of the power of a complex envelope that the best of many pairs of sines explains, up to three widths off."""
+    t = (times - times[0]) / (times[-1] - times[0])
+    some = np.unique(np.linspace(0, len(t) - 1, 64).astype(int))
+    waves = np.exp(2j * np.pi * np.outer(t[some], np.arange(-2, 2.01, 0.125)))
+    power, best = float((np.abs(z[some]) ** 2).sum()), 0.0
+    for one, other in combinations(waves.T, 2):
+        pair = np.column_stack([one, other])
+        best = max(best, float((np.abs(pair @ np.linalg.lstsq(pair, z[some], rcond=None)[0]) ** 2).sum()))
+    return best / power
 
 
 def _skirt(times: Numbers, values: Numbers, frequency: float) -> float:

@@ -291,6 +291,15 @@ def test_what_swells_and_fades_again_is_no_mode():
     assert at(locate(made_ready("swell", TIMES, places)), 0.6).evidence.kind == "not known"
 
 
+def test_two_forcings_at_close_frequencies_beat_and_are_no_mode():
+    t = times_of(60.0)
+    beat = sine(t, 0.7, 0.02) + sine(t, 0.725, 0.016)
+    measured = record("two_area", {"gfor.droop.delta_P_ref": beat}, times=t, loads=5e-4, measuring=5e-5)
+    found = at(locate(measured), 0.7)
+    assert found.evidence.kind == "not known"
+    assert "two steady sines" in found.reason
+
+
 def test_noise_of_loads_alone_forces_nothing():
     for name in ("two_area", "ieee39"):
         found = locate(record(name, {}, loads=0.002, measuring=5e-5, times=times_of(60.0)))
