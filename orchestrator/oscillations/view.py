@@ -88,6 +88,9 @@ def sources_of(
         except CosimError as error:
             remark = f"the record is compared with no models of the units: {error}"
             measured = replace(measured, remarks=(*measured.remarks, remark))
+    if models and prepared and (recorded := dataset.attrs.get("scenario", prepared.name)) != prepared.name:
+        remark = f"it is a record of the scenario {recorded!r}, and judged with the models of {prepared.name!r}"
+        measured = replace(measured, remarks=(*measured.remarks, remark))
     located = locate(measured, models)
     if models and prepared:
         from orchestrator.oscillations.levers import with_levers  # noqa: PLC0415 - only where there is a case

@@ -137,6 +137,9 @@ def test_a_run_is_compared_with_the_models_of_its_own_case(run, gfor, tmp_path):
     code, out, _ = gfor("signal", "source", tmp_path / "gfor", "--json")
     (one,) = json.loads(out)["oscillations"]
     assert (code, one["source"], one["methods"][0]["method"]) == (0, "sg1", OWN_MODEL)
+    other = gfor_api.source(run.dataset, scenario=gfor_api.load("two_area_rms").scenario("pod_p"))
+    assert "a record of the scenario 'gfor', and judged with the models of 'pod_p'" in other.remarks[-1]
+    assert not any("judged with" in remark for remark in run.source().remarks)
 
 
 def test_a_table_of_phasors_is_compared_with_a_case(run, gfor, tmp_path):
