@@ -12,7 +12,7 @@ import xarray as xr
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.all_codes import CODES
-from orchestrator.certification.codes.bench_point import BenchResult, case_name
+from orchestrator.certification.codes.bench_point import BenchResult, case_name, write_row
 from orchestrator.certification.codes.row_verdict import judge_row
 from orchestrator.certification.files import HTML, JSON, RESPONSES, figures_hash, save, seal_of
 from orchestrator.certification.request import CertificationRequest
@@ -27,18 +27,17 @@ CODE = CODES["fingrid"]
 @pytest.fixture
 def fails(tmp_path, fmu_path):
     """A certificate of Fingrid's table on powers that never move: jumps are not opposed, and the rest is met."""
-    results = {}
+    results, fmu = {}, tmp_path / "converter.fmu"
+    shutil.copyfile(fmu_path("gfor"), fmu)
+    request = CertificationRequest(fmu)
     for row in CODE.rows:
         programme = row.programme(50.0)
         times = np.arange(0, programme.stop + 1e-3, 1e-3)
         one, angle = np.ones(times.shape), programme.source_angle(times, 50.0)
         signals = {"p": 0.5 * one, "q": 0.1 * one, "v": one, "v_re": np.cos(angle), "v_im": np.sin(angle)}
         results[row.name] = BenchResult(row.name, times, signals)
-        (tmp_path / case_name(row.name)).write_text("", encoding="utf-8")
-    fmu = tmp_path / "converter.fmu"
-    shutil.copyfile(fmu_path("gfor"), fmu)
+        write_row(request, row.name, row.title, programme, 50.0, tmp_path)
     verdicts = [judge_row(row, results[row.name], 50.0) for row in CODE.rows]
-    request = CertificationRequest(fmu)
     case = tmp_path / case_name(CODE.rows[0].name)
     save(Certificate(request, bound_fmu(fmu), CODE, 50.0, verdicts, results, case), tmp_path)
     assert verify_files(*read_certificate(tmp_path)).holds
