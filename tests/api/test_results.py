@@ -410,8 +410,8 @@ def test_an_fmu_shows_what_it_declares(fmu_path, gfor):
     assert found.description.model_name in found._repr_html_()
 
 
-def test_an_fmu_is_opened_with_the_values_it_is_given():
-    fmu = face.build("infinite_bus")
+def test_an_fmu_is_opened_with_the_values_it_is_given(tmp_path):
+    fmu = face.build("infinite_bus", tmp_path)
     for values in ({}, {"v_0": 1.05}, None):
         with face.open_fmu(fmu, values) as opened:
             assert opened.get("v") == pytest.approx(1.05 if values else 1.0)
