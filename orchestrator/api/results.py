@@ -136,10 +136,11 @@ class Modes:
 
     def save(self, folder: str | Path) -> Path:
         """Write what ``gfor modes --out`` leaves into a folder."""
+        from orchestrator.study import beside  # noqa: PLC0415 - as below
         from orchestrator.study.files import write_modes  # noqa: PLC0415 - plots: a second to import
 
         place = made_folder(folder, "folder")
-        write_modes([self.result], place)
+        write_modes([self.result], place, (), [*beside.told([self.result])])
         return place
 
     def plot(self, ax: Axes = None, *, radians: bool = False, annotate: bool = False) -> Axes:
@@ -300,6 +301,7 @@ class Run:
         Other scenarios' results that are in the folder stay, but for the tables of all together."""
         from orchestrator.results.recording import TRAJECTORY  # noqa: PLC0415 - as below
         from orchestrator.results.storage import save_netcdf  # noqa: PLC0415 - as below
+        from orchestrator.study import beside  # noqa: PLC0415 - as below
         from orchestrator.study.files import save_run, save_study  # noqa: PLC0415 - plots: a second to import
 
         place, run_id, name = made_folder(folder, "folder"), new_run_id(), self.result.modes.prepared.name
@@ -307,7 +309,7 @@ class Run:
         save_netcdf(self.result.dataset, scenario.path / TRAJECTORY)
         save_run(self.result, scenario, csv=False)
         with staged(place, run_id, [name]) as staging:
-            save_study([self.result], staging)
+            save_study([self.result], staging, [*beside.told([self.result.modes])])
         return place
 
     def plot(self, signal: str | None = None, ax: Axes = None) -> Axes:

@@ -72,16 +72,16 @@ def _compute(
         prepared = [scenario.prepared for scenario in scenarios]
         results = compute_all_modes(prepared, request.frequencies, request.critical, directional=request.directional)
     weights = [] if options.black_box else load_model_weights(scenarios, results, request.frequencies)
-    written = []
+    written, said = [], [*beside.told(results)]
     if folder:
         from orchestrator.study.files import write_modes  # noqa: PLC0415 - plots: a second to import
 
-        written = write_modes(results, folder, weights)
+        written = write_modes(results, folder, weights, said)
     if options.json:
-        terminal.print_json(modes_json(results, weights, [*beside.told(results)]))
+        terminal.print_json(modes_json(results, weights, said))
         return exit_code(options, [r.stability for r in results])
     console = terminal.make_console()
-    print_answers(console, [of_modes(r) for r in results], results)
+    print_answers(console, [of_modes(r) for r in results], results, said)
     terminal.print_warnings(results)
     terminal.say("question", weights)
     whole = len(results) == 1 or options.details

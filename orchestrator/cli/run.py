@@ -35,6 +35,7 @@ from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder, 
 from orchestrator.results.staging import ScenarioFolder, mend, new_run_id, staged, unfinished
 from orchestrator.results.storage import save_dataset
 from orchestrator.safe_files import PARTIAL, made_folder
+from orchestrator.study import beside
 from orchestrator.study.all_modes import all_ours
 from orchestrator.study.answers import EarlyEnd
 from orchestrator.study.files import save_run, save_study, summary_of
@@ -124,11 +125,12 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
             kept.end(whole=False)
         raise error
     early_end = _early_end(stopped, scenarios, results) if stopped else None
-    plots = _save_together(results, folder, run_id, stopped, early_end)
+    said = [*beside.told([r.modes for r in results])]
+    plots = _save_together(results, said, folder, run_id, stopped, early_end)
     if options.json:
         terminal.print_json([summary_of(r) for r in results])
     else:
-        print_run(console, results, early_end, details=options.details)
+        print_run(console, results, said, early_end, details=options.details)
         written = "trajectories (.nc, .csv)" if options.csv else "trajectories (.nc)"
         words = (
             f"Results in {folder}: {written}, modes.csv, participation.csv, mode_shapes.csv, "
@@ -208,14 +210,14 @@ def _is_interrupt(error: BaseException) -> bool:
 
 
 def _save_together(
-    results: Sequence[RunResult], folder: Path, run_id: str, stopped: Mapping[str, BaseException],
-    early_end: EarlyEnd | None,
+    results: Sequence[RunResult], said: Sequence[str], folder: Path, run_id: str,
+    stopped: Mapping[str, BaseException], early_end: EarlyEnd | None,
 ) -> list[Path]:  # fmt: skip
     whole = [r for r in results if not isinstance(r.failure, ResultsError)]
     names = [r.modes.prepared.name for r in whole]
     try:
         with staged(folder, run_id, [name for name in names if (folder / name).is_dir()]) as staging:
-            return save_study(results, staging, early_end)
+            return save_study(results, staging, said, early_end)
     except ResultsError:
         if not any(isinstance(error, ResultsError) for error in stopped.values()):
             raise

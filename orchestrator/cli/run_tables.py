@@ -37,14 +37,14 @@ def on_adaptive_steps(prepared: PreparedScenario, counts: StepCounts) -> str:
 
 
 def print_run(
-    console: Console, results: Sequence[RunResult], early_end: EarlyEnd | None, *, details: bool = False
+    console: Console, results: Sequence[RunResult], beside: Sequence[str], early_end: EarlyEnd | None, *, details: bool
 ) -> None:
     if early_end is not None:
         colour = "yellow" if early_end.interrupted else "red"
         words = f"[bold {colour}]{early_end.word}[/] {escape(early_end.place)}"
         console.print(words, soft_wrap=True, highlight=False)
     modes = [r.modes for r in results]
-    print_answers(console, [of_run(r) for r in results], modes)
+    print_answers(console, [of_run(r) for r in results], modes, beside)
     print_named_modes(console, modes)
     print_sources(console, modes)
     if any(r.ring_down for r in results):

@@ -10,7 +10,7 @@ from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.stability import Stability
 from orchestrator.cli.arguments import switch
 from orchestrator.report.tables import COLOURS, VerdictSentence
-from orchestrator.study import beside, tables
+from orchestrator.study import tables
 from orchestrator.study.answers import ScenarioAnswer, answers_table, outside
 from orchestrator.study.modes import ModesResult
 
@@ -51,10 +51,12 @@ def add_details_argument(parser: argparse.ArgumentParser) -> None:
     switch(parser, "--details", "print also the power flow, and each verdict with its eigenvalue")
 
 
-def print_answers(console: Console, answers: Sequence[ScenarioAnswer], results: Sequence[ModesResult]) -> None:
+def print_answers(
+    console: Console, answers: Sequence[ScenarioAnswer], results: Sequence[ModesResult], beside: Sequence[str]
+) -> None:
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
     console.print(answers_table(answers, ranges[0] if ranges else ELECTROMECHANICAL_HZ))
-    for sentence in beside.told(results):
+    for sentence in beside:
         console.print(escape(sentence), soft_wrap=True, highlight=False)
     if rest := outside(results):
         console.print(escape(rest), style="dim", soft_wrap=True, highlight=False)

@@ -19,7 +19,6 @@ from orchestrator.results.signals import relative_difference
 from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
 from orchestrator.safe_files import write_text
-from orchestrator.study import beside
 from orchestrator.study.answers import EarlyEnd, of_run
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation, plot_signals
 from orchestrator.study.modes import ModesResult, modes_json
@@ -60,16 +59,20 @@ def save_modes(results: Sequence[ModesResult], folder: Path) -> list[Path]:
     return plots
 
 
-def write_modes(results: Sequence[ModesResult], folder: Path, weights: Sequence[str] = ()) -> list[str]:
+def write_modes(
+    results: Sequence[ModesResult], folder: Path, weights: Sequence[str], beside: Sequence[str]
+) -> list[str]:
     """Write what ``gfor modes --out`` leaves, all of it at once; return the files' names."""
     with staged(folder, new_run_id()) as staging:
         plots = [path.name for path in save_modes(results, staging)]
-        save_json(modes_json(results, weights, [*beside.told(results)]), staging / "modes.json")
+        save_json(modes_json(results, weights, beside), staging / "modes.json")
         flows = sorted(path.name for path in staging.glob("power_flow_*.csv"))
     return ["modes.csv", "participation.csv", "mode_shapes.csv", "modes.json", *flows, *plots]
 
 
-def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd | None = None) -> list[Path]:
+def save_study(
+    results: Sequence[RunResult], folder: Path, beside: Sequence[str], early_end: EarlyEnd | None = None
+) -> list[Path]:
     case = results[0].modes.prepared.case
     write_text(folder / "case.toml", case.text)
     save_table(_shift_rows(results), folder / "step_size.csv")
@@ -77,7 +80,7 @@ def save_study(results: Sequence[RunResult], folder: Path, early_end: EarlyEnd |
     made_of = {"case": case.name, "case_file": word_of(case, folder.parent)}  # the files are put there at the end
     given = {r.modes.prepared.name: dict(r.modes.prepared.given) for r in results}
     summary = {**made_of, "ended_early": ended, "given": given, "scenarios": [summary_of(r) for r in results],
-               "beside": [*beside.told([r.modes for r in results])]}  # fmt: skip
+               "beside": list(beside)}  # fmt: skip
     save_json(summary, folder / "summary.json")
     plots = []
     for table in case.table.plots:
