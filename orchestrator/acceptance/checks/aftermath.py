@@ -1,7 +1,7 @@
 """What dips, overvoltages and jumps leave behind: another answer to small changes, another rest, memory."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass
 from enum import Enum, auto
 from functools import partial
@@ -15,7 +15,7 @@ from orchestrator.acceptance.checks.base import SAME, CheckResult, check, failed
 from orchestrator.acceptance.checks.events import Segment, factor, in_words, scale, series
 from orchestrator.acceptance.checks.port import WHY, current_limit, currents, followed, voltage_rows
 from orchestrator.acceptance.checks.running import RUN_FOR, spent_since
-from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject, saved
+from orchestrator.acceptance.checks.subject import OperatingAt, Running, Subject, unmoved
 from orchestrator.arrays import Complex
 from orchestrator.errors import ComponentError
 
@@ -167,9 +167,9 @@ class _Look:
 
     def _answers(self, running: Running) -> tuple[Complex, Complex]:
         """What it does with and without small changes from here on, where it stays."""
-        with _unmoved(running):
+        with unmoved(running):
             small = _in_frame(running, self._small)
-        with _unmoved(running):
+        with unmoved(running):
             return small, _in_frame(running, self._still)
 
     def after(self, segments: Sequence[Segment], soon: bool) -> _After:
@@ -205,7 +205,7 @@ class _Look:
         kept = max(0.0, min((b - a) / steps for (a, _), (b, steps) in pairwise(sizes)))
         begun, restores = running.time, self._subject.memory.get("restores", False)
         waits = sorted(self._steps(self._draw.uniform(*bounds)) for bounds in (_LATER if soon else ()))
-        with _unmoved(running) if restores else nullcontext():
+        with unmoved(running) if restores else nullcontext():
             end, away = self._came_back(running, self._rest)
             back = [round((running.time - begun) / self._subject.step_size)] if end is _End.BACK else []
             last = [(wait, *self._answers(running)) for wait in back if restores]
@@ -255,13 +255,3 @@ class _Look:
 def _in_frame(running: Running, factors: Complex) -> Complex:
     """The current in the frame of the voltage while that is changed by factors."""
     return followed(running, factors) * np.abs(factors) / factors
-
-
-@contextmanager
-def _unmoved(running: Running) -> Iterator[None]:
-    """Bring it back to where it was before what is done meanwhile."""
-    at = running.time
-    with saved(running) as kept:
-        yield
-        running.restore(kept)
-        running.time = at

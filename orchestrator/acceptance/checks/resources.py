@@ -8,7 +8,7 @@ from time import perf_counter
 
 from orchestrator.acceptance.checks.base import CheckResult, check, failed, not_applicable, passed, remarked
 from orchestrator.acceptance.checks.running import affordable
-from orchestrator.acceptance.checks.subject import Subject, saved
+from orchestrator.acceptance.checks.subject import Subject, unmoved
 from orchestrator.errors import ComponentError
 
 _BLOCKS, _BLOCK = 8, 0.2  # parts of a measurement, and the longest time of one with instances [s]
@@ -169,10 +169,7 @@ def _of_states(subject: Subject) -> float | _Unknown:
 
         def block() -> None:
             for _ in range(50):
-                with saved(running) as kept:
-                    at = running.time
+                with unmoved(running):
                     running.step(subject.step_size)
-                    running.restore(kept)
-                    running.time = at
 
         return _growth(subject, block, 50)

@@ -278,3 +278,13 @@ def saved(running: Running) -> Iterator[Any]:
         yield state
     finally:
         running.component.free_state(state)
+
+
+@contextmanager
+def unmoved(running: Running) -> Iterator[None]:
+    """Bring it back to where it was before what is done meanwhile."""
+    at = running.time
+    with saved(running) as kept:
+        yield
+        running.restore(kept)
+        running.time = at
