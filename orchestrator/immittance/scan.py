@@ -14,12 +14,14 @@ from orchestrator.errors import InputError
 
 SIEMENS, PER_UNIT = "S", "pu"
 _TOP = 5.0  # frequencies down to this part of the highest tell signs: there a device's filter answers, not its control
-_ACTIVE = 0.5
-"""Part of those frequencies at which both resistances must be negative for the sign to be called the generator's."""
+_ACTIVE = 0.5  # part of those at which both resistances must be negative for the sign to be called the generator's
 
-_SURE, _OFF, _NONE, _COIL, _FEW = 0.3, 2.0, 0.1, 0.3, 8
-"""Parts of the rated frequency that are seen of the other q axis, of rad/s (2.9 to 6.4 of devices and networks; 0.4 to
-1.03 of right ones), and of elements left out; least likeness to a coil, and points, from which on it tells."""
+# Parts of the rated frequency that a scan shows; right ones of devices and networks show 0.4 to 1.03.
+_OTHER_AXIS = -0.3  # below it the q axis is the other one
+_IN_RAD = 2.0  # above it the frequencies are in rad/s, which show 2.9 to 6.4
+_LEFT_OUT = 0.1  # to either side of 0: dq and qd were left out
+_COIL = 0.3  # least likeness to a coil from which on it tells
+_FEW = 8  # points from which on it tells
 
 _CLEAR = 0.35  # most that an admittance may miss the relation by: resonances between coarse rows miss it by more
 
@@ -117,18 +119,18 @@ def in_own_form(
     how its frame turns."""
     own = values if q_leads else other_q_axis(values)
     seen = _rated_seen(frequencies, own, rated_hz)
-    if seen < -_SURE:
+    if seen < _OTHER_AXIS:
         raise InputError(
             f"{source}: by its reactance at high frequencies the q axis {'lags' if q_leads else 'leads'} the d axis, "
             f"where this form has it {'leading' if q_leads else 'lagging'}; turn the sign of the dq and qd elements"
         )
-    if seen > _OFF:
+    if seen > _IN_RAD:
         raise InputError(
             f"{source}: by its reactance at high frequencies its frame turns {seen:.2g} times as fast as at the rated "
             f"{rated_hz:g} Hz: are its frequencies in rad/s? Give them in Hz"
         )
     none = f"{source}: were dq and qd left at 0, or has one the wrong sign? They show no reactance where dd and qq do"
-    return own, (none,) if abs(seen) < _NONE else ()
+    return own, (none,) if abs(seen) < _LEFT_OUT else ()
 
 
 def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:

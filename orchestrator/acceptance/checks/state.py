@@ -10,12 +10,10 @@ from orchestrator.acceptance.checks.instances import IN_EVENTS, NOT_IN_EVENTS
 from orchestrator.acceptance.checks.running import affordable
 from orchestrator.acceptance.checks.settings import Setting, elsewhere, tune, with_each_setting
 from orchestrator.acceptance.checks.subject import Running, Stimulus, Subject, saved
-from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError, EndedError
 from orchestrator.fmi.component import RealBatch
 
-_CLEAR = 1e-6
-"""Relative difference above which something was not restored; an integrator with memory may begin anew below it."""
+_CLEAR = 1e-6  # relative difference above which something was not restored; an integrator may begin anew below it
 
 _EXACT = 1e-12
 _RESTARTED = 1e-2  # the same with dips and jumps, which amplify what an integrator leaves that begins anew
@@ -112,8 +110,7 @@ def _in_events(subject: Subject, setting: Setting) -> tuple[float, str]:
                 seen = (0.0, IN_EVENTS)
                 for (words, part, at, state), first in zip(saves, found, strict=True):
                     running.hold(away, len(away), h)
-                    running.restore(state)
-                    running.time = at
+                    running.restore(state, at)
                     apart, place = difference(first, running.hold(part, len(part), h))
                     if apart > seen[0]:
                         says = f"{subject.watched[place]} differs by {apart:.3g} of its range after a state that was "
@@ -194,8 +191,7 @@ def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[s
             far = states.read().copy()
             with saved(running):
                 for _ in range(2):
-                    running.restore(kept)
-                    running.time = at
+                    running.restore(kept, at)
                     now = states.read().copy()
                     for k, name in enumerate(states.names):
                         if abs(now[k] - size[k]) > _READ * max(abs(size[k]), abs(far[k] - size[k]), 1e-6):
@@ -213,45 +209,26 @@ def _brought_back(subject: Subject, setting: Setting, moved: Setting) -> tuple[s
 
 
 def _serialised(running: Running, h: float, stimulus: Stimulus) -> str | None:
-    """What is wrong with a state that went through bytes and back; None if nothing is."""
-    at = running.time
+    """What is wrong with a state that went through bytes and back, or into another instance: a pointer may have been
+    saved. None if nothing is."""
+    at, subject = running.time, running.subject
     with saved(running) as kept:
         content = running.component.serialize_state(kept)
     first = running.record(50, h, stimulus)
-    try:
-        copy = running.component.deserialize_state(content)
-        running.restore(copy)
-    except ComponentError as error:
-        return str(error)
-    running.component.free_state(copy)
-    running.time = at
-    apart, place = difference(first, running.record(50, h, stimulus))
-    if apart <= _CLEAR:
-        return _in_another(running, content, at, first, h, stimulus)
-    return (
-        f"{running.subject.watched[place]} differs by {apart:.3g} of its range after a state that went through "
-        f"{len(content)} bytes"
-    )
 
-
-def _in_another(
-    running: Running, content: bytes, at: float, first: Numbers, h: float, stimulus: Stimulus
-) -> str | None:
-    """What is wrong with a state of one instance that another one takes from bytes: a pointer may have been saved."""
-    subject = running.subject
-    if subject.description.one_instance:
-        return None
-    with subject.running("another") as another:
+    def wrong(taking: Running, refused: str, where: str) -> str | None:
         try:
-            copy = another.component.deserialize_state(content)
-            another.restore(copy)
+            copy = taking.component.deserialize_state(content)
+            taking.restore(copy, at)
         except ComponentError as error:
-            return f"in another instance, {error}"
-        another.component.free_state(copy)
-        another.time = at
-        apart, place = difference(first, another.record(len(first) - 1, h, stimulus))
-    if apart <= _CLEAR:
-        return None
-    return (
-        f"{subject.watched[place]} differs by {apart:.3g} of its range in another instance that takes the state's bytes"
-    )
+            return f"{refused}{error}"
+        taking.component.free_state(copy)
+        apart, place = difference(first, taking.record(50, h, stimulus))
+        says = f"{subject.watched[place]} differs by {apart:.3g} of its range {where}"
+        return None if apart <= _CLEAR else says
+
+    here = wrong(running, "", f"after a state that went through {len(content)} bytes")
+    if here is not None or subject.description.one_instance:
+        return here
+    with subject.running("another") as another:
+        return wrong(another, "in another instance, ", "in another instance that takes the state's bytes")

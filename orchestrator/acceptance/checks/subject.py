@@ -260,8 +260,10 @@ class Running(Closing):
     def save(self) -> Any:
         return self.component.save_state()
 
-    def restore(self, state: Any) -> None:
+    def restore(self, state: Any, time: float) -> None:
+        """Bring it back to a state that was saved at this time [s]."""
         self.component.restore_state(state)
+        self.time = time
 
     def reset(self) -> None:
         self.component.reset()
@@ -286,5 +288,4 @@ def unmoved(running: Running) -> Iterator[None]:
     at = running.time
     with saved(running) as kept:
         yield
-        running.restore(kept)
-        running.time = at
+        running.restore(kept, at)
