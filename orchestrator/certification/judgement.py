@@ -8,18 +8,7 @@ import numpy as np
 
 from orchestrator.analysis.modes import damping_ratio
 from orchestrator.arrays import Numbers
-from orchestrator.certification.criteria import (
-    LEAST_DAMPING,
-    ModalTest,
-    ModeVerdict,
-    PodEffect,
-    critical_mode,
-    judged_modes,
-    matched_modes,
-    modal_test,
-    neighbouring_modes,
-    stability_fault,
-)
+from orchestrator.certification import criteria
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.point import CONVERTER, FREQUENCY, POWER, PointResult
 from orchestrator.certification.request import row_of
@@ -41,7 +30,7 @@ class TimeVerdict:
     signal: str
     swings: SwingTest
     other_reading: SwingTest
-    modal: ModalTest
+    modal: criteria.ModalTest
 
     @property
     def accepted(self) -> bool:
@@ -53,7 +42,7 @@ class TimeVerdict:
         ratio, least = self.swings.ratio, min((m.damping_percent for m in self.modal.modes), default=None)
         ways = [
             (self.swings.accepted, None if ratio is None else 1 - abs(ratio) / LARGEST_RATIO),
-            (self.modal.accepted, None if least is None else least / (100 * LEAST_DAMPING) - 1),
+            (self.modal.accepted, None if least is None else least / (100 * criteria.LEAST_DAMPING) - 1),
         ]
         if any(accepted and margin is None for accepted, margin in ways):
             return None
@@ -63,15 +52,15 @@ class TimeVerdict:
 @dataclass(frozen=True)
 class PointVerdict:
     X_L: float
-    modes: tuple[ModeVerdict, ...]
+    modes: tuple[criteria.ModeVerdict, ...]
     time: TimeVerdict | None
     base_time: TimeVerdict | None  # the time-domain criterion on the system without the converter, for comparison only
     faults: tuple[str, ...]  # why the point is not accepted; empty where it is
-    neighbours: tuple[ModeVerdict, ...] = ()
+    neighbours: tuple[criteria.ModeVerdict, ...] = ()
     unknown: str = ""  # why the point could not be judged at all; empty where it was
     # the least damped judged mode without the converter [rad/s]; None where there is none.
     base_critical: complex | None = None
-    pod: PodEffect | None = None  # what the active damping controllers change; None where none is
+    pod: criteria.PodEffect | None = None  # what the active damping controllers change; None where none is
 
     @property
     def name(self) -> str:
@@ -90,7 +79,7 @@ class PointVerdict:
         return bool(self.modes) and all(m.accepted for m in self.modes)
 
     @property
-    def lowered(self) -> tuple[ModeVerdict, ...]:
+    def lowered(self) -> tuple[criteria.ModeVerdict, ...]:
         """Modes, judged or listed, whose damping is more than two points lower than without the converter."""
         every = (*self.modes, *self.neighbours)
         return tuple(m for m in every if (b := m.before_percent) is not None and b - m.damping_percent > LOWERED)
@@ -101,7 +90,7 @@ class PointVerdict:
         found = [
             CriterionMargin(place, f"damping at {m.frequency_hz:.3f} Hz", margin, m.accepted, m.reason)
             for m in self.modes
-            if (margin := damping_ratio(m.eigenvalue) / LEAST_DAMPING - 1) >= 0 or not m.accepted
+            if (margin := damping_ratio(m.eigenvalue) / criteria.LEAST_DAMPING - 1) >= 0 or not m.accepted
         ]  # a mode below 5 % that is accepted was below without the converter
         if self.time is not None:
             reasons = f"{self.time.swings.reason}; {self.time.modal.reason}"
@@ -131,7 +120,7 @@ def watched(pod: str) -> str:
 
 
 def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float,
-          known: Sequence[ModeVerdict] | None = None) -> PointVerdict:  # fmt: skip
+          known: Sequence[criteria.ModeVerdict] | None = None) -> PointVerdict:  # fmt: skip
     """All criteria at one reactance, from the system with and without the converter.
 
     ``known``: Which mode is which without the converter; None where the modes' shapes are to tell it."""
@@ -141,16 +130,21 @@ def judge(having: PointResult, lacking: PointResult, pod: str, event_time: float
     faults = _wrong(having, pod, event_time)
     if having.failure:
         faults = [f"the study failed with the converter: {having.failure}"]
-    modes: tuple[ModeVerdict, ...] = ()
-    beside: tuple[ModeVerdict, ...] = ()
-    critical, unknown = None if lacking.modes is None else critical_mode(lacking.modes), not_judged(having.findings)
+    modes: tuple[criteria.ModeVerdict, ...] = ()
+    beside: tuple[criteria.ModeVerdict, ...] = ()
+    critical, unknown = (
+        None if lacking.modes is None else criteria.critical_mode(lacking.modes),
+        not_judged(having.findings),
+    )
     if having.stability and having.stability["stable"] is None:
         unknown = f"nothing shows that the system with the converter is stable: {having.stability['sentence']}"
     if having.modes is not None and lacking.modes is not None:
-        matched = list(matched_modes(having.modes, lacking.modes, having.components) if known is None else known)
-        modes, beside = tuple(judged_modes(matched)), tuple(neighbouring_modes(matched))
+        matched = list(
+            criteria.matched_modes(having.modes, lacking.modes, having.components) if known is None else known
+        )
+        modes, beside = tuple(criteria.judged_modes(matched)), tuple(criteria.neighbouring_modes(matched))
         faults += [f"{m.frequency_hz:.3f} Hz: {m.reason}" for m in modes if not m.accepted]
-        fault = stability_fault(having.growth, lacking.growth, having.stability, lacking.stability)
+        fault = criteria.stability_fault(having.growth, lacking.growth, having.stability, lacking.stability)
         faults += [fault] if fault else []
     if not having.failure and not modes:
         faults.append("no mode from 0.1 to 1.5 Hz was found, so that the eigenvalue criterion judged nothing")
@@ -200,7 +194,7 @@ def judge_response(point: PointResult, signal: str, event_time: float) -> TimeVe
         return None
     times, y = point.times, slow_part(point.times, point.signals[signal])
     with_first = swing_test(times, y, event_time, drop_first=False)
-    modal = modal_test(times, y, event_time + SETTLING)
+    modal = criteria.modal_test(times, y, event_time + SETTLING)
     return TimeVerdict(signal, swing_test(times, y, event_time), with_first, modal)
 
 

@@ -12,13 +12,7 @@ from rich.console import Console, RenderableType
 from rich.markup import escape
 
 from orchestrator.api.progress import shown_progress
-from orchestrator.cli.arguments import (
-    add_executor_arguments,
-    add_json_argument,
-    add_request_arguments,
-    choose_executor,
-    option,
-)
+from orchestrator.cli import arguments
 from orchestrator.cli.case_arguments import add_case_arguments, asked_of_case, case_of
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, print_questions, say
@@ -87,16 +81,16 @@ Simple = StudyAtOnce[..., Any]
 
 def add_study_arguments(name: str, study: AnyStudy | Simple, parser: argparse.ArgumentParser) -> None:
     add_case_arguments(parser, several=study.of_several)
-    add_request_arguments(parser, study.asks)
+    arguments.add_request_arguments(parser, study.asks)
     if isinstance(study, PointStudy):
-        add_executor_arguments(parser)
+        arguments.add_executor_arguments(parser)
         kept = f"{study.counted} that are there are not computed again"
         where = f"folder for results (default: results/<case>_{name}); {kept}"
-        option(parser, "--out", "DIR", where, read=Path)
+        arguments.option(parser, "--out", "DIR", where, read=Path)
         add_verdict_argument(parser)
     elif study.files:
-        option(parser, "--out", "DIR", f"write {study.files}", read=Path)
-    add_json_argument(parser)
+        arguments.option(parser, "--out", "DIR", f"write {study.files}", read=Path)
+    arguments.add_json_argument(parser)
 
 
 def run_study(name: str, study: AnyStudy | Simple, options: argparse.Namespace) -> int:
@@ -130,7 +124,7 @@ def working_in(
     case = case_of(options)
     request = study.request(**asked_of_case(options, study.asks, name) | more)
     folder = place or options.out or Path("results") / f"{case.name}_{name}"
-    executor, progress = choose_executor(options, study.imports), Progressing(folder)
+    executor, progress = arguments.choose_executor(options, study.imports), Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on):
         planned = study.plan(case, request)
         print_questions(study.prepared(planned), as_json=options.json)

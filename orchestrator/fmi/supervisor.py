@@ -21,21 +21,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fmus.toolchain.removal import remove_tree
-from orchestrator.fmi import wine
+from orchestrator.fmi import linux, wine
 from orchestrator.fmi.confinement import Means, confine
 from orchestrator.fmi.limits import TOO_MANY_TASKS, TOO_MUCH_DISK, TOO_MUCH_MEMORY, Limits
-from orchestrator.fmi.linux import (
-    NEW_IPC,
-    NEW_MOUNTS,
-    NEW_NETWORK,
-    NEW_PROCESSES,
-    NEW_USER,
-    adopt_orphans,
-    call,
-    die_with_parent,
-    mount,
-    unshare,
-)
 from orchestrator.fmi.process_tree import descendants, end_descendants, size_of, size_of_removed, usage
 
 _MOUNT_SETATTR, _HERE, _RECURSIVE, _READ_ONLY = 442, -100, 0x8000, 0x1
@@ -43,14 +31,13 @@ _PRIVATE, _ALL_BELOW = 1 << 18, 1 << 14
 _NO_SETUID, _NO_DEVICES = 0x2, 0x4
 _FEWEST_NUMBERS = 301  # the smallest number of process numbers that the kernel lets a namespace have
 _MOST_FILES = 4096
-_SHARED = 16 * 1024**2
-"""What memory shared by name may come to [bytes]; it lies outside of the folder, and counts for no process."""
+_SHARED = 16 * 1024**2  # most that memory shared by name comes to [bytes]: outside of the folder, and of no process
 
 
 def enter_namespaces() -> None:
     """Go into new namespaces: users, network and System V's objects for this process, processes for its children."""
     user, group = os.geteuid(), os.getegid()
-    unshare(NEW_USER | NEW_PROCESSES | NEW_NETWORK | NEW_IPC)
+    linux.unshare(linux.NEW_USER | linux.NEW_PROCESSES | linux.NEW_NETWORK | linux.NEW_IPC)
     own = Path("/proc/self")
     (own / "setgroups").write_text("deny", encoding="ascii")
     (own / "uid_map").write_text(f"{user} {user} 1", encoding="ascii")
@@ -63,16 +50,16 @@ def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[
     ``folder``: where that folder is put, empty.
     ``size``: what it may hold [bytes].
     ``more``: folders in whose place there is an empty one in memory as well."""
-    unshare(NEW_MOUNTS)
-    mount(None, "/", None, _PRIVATE | _ALL_BELOW)
+    linux.unshare(linux.NEW_MOUNTS)
+    linux.mount(None, "/", None, _PRIVATE | _ALL_BELOW)
     sizes = {folder: size, Path("/dev/shm"): min(size, _SHARED)} | dict.fromkeys(more, min(size, _SHARED))
     own = [path for path in sizes if path.is_dir()]
     for path in own:
         options = f"size={sizes[path]},nr_inodes={_MOST_FILES},mode=0700"
-        mount("tmpfs", str(path), "tmpfs", _NO_SETUID | _NO_DEVICES, options)
+        linux.mount("tmpfs", str(path), "tmpfs", _NO_SETUID | _NO_DEVICES, options)
     missing = []
     try:
-        mount("proc", "/proc", "proc", _NO_SETUID | _NO_DEVICES)
+        linux.mount("proc", "/proc", "proc", _NO_SETUID | _NO_DEVICES)
         with contextlib.suppress(OSError):  # since 6.14 each namespace has numbers of its own
             Path("/proc/sys/kernel/pid_max").write_text(str(_FEWEST_NUMBERS), encoding="ascii")
     except OSError:  # a container that hides a part of /proc forbids it
@@ -87,7 +74,7 @@ def mount_read_only(folder: Path, size: int, more: Iterable[Path] = ()) -> list[
 
 
 def _set_attributes(path: Path, flags: int, on: int, off: int) -> None:
-    call(_MOUNT_SETATTR, _HERE, os.fsencode(path), flags, struct.pack("<QQQQ", on, off, 0, 0), 32)
+    linux.call(_MOUNT_SETATTR, _HERE, os.fsencode(path), flags, struct.pack("<QQQQ", on, off, 0, 0), 32)
 
 
 _LOOK = 100  # time after which it is looked what the FMU's processes take [ms]
@@ -107,7 +94,7 @@ def main(request: dict[str, Any]) -> None:
     means.namespaces = "left out"
     if "namespaces" in request["layers"]:
         means.namespaces = _entered()
-    adopt_orphans()
+    linux.adopt_orphans()
     told, tell = os.pipe()
     alive, living = os.pipe()
     keeper = os.fork()
@@ -189,7 +176,7 @@ def _end_as(status: int) -> NoReturn:
 def _keep(request: dict[str, Any], means: Means, work: Path, tell: int, alive: int) -> NoReturn:
     """Start the worker, reap all that ends, tell how the worker ended, and end with it."""
     if _LINUX:
-        die_with_parent(signal.SIGKILL)
+        linux.die_with_parent(signal.SIGKILL)
         if select.select([alive], [], [], 0)[0]:  # the supervisor ended before that
             _exit()
     _attach(Path(os.devnull), 0)
@@ -200,14 +187,14 @@ def _keep(request: dict[str, Any], means: Means, work: Path, tell: int, alive: i
             means.read_only, means.own_processes = "files" not in lacking, "processes" not in lacking
         except OSError:
             pass  # `confine` knows what that leaves open
-    adopt_orphans()
+    linux.adopt_orphans()
     me = os.getpid()
     worker = os.fork()
     if not worker:
         os.close(tell)
         os.close(alive)
         if _LINUX:
-            die_with_parent(signal.SIGKILL)
+            linux.die_with_parent(signal.SIGKILL)
             if os.getppid() != me:
                 _exit()
         _work(request, means)

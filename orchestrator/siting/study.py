@@ -21,23 +21,12 @@ from orchestrator.operating_points.item import Item
 from orchestrator.operating_points.outages import INTACT, read_outages
 from orchestrator.operating_points.preparation import ItemPreparation, failure
 from orchestrator.points.request import OfCase, of_frequencies, of_scenario, of_values
+from orchestrator.siting import placing
 from orchestrator.siting.confirmation import Confirmation, confirmed
-from orchestrator.siting.placing import (
-    ACTIVE,
-    OURS_MVA,
-    REACTIVE,
-    converter,
-    foreign,
-    ideal_support,
-    name_at,
-    placed,
-    response_of,
-    turned,
-)
 from orchestrator.siting.residues import SeenMode, Situation, situation_of
 from orchestrator.study.modes import running
 
-PODS = {"pod_p": ACTIVE, "pod_q": REACTIVE}
+PODS = {"pod_p": placing.ACTIVE, "pod_q": placing.REACTIVE}
 DROOP = "droop"
 _RATING = FieldKind("MVA", POSITIVE.read, lambda given, name: None if given is None else above_zero(given, name))
 _DEVICE = FieldKind("DEVICE", str, lambda given, argument: str(text_or_none(str(given), argument)))
@@ -209,11 +198,11 @@ def _candidates(wanted: Sequence[str], prepared: PreparedScenario) -> list[str]:
 def _shifted(
     case: Case, request: SiteRequest, situations: list[Situation], not_judged: dict[str, str], scenario: str
 ) -> SiteResult:
-    shifts = {kind: _all_shifts(situations, _ideal(kind), tuned=True) for kind in (ACTIVE, REACTIVE)}
+    shifts = {kind: _all_shifts(situations, _ideal(kind), tuned=True) for kind in (placing.ACTIVE, placing.REACTIVE)}
     if request.is_foreign:
-        shifts[DEVICE] = _of_foreign(case, request, situations, shifts[ACTIVE], scenario)
+        shifts[DEVICE] = _of_foreign(case, request, situations, shifts[placing.ACTIVE], scenario)
     elif request.device == DROOP:
-        shifts[DEVICE] = _all_shifts(situations, _ideal(ACTIVE), tuned=False)
+        shifts[DEVICE] = _all_shifts(situations, _ideal(placing.ACTIVE), tuned=False)
     else:
         shifts[DEVICE] = shifts[PODS[request.name]]
     found = SiteResult(case, request, tuple(situations), shifts, (), not_judged)
@@ -222,7 +211,7 @@ def _shifted(
 
 
 def _ideal(kind: str) -> Shift:
-    return lambda at, bus, seen: seen.shift(bus, ideal_support(kind, at.voltages[bus], seen.mode.eigenvalue))
+    return lambda at, bus, seen: seen.shift(bus, placing.ideal_support(kind, at.voltages[bus], seen.mode.eigenvalue))
 
 
 def _all_shifts(situations: Sequence[Situation], shift: Shift, *, tuned: bool) -> dict[str, ByMode]:
@@ -248,15 +237,15 @@ def _of_foreign(
     intact = situations[0]
     there = active[intact.name][intact.modes[0].label]
     bus = max(there, key=lambda name: abs(there[name].change))
-    device = foreign(Path(request.device), request.binding_file, request.rating)
-    prepared = _prepared(placed(case, device, [bus]), request, scenario)
+    device = placing.foreign(Path(request.device), request.binding_file, request.rating)
+    prepared = _prepared(placing.placed(case, device, [bus]), request, scenario)
     with running(prepared) as master:
         find_operating_point(master)
-        model = Blocks(master).components[name_at(bus)]
+        model = Blocks(master).components[placing.name_at(bus)]
 
         def shift(at: Situation, other: str, seen: SeenMode) -> complex:
             ahead = cmath.phase(at.voltages[other] / intact.voltages[bus])
-            return seen.settled(other, lambda there: turned(response_of(master, model, there), ahead))
+            return seen.settled(other, lambda there: placing.turned(placing.response_of(master, model, there), ahead))
 
         return _all_shifts(situations, shift, tuned=False)
 
@@ -269,13 +258,13 @@ def _prepared(case: Case, request: SiteRequest, scenario: str) -> PreparedScenar
 def _with_confirmations(result: SiteResult, scenario: str, report: Callable[[int], None]) -> SiteResult:
     request, seen = result.request, result.intact.modes[0]
     device: ComponentTable = (
-        foreign(Path(request.device), request.binding_file, request.rating)
+        placing.foreign(Path(request.device), request.binding_file, request.rating)
         if request.is_foreign
-        else converter(result.prepared, request.rating or OURS_MVA, request.controller)
+        else placing.converter(result.prepared, request.rating or placing.OURS_MVA, request.controller)
     )
     found = []
     for k, bus in enumerate(result.ranking[: request.confirm]):
-        prepared = _prepared(placed(result.case, device, [bus]), request, scenario)
+        prepared = _prepared(placing.placed(result.case, device, [bus]), request, scenario)
         found.append(confirmed(prepared, bus, seen, request.frequencies, request.controller, request.gain))
         report(k + 1)
     return replace(result, confirmations=tuple(found))

@@ -10,7 +10,7 @@ import orchestrator as gfor_api
 from orchestrator.analysis.linearization import Blocks
 from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.cases.case import load_case
-from orchestrator.siting import residues, study
+from orchestrator.siting import placing, residues
 from orchestrator.siting.placing import ideal_support
 from orchestrator.siting.study import SiteRequest, find_sites
 from orchestrator.siting.view import answer, remarks
@@ -99,7 +99,7 @@ def test_a_unit_of_support_is_a_megawatt_whatever_the_bus(voltage):
 
 def test_more_than_one_unit_scales_no_order(monkeypatch):
     found = sites("two_area_rms", "pod_p", confirm=0)
-    monkeypatch.setattr(study, "ideal_support", lambda *at: 7.0 * ideal_support(*at))
+    monkeypatch.setattr(placing, "ideal_support", lambda *at: 7.0 * ideal_support(*at))
     other = sites("two_area_rms", "pod_p", confirm=0)
     assert other.ranking == found.ranking
     assert other.least("bus_2")[0] == pytest.approx(7 * found.least("bus_2")[0], rel=1e-3)

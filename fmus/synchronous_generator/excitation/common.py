@@ -6,13 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from fmus.synchronous_generator.declarations import (
-    per_unit,
-    require_between,
-    require_rising,
-    saturated_part,
-    time_constant,
-)
+from fmus.synchronous_generator import declarations
 from fmus.synchronous_generator.machine import Start
 from fmus.toolchain.blocks import BYPASS_TIME, lead_lag
 from fmus.toolchain.model_builder import ModelBuilder
@@ -36,12 +30,11 @@ class Regulated:
     v_s: Scalar = 0.0  # added to the voltage reference [pu, S_n]
 
 
-Exciter = Callable[[ModelBuilder, Regulated], tuple[Expr, Expr]]
-"""Declares an excitation system and returns (E_fd, |v_t|) [pu]."""
+Exciter = Callable[[ModelBuilder, Regulated], tuple[Expr, Expr]]  # an excitation system; gives (E_fd, |v_t|) [pu]
 
 
-gain = partial(per_unit, base=E_FD, source=SOURCE)
-time = partial(time_constant, source=SOURCE)
+gain = partial(declarations.per_unit, base=E_FD, source=SOURCE)
+time = partial(declarations.time_constant, source=SOURCE)
 
 
 class Measurement:
@@ -97,7 +90,7 @@ def rate_feedback(
 
 
 require_within = partial(
-    require_between,
+    declarations.require_between,
     rule="so the generator cannot hold its voltage; change the limit, the gain, or the generator's voltage and "
     "reactive power",
 )
@@ -114,7 +107,7 @@ def exciter_saturation(m: ModelBuilder, E_1: float, S_E1: float, E_2: float, S_E
         for k, value in ((1, S_E1), (2, S_E2))
     ]
     points = ((E[0], S[0]), (E[1], S[1]))
-    require_rising(m, *points, "exciter.E_1, S_E1, E_2, S_E2")
+    declarations.require_rising(m, *points, "exciter.E_1, S_E1, E_2, S_E2")
     return ExciterSaturation(points)
 
 
@@ -126,7 +119,7 @@ class ExciterSaturation:
 
     def part(self, E: Expr) -> Expr:
         """S_E(E)·E [pu]; 0 for a negative voltage."""
-        return saturated_part(E, *self._points)
+        return declarations.saturated_part(E, *self._points)
 
 
 def rectifier(I_N: Expr) -> Expr:

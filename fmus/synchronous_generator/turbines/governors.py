@@ -33,15 +33,7 @@ from collections.abc import Callable
 from functools import partial
 
 from fmus.synchronous_generator.declarations import per_unit, require_between, time_constant
-from fmus.toolchain.blocks import (
-    clamp,
-    held_at_limits,
-    lead_lag,
-    limited_low_pass,
-    limited_proportional_integral,
-    low_pass,
-    low_pass_or_nothing,
-)
+from fmus.toolchain import blocks
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, logic_and
 
@@ -115,9 +107,9 @@ def hygov(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         c = m.algebraic("c")
         filtered = m.state("filtered", 0.0, "pu", "Error through the filter", base="S_n")
         m.derivative(filtered, (R * (wanted - c) - (w - 1) - filtered) / T_f)
-        m.close(c, limited_proportional_integral(m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low, high, g_0))
+        m.close(c, blocks.limited_proportional_integral(m, "c_slow", filtered, 1 / r, 1 / (r * T_r), low, high, g_0))
         x = m.state("gate", g_0, "pu", "Gate", base="S_n")
-        m.derivative(x, clamp((c - x) / T_g, -VELM, VELM))
+        m.derivative(x, blocks.clamp((c - x) / T_g, -VELM, VELM))
         gate = fmax(x, _LEAST_GATE)
         q = m.state("q", g_0, "pu", "Flow", base="S_n")
         h = (q / gate) ** 2
@@ -144,8 +136,8 @@ def gast(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         )
         exhaust = m.state("exhaust", P_m_0, "pu", "Measured temperature of the exhaust", base="S_n")
         wanted = fmin(power_reference(m, P_m_0) - (w - 1) / R, A_T + K_T * (A_T - exhaust))
-        valve = limited_low_pass(m, "valve", wanted, T_1, low, high, P_m_0)
-        fuel = low_pass(m, "combustion", valve, T_2, P_m_0)
+        valve = blocks.limited_low_pass(m, "valve", wanted, T_1, low, high, P_m_0)
+        fuel = blocks.low_pass(m, "combustion", valve, T_2, P_m_0)
         m.derivative(exhaust, (fuel - exhaust) / T_3)
         return fuel - D_turb * (w - 1)
 
@@ -163,8 +155,8 @@ def tgov1(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         D_t = power(m, "D_t", 0.0, "Damping of the turbine", 0)
         m.require(if_else(logic_and(T_3 <= 0, T_2 > 0), -1, 1), "governor.T_3 = 0 needs governor.T_2 = 0 as well")
         require_within(m, P_m_0, low, high, ("governor.V_MIN", "governor.V_MAX"))
-        valve = limited_low_pass(m, "valve", power_reference(m, P_m_0) - (w - 1) / R, T_1, low, high, P_m_0)
-        return lead_lag(m, "reheater", valve, T_2, T_3, P_m_0) - D_t * (w - 1)
+        valve = blocks.limited_low_pass(m, "valve", power_reference(m, P_m_0) - (w - 1) / R, T_1, low, high, P_m_0)
+        return blocks.lead_lag(m, "reheater", valve, T_2, T_3, P_m_0) - D_t * (w - 1)
 
 
 _STAGES = ("steam_chest", "reheater", "crossover", "last_stage")
@@ -194,13 +186,13 @@ def ieeeg1(m: ModelBuilder, w: Expr, P_m_0: Expr) -> Expr:
         m.require(fractions - 1e-3, "governor: at least one turbine fraction K_1 to K_8 must exceed 0")
         valve_0 = P_m_0 / fmax(fractions, 1e-3)
         require_within(m, valve_0, low, high, ("governor.P_MIN", "governor.P_MAX"))
-        control = lead_lag(m, "controller", K * (w - 1), T_2, T_1)
+        control = blocks.lead_lag(m, "controller", K * (w - 1), T_2, T_1)
         x = m.state("gate", valve_0, "pu", "Valve", base="S_n")
-        valve = clamp(x, low, high)
-        rate = clamp((power_reference(m, valve_0) - control - valve) / T_3, U_c, U_o)
-        m.derivative(x, held_at_limits(x, rate, low, high))
+        valve = blocks.clamp(x, low, high)
+        rate = blocks.clamp((power_reference(m, valve_0) - control - valve) / T_3, U_c, U_o)
+        m.derivative(x, blocks.held_at_limits(x, rate, low, high))
         signal, total = valve, Expr(0)
         for stage, name in enumerate(_STAGES):
-            signal = low_pass_or_nothing(m, name, signal, T[stage], valve_0)
+            signal = blocks.low_pass_or_nothing(m, name, signal, T[stage], valve_0)
             total += (part[2 * stage] + part[2 * stage + 1]) * signal
         return total

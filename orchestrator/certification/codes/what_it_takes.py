@@ -12,15 +12,8 @@ from typing import TypeVar
 from orchestrator.cases.case import load_case
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.certification.certificate import Certificate
+from orchestrator.certification.codes import change_point
 from orchestrator.certification.codes.bench_point import DUPLICATE, PLANT, case_name
-from orchestrator.certification.codes.change_point import (
-    ChangedCriterion,
-    ChangeResult,
-    ChangeTask,
-    compute_change,
-    margins_with_time,
-    mark_of,
-)
 from orchestrator.certification.codes.row_verdict import RowVerdict
 from orchestrator.certification.codes.sensitivity import MarginSensitivity, sensitivity_of
 from orchestrator.certification.request import GIVEN
@@ -53,7 +46,7 @@ class ConfirmedChange:
 @dataclass
 class CriterionNeeds:
     row: str
-    criterion: ChangedCriterion
+    criterion: change_point.ChangedCriterion
     sensitivities: Sequence[MarginSensitivity]
     confirmed: ConfirmedChange | None = None
 
@@ -66,7 +59,7 @@ class ChangePlan:
     parameters: Sequence[Parameter]
     left_out: Mapping[str, str]
     change: float
-    tasks: Mapping[tuple[str, str, int], ChangeTask] = field(repr=False)
+    tasks: Mapping[tuple[str, str, int], change_point.ChangeTask] = field(repr=False)
 
     @property
     def seconds(self) -> float:
@@ -121,8 +114,8 @@ def run_changes(plan: ChangePlan, executor: Executor, report: CountReport = nobo
     found = []
     for v in plan.rows:
         base = plan.certificate.results[v.row.name]
-        mark = mark_of(base)
-        for criterion in margins_with_time(v, base.findings, plan.certificate.f_n):
+        mark = change_point.mark_of(base)
+        for criterion in change_point.margins_with_time(v, base.findings, plan.certificate.f_n):
             if not criterion.accepted:
                 rows = [
                     sensitivity_of(p, criterion, mark,
@@ -142,7 +135,7 @@ def confirm_changes(plan: ChangePlan, needs: Sequence[CriterionNeeds], executor:
     Taken is the parameter whose line reaches the limit, or comes nearest to it, and of several the one that has to
     move least."""
     wanted: dict[int, tuple[MarginSensitivity, float]] = {}
-    tasks: dict[int, ChangeTask] = {}
+    tasks: dict[int, change_point.ChangeTask] = {}
     for k, need in enumerate(needs):
         tried = [(s, change) for s in need.sensitivities if (change := s.change_to_meet()) is not None]
         if tried:
@@ -159,7 +152,7 @@ def _expected(sensitivity: MarginSensitivity, change: float) -> float:
 
 
 def _confirmed(
-    need: CriterionNeeds, sensitivity: MarginSensitivity, change: float, result: ChangeResult
+    need: CriterionNeeds, sensitivity: MarginSensitivity, change: float, result: change_point.ChangeResult
 ) -> ConfirmedChange:
     again = next((c for c in result.criteria if c.criterion == need.criterion.criterion), None)
     reason = str(result.failure) if result.failure else ("" if again else "; ".join(c.text for c in result.criteria))
@@ -173,20 +166,22 @@ Place = TypeVar("Place")
 
 
 def _computed(
-    plan: ChangePlan, tasks: Mapping[Place, ChangeTask], executor: Executor, report: CountReport
-) -> dict[Place, ChangeResult]:
+    plan: ChangePlan, tasks: Mapping[Place, change_point.ChangeTask], executor: Executor, report: CountReport
+) -> dict[Place, change_point.ChangeResult]:
     work = Work.into(plan.folder, executor, report)
-    return dict(zip(tasks, work.all(compute_change, list(tasks.values())), strict=True))
+    return dict(zip(tasks, work.all(change_point.compute_change, list(tasks.values())), strict=True))
 
 
-def _task(certificate: Certificate, folder: Path, row: str, parameter: Parameter, change: float) -> ChangeTask:
+def _task(
+    certificate: Certificate, folder: Path, row: str, parameter: Parameter, change: float
+) -> change_point.ChangeTask:
     prepared = _prepared(folder, row)
     value = parameter.value + change * parameter.scale
     places = [name for name in (PLANT, DUPLICATE) if name in prepared.system.components]
     changes = tuple((f"{name}.{parameter.variable}", value) for name in places)
     declared = tuple(sorted(certificate.code.declared.items()))
     code = certificate.code.key
-    return ChangeTask(StudyCase.of(prepared), row, changes, code, certificate.f_n, declared)
+    return change_point.ChangeTask(StudyCase.of(prepared), row, changes, code, certificate.f_n, declared)
 
 
 @lru_cache(maxsize=32)
