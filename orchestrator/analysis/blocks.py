@@ -107,7 +107,11 @@ class Blocks:
     ) -> ComponentLinearization:
         """One component, without the inputs that nothing moves where others are as they are."""
         self._idle[name] = _idle_inputs(master, name, others) if _has_many_inputs(master, name) else frozenset()
-        return self._linearize(master, name, self._idle[name])
+        return linearize_within(
+            master, name, self.step_size / self.parts, self._driven[name], self._observed[name],
+            derivatives=self._derivatives, without_step=self._untold, directional=self.directional,
+            idle=self._idle[name], once=self._once,
+        )  # fmt: skip
 
     def _anew(self, master: Master, names: Iterable[str]) -> dict[str, ComponentLinearization]:
         """All components, some of them linearised again, and with them those whose idle inputs move now."""
@@ -128,13 +132,6 @@ class Blocks:
         other._idle = dict(self._idle)
         other.components = other._anew(master, [name])
         return other
-
-    def _linearize(self, master: Master, name: str, idle: Collection[str] = ()) -> ComponentLinearization:
-        return linearize_within(
-            master, name, self.step_size / self.parts, self._driven[name], self._observed[name],
-            derivatives=self._derivatives, without_step=self._untold, directional=self.directional, idle=idle,
-            once=self._once,
-        )  # fmt: skip
 
     def check_made_for(self, schedule: Schedule | None) -> None:
         """Refuse blocks whose components were given another communication step than a schedule's; None: no step."""

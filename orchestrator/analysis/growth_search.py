@@ -17,9 +17,7 @@ from orchestrator.analysis.linear_model import LinearModel
 from orchestrator.analysis.modes import Mode, make_mode
 from orchestrator.errors import AnalysisError
 
-SLOWEST = 2 * np.pi * 1e-3
-"""Smallest eigenvalue that is looked for [rad/s]: smaller ones grow by less than a hundredth in a second."""
-
+SLOWEST = 2 * np.pi * 1e-3  # least eigenvalue looked for [rad/s]: smaller grow by less than 0.01 a second
 FASTEST = 2 * np.pi * 1e5  # largest eigenvalue of a continuous model that is looked for [rad/s]
 _RING = 1.6  # ratio of the radii of a ring
 _AT_A_TIME = (20, 80)  # numbers of eigenvalues to find around one point: the first number and the largest one
@@ -83,7 +81,10 @@ def find_growing_modes(model: LinearModel) -> GrowthSearch:
         sector = waiting.pop()
         modes = _modes_in(model, sector)
         if modes is None:
-            waiting += _cut(sector)
+            if sector.outer - sector.inner < _THINNEST * sector.outer:
+                here = f"{_AT_A_TIME[1]} modes lie at {sector.centre:.4g} rad/s"
+                raise AnalysisError(f"more than {here}; compute the full spectrum instead")
+            waiting += sector.parts()
         else:
             found += [mode for mode in modes if mode.eigenvalue.real <= limit]
     found.sort(key=lambda mode: -mode.eigenvalue.real)
@@ -114,14 +115,6 @@ def _standing_out(model: LinearModel, step_size: float) -> list[Mode]:
         raise AnalysisError(f"more than {count} modes grow by a tenth in each communication step; take a shorter one")
     pairs = [nearest_pairs(model, complex(np.log(value.astype(complex)) / step_size), 1)[0] for value in mu]
     return [make_mode(*pair, model.names) for pair in pairs]
-
-
-def _cut(sector: _Sector) -> tuple[_Sector, ...]:
-    if sector.outer - sector.inner < _THINNEST * sector.outer:
-        raise AnalysisError(
-            f"more than {_AT_A_TIME[1]} modes lie at {sector.centre:.4g} rad/s; compute the full spectrum instead"
-        )
-    return sector.parts()
 
 
 def _modes_in(model: LinearModel, sector: _Sector) -> list[Mode] | None:

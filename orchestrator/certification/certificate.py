@@ -19,7 +19,7 @@ from orchestrator.certification.details import Details
 from orchestrator.certification.judgement import watched
 from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.point import CONVERTER
-from orchestrator.certification.request import REACTANCES, CertificationRequest, missing_reactances
+from orchestrator.certification.request import REACTANCES, CertificationRequest, same_reactance
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because, verdict_of
 from orchestrator.errors import CaseError, Problem
 from orchestrator.fmi.description import FmuDescription
@@ -129,7 +129,8 @@ class DampingTest:
 
 def missing_of(c: Certificate) -> tuple[float, ...]:
     """Reactances of the norm that were not judged [pu]."""
-    return missing_reactances(v.X_L for v in c.verdicts if v.judged)
+    done = [v.X_L for v in c.verdicts if v.judged]
+    return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in done))
 
 
 _OWN = re.compile(rf'^(?:components\.{CONVERTER}\.parameters\.|--set {CONVERTER}\.)"?(?P<name>[^"]*)"?$')

@@ -1,7 +1,7 @@
 """The request for a certificate, and its departures from the norm's own test."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -75,8 +75,3 @@ def row_of(X_L: float) -> str:
 
 def same_reactance(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=1e-9)
-
-
-def missing_reactances(done: Iterable[float]) -> tuple[float, ...]:
-    values = list(done)
-    return tuple(X for X in REACTANCES if not any(same_reactance(X, value) for value in values))

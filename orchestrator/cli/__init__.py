@@ -130,7 +130,9 @@ def _failed(error: CosimError | SetupError | OSError) -> int:
         case BrokenPipeError():
             return 0
         case OSError():  # of a file that no command expected to fail with
-            _print_error(_os_error(error))
+            where = f"{error.filename}: " if error.filename is not None else ""
+            remedy = "make sure that the disk has room and that you may read and write there"
+            _print_error(f"{where}{error.strerror or error}; {remedy}")
     return CosimError.exit_code
 
 
@@ -148,11 +150,6 @@ def _escaped(error: UnicodeError) -> tuple[str, int]:
         raise error
     units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[k]:02x}{units[k + 1]:02x}" for k in range(0, len(units), 2)), error.end
-
-
-def _os_error(error: OSError) -> str:
-    where = f"{error.filename}: " if error.filename is not None else ""
-    return f"{where}{error.strerror or error}; make sure that the disk has room and that you may read and write there"
 
 
 def _print_error(text: str) -> None:

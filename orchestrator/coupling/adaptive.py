@@ -18,16 +18,13 @@ from orchestrator.coupling.tracks import Tracks
 from orchestrator.coupling.turns import Exchange, Loop
 from orchestrator.errors import ComponentError, CosimError, CouplingError, EndedError, InputError
 
-_ORDER = 2
-"""Of the schedules in which inputs follow straight lines: the error of a pair of steps falls with this power plus 1."""
-
+_ORDER = 2  # of schedules in which inputs follow straight lines: a pair's error falls with this power plus 1
 _SAFETY = 0.5  # part of the tolerance that the next pair is aimed at
 _SHORTEST = 1 / 1024  # shortest step, as a part of the communication step
 _FIRST = 1 / 4  # first pair, and the first after an event, as a part of the communication step
 _MOST_HALVINGS = 4  # so often a pair is halved at once, at most
 _PROVEN_EVERY = 100  # pairs between two proofs that all components go back to their saved states
-_SAME = 1e-8
-"""Of 1 or of an output: by how much a step may differ from the same step, done again. ``newton`` agrees to 1e-10."""
+_SAME = 1e-8  # of 1 or an output: what a step may differ by from the same, done again; ``newton`` agrees to 1e-10
 
 Values = NDArray[np.float64]
 
@@ -127,7 +124,12 @@ class AdaptiveLoop:
                 self._until_proof -= 1
                 return error_in_tolerances
             if not can_halve:
-                raise self._too_coarse(int(apart.argmax()), float(apart.max()), index * pair, pair / 2)
+                turn, variable = self._place(int(apart.argmax()))
+                raise CouplingError(
+                    f"tolerance = {self._tolerance:g} at {index * pair:.6g} s: in steps of {pair / 2:.3g} s, the "
+                    f"shortest, the error of {turn.component.name}.{variable} is still {apart.max():.3g}; give a "
+                    "larger tolerance, or a shorter communication step"
+                )
             start.go_back(pair)
             self.counts.rejected += 1
             return error_in_tolerances
@@ -154,14 +156,6 @@ class AdaptiveLoop:
             f"tolerance = {self._tolerance:g}: at {time:.6g} s the same step was done twice from the same saved state, "
             f"and {turn.component.name}.{variable} differs by {apart.max():.3g}; some FMU does not restore all of its "
             "state (`gfor fmu check`): leave the tolerance out"
-        )
-
-    def _too_coarse(self, worst: int, error: float, time: float, step: float) -> CouplingError:
-        turn, variable = self._place(worst)
-        return CouplingError(
-            f"tolerance = {self._tolerance:g} at {time:.6g} s: in steps of {step:.3g} s, the shortest, the error of "
-            f"{turn.component.name}.{variable} is still {error:.3g}; give a larger tolerance, or a shorter "
-            "communication step"
         )
 
     def _place(self, output: int) -> tuple[Exchange, str]:

@@ -120,7 +120,11 @@ class Hub:
             name for name in names if name not in set(helics_calls.ask(self._federate, "root", "federates") or ())
         ]:
             if time.monotonic() > deadline:
-                raise self._not_joined(missing)
+                raise _FederationError(
+                    "nobody", f"no federate named {' or '.join(map(repr, missing))} joined the federation at "
+                    f"{self._request['broker']} within {self._request['to_join']:g} s; its name at HELICS must be the "
+                    "component's", missing[0],
+                )  # fmt: skip
             time.sleep(_LOOK)
         self._waiting = (time.monotonic() + self._request["to_join"], "all federates to enter the initialisation")
         helics.helicsFederateEnterInitializingMode(self._federate)
@@ -132,13 +136,6 @@ class Hub:
         helics.helicsFederateEnterExecutingMode(self._federate)
         self._waiting = None
         return joined
-
-    def _not_joined(self, missing: list[str]) -> _FederationError:
-        return _FederationError(
-            "nobody", f"no federate named {' or '.join(map(repr, missing))} joined the federation at "
-            f"{self._request['broker']} within {self._request['to_join']:g} s; its name at HELICS must be the "
-            "component's", missing[0],
-        )  # fmt: skip
 
     def _published(self, part: dict[str, Any]) -> dict[str, Any]:
         name = part["name"]

@@ -60,8 +60,10 @@ class Nyquist:
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor fmu nyquist --json`` prints, as JSON's types."""
-        more = {"retune": retuned_json(self.retuned, self.goal)} if self.retuned else {}
-        return self.result.as_json() | more
+        if not self.retuned:
+            return self.result.as_json()
+        found = {"distance_wanted": self.goal, "parameters": [_one(x, self.goal) for x in self.retuned]}
+        return self.result.as_json() | {"retune": found}
 
     def save_pictures(self, folder: str | Path) -> list[Path]:
         """Write the eigenloci and the matrices as PNG into a folder that exists; returns the paths."""
@@ -143,10 +145,6 @@ def _strength(result: CutResult) -> str:
 
 def _cells(margin: Margin | None, text: str) -> tuple[str, str]:
     return ("none", "") if margin is None else (text.format(margin.value), f"{margin.frequency_hz:.3f}")
-
-
-def retuned_json(found: Sequence[Retuned], goal: float) -> dict[str, Any]:
-    return {"distance_wanted": goal, "parameters": [_one(x, goal) for x in found]}
 
 
 def _one(x: Retuned, goal: float) -> dict[str, Any]:

@@ -50,7 +50,7 @@ def call_order(subject: Subject) -> CheckResult:
     h = subject.step_size
     steps: dict[str, tuple[Callable[[Subject], HostedComponent], float, float]] = {
         "before initialisation": (Subject.open, 0.0, h), "of size 0": (_stepped, h, 0.0),
-        "backwards": (_started, 0.0, -h),
+        "backwards": (lambda subject: subject.running().component, 0.0, -h),
     }  # fmt: skip
     accepted, ended = [], []
     for words, (begin, time, step_size) in steps.items():
@@ -66,10 +66,6 @@ def call_order(subject: Subject) -> CheckResult:
         remedy = "FMI forbids these calls; a master that makes them by mistake will not be told"
         return remarked("call_order", f"it accepts {' and '.join(accepted)}", remedy)
     return passed("call_order", "steps before initialisation, of size 0 and backwards are refused")
-
-
-def _started(subject: Subject) -> HostedComponent:
-    return subject.running().component
 
 
 def _stepped(subject: Subject) -> HostedComponent:

@@ -5,7 +5,6 @@ from typing import TypeVar
 
 from orchestrator.acceptance.checks.subject import Running, Subject
 from orchestrator.errors import ComponentError
-from orchestrator.fmi.description import VariableInfo
 
 Look = TypeVar("Look")
 
@@ -19,7 +18,8 @@ def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | b
         if info.causality != "parameter" or info.variability != "tunable" or info.start is None:
             continue
         value, low, high = info.start_number, info.minimum, info.maximum
-        flag = info.type == "Real" and _may_be_a_flag(info)
+        # A whole number without a unit may stand for a flag, a mode or a count, which has no values between.
+        flag = info.type == "Real" and value == round(value) and (info.unit or "").strip().lower() in _NO_UNIT
         if flag or info.type == "Integer":
             others = [] if low is None or high is None else [n for n in (value - 1, value + 1) if low <= n <= high]
             if others and (flag or switches):
@@ -31,11 +31,6 @@ def elsewhere(subject: Subject, *, switches: bool = True) -> dict[str, float | b
         elif info.type == "Boolean" and switches:
             found[name] = not _switched_on(subject, name)
     return found
-
-
-def _may_be_a_flag(info: VariableInfo) -> bool:
-    """Whether a Real may stand for a flag, a mode or a count, which has no values between: a whole number, no unit."""
-    return info.start_number == round(info.start_number) and (info.unit or "").strip().lower() in _NO_UNIT
 
 
 _NO_UNIT = ("", "1", "-", "n/a", "na", "none", "unitless", "flag", "bool", "mode")

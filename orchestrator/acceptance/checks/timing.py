@@ -220,8 +220,7 @@ def step_invariance(subject: Subject) -> CheckResult:
         return failed("step_invariance", "step-dependent answer", seen, **figures)
     if first > 1e-3:
         return remarked("step_invariance", seen, "it converges, but needs a smaller communication step", **figures)
-    if breaks and _only_switches(subject, runs, h):
-        breaks = False
+    breaks = breaks and not switches_elsewhere(subject.watched, [((double, 2 * h), (fourfold, 4 * h))])
     named = max(subject.description.default_step_size or 0.0, subject.use.step_size or 0.0)
     if breaks and h == subject.step_size and 4 * h <= named * (1 + 1e-9):
         return failed("step_invariance", "step-dependent answer", f"{seen}, which it declares to bear", **figures)
@@ -232,12 +231,6 @@ def step_invariance(subject: Subject) -> CheckResult:
         seen += f"; with {4 * subject.step_size:g} s it leads nowhere"
         return remarked("step_invariance", seen, "keep to its own communication step, or a smaller one", **figures)
     return passed("step_invariance", seen, **figures)
-
-
-def _only_switches(subject: Subject, runs: tuple[Numbers, Numbers, Numbers], h: float) -> bool:
-    """Whether the longer steps differ in moments of switching only."""
-    _, double, fourfold = runs
-    return bool(switches_elsewhere(subject.watched, [((double, 2 * h), (fourfold, 4 * h))]))
 
 
 def _switching(name: str, signals: list[str], seen: str, **figures: float) -> CheckResult:

@@ -118,7 +118,7 @@ def _stairs(end: float) -> tuple[tuple[float, float], ...]:
 
 
 _OPPOSED = c.opposes_jump(0, 1, 0.2), c.opposes_jump(1, -1, 0.2)
-_OPPOSED_FOUR = c.opposes_jumps((1, -1, -1, 1))
+_OPPOSED_FOUR = tuple(c.opposes_jump(k, sign, c.OPPOSED, of_code=False) for k, sign in enumerate((1, -1, -1, 1)))
 _BACK = c.settles(), c.returns(events=(-1,))
 
 MISO = GridCode.of(

@@ -21,17 +21,14 @@ SETTLED = 0.02
 
 BACK = 0.05  # largest distance from the power before an event at which it counts as returned [pu]
 MOVED = 0.01  # least change of a settled power that counts as a response of the droop [pu]
-CALM = 0.05
-"""Largest movement of the frequency, peak to peak over the last half second of a hold, that counts as settled [Hz]."""
+CALM = 0.05  # largest movement of the frequency, peak to peak in a hold's last half second, that is settled [Hz]
 
 OPPOSED = 0.2
 """Least change of the power against a jump of 10° or more where the code gives no number [pu]: what MISO and ERCOT ask
 for 10°."""
 
 FIRST_SWING = 0.1  # time after a jump in which its first response is looked for [s]
-SPIKE = 5e-3
-"""Width of the median by which the speed of a response is read [s]: what is shorter than half of it is the filter's."""
-
+SPIKE = 5e-3  # width of the median for a response's speed [s]: what is shorter than half of it is the filter's
 SIDE = 0.01  # largest deviation of a settled frequency to the wrong side of rated [Hz]
 
 POWER_SHOWN, VOLTAGE_SHOWN = "Active power [pu]", "Voltage [pu]"  # how pictures call what is judged
@@ -152,11 +149,6 @@ def opposes_jump(event: int, sign: int, least: float, *, of_code: bool = True) -
         return [_beyond(name, time, time + FIRST_SWING, row.before(time) + sign * least, sign)]
 
     return Bounded(judge, bands)
-
-
-def opposes_jumps(signs: tuple[int, ...]) -> tuple[Judge, ...]:
-    """As `opposes_jump` for one jump after the other, where the code gives no number: `OPPOSED` is asked."""
-    return tuple(opposes_jump(event, sign, OPPOSED, of_code=False) for event, sign in enumerate(signs))
 
 
 def responds_within(event: int, sign: int, longest: float, share: float = 0.9) -> Judge:
