@@ -20,11 +20,8 @@ from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.three_phases import V_N
 from gfor_fmu.usual import FORMING
 
-LEAD = "output_lead"
-"""Parameter with which the bridge voltage makes up for the time until it is applied."""
-
-_THIRD = (1.0, -0.5, -0.5)
-"""Phases a, b, c of a cosine of amplitude 1 at the angle 0."""
+LEAD = "output_lead"  # parameter with which the bridge voltage makes up for the time until it is applied
+_THIRD = (1.0, -0.5, -0.5)  # phases a, b, c of a cosine of amplitude 1 at the angle 0
 
 
 def grid_forming_control() -> Model:

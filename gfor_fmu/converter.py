@@ -13,8 +13,7 @@ from gfor_fmu.inner_loops import inner_loops
 from gfor_fmu.pod import pod
 from gfor_fmu.usual import FORMING
 
-S_N, P_0 = 1500.0, 0.9
-"""Default rating [MVA] and dispatch [pu]: the two-area system's converter."""
+S_N, P_0 = 1500.0, 0.9  # default rating [MVA] and dispatch [pu]: the two-area system's converter
 
 
 @dataclass(frozen=True)

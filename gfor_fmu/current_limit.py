@@ -13,14 +13,9 @@ from fmus.toolchain.symbols import Expr, cos, fabs, fmax, if_else, logic_and, lo
 
 PAPER = "Mateu-Barriendos et al. 2024, appendix, current saturation"
 
-BOX, CIRCULAR, THRESHOLD_IMPEDANCE, SATURATION_INFORMED = range(4)
-"""Values of ``current_limit.kind``."""
-
-_NEWTON = 8
-"""Steps of Newton's method for the current behind a threshold impedance: down to rounding for demands up to 100 pu."""
-
-_SMALLEST = 1e-12
-"""Least value under a root. It keeps derivatives finite where the limit does not act."""
+BOX, CIRCULAR, THRESHOLD_IMPEDANCE, SATURATION_INFORMED = range(4)  # values of ``current_limit.kind``
+_NEWTON = 8  # Newton's steps for the current behind a threshold impedance: to rounding for demands up to 100 pu
+_SMALLEST = 1e-12  # least value under a root; it keeps derivatives finite where the limit does not act
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from fmus.toolchain.blocks import lead_lag, limit, low_pass, washout
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, if_else, logic_and
 
-N_S_MAX = 3
-"""Most lead/lag stages a controller can be given."""
+N_S_MAX = 3  # most lead/lag stages a controller can be given
 
 SOURCE = "Mateu-Barriendos et al. 2024, table of POD parameters"
 

@@ -16,8 +16,7 @@ from fmus.toolchain.symbols import sqrt
 from gfor_fmu.converter import P_0, S_N, declare_converter, declare_converter_outputs
 from gfor_fmu.usual import FORMING
 
-V_N = 230.0
-"""Default rated voltage [kV, line to line, rms]."""
+V_N = 230.0  # default rated voltage [kV, line to line, rms]
 
 
 def grid_forming_converter_abc() -> Model:

@@ -11,8 +11,7 @@ from fmus.toolchain.phasor_port import MasterStep
 from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr, exp, fmax
 
-SHORT = 1e-3
-"""Communication step in parts of the lags below which their delays are those of a step so short: 2e-7 from τ."""
+SHORT = 1e-3  # communication step in parts of the lags below which their delays are those of none: 2e-7 from τ
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port_variables import SYSTEM_BASE
 from fmus.toolchain.symbols import Expr, Scalar, fmax
 
-RECOVERY_TIME = 1e-3
-"""Default of τ [s]: its pole lies far above all electromechanical modes and well below the communication rate."""
+RECOVERY_TIME = 1e-3  # default of τ [s]: far above electromechanical modes, well below the communication rate
 
 POWER_RECOVERY_TIME = 2e-3
 """The same with a share of constant power, whose negative resistance feeds resonances of the network below 1/τ: in

@@ -14,8 +14,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
 from fmus.toolchain.symbols import Expr
 
-S_N, P_0 = 1500.0, 0.9
-"""Default rating [MVA] and dispatch [pu]: those of the two-area system's converter, whose place it can take."""
+S_N, P_0 = 1500.0, 0.9  # default rating [MVA] and dispatch [pu]: the two-area system's converter, whose place it takes
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, Scalar, fmax, fmin, if_else, sqrt
 
 SOURCE = "Mateu-Barriendos et al. 2024, appendix: 1.1 pu, there for each component"
-SMALLEST = 1e-6
-"""Part of the limit that is always left to the current without priority, so that no root of 0 has to be derived."""
+SMALLEST = 1e-6  # part of the limit always left to the current without priority: no root of 0 is to be derived
 
 
 @dataclass(frozen=True)

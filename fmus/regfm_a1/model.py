@@ -92,8 +92,7 @@ def _held(x: Expr, rate: Expr, least: Expr, most: Expr) -> Expr:
     return if_else(outward, 0, rate)
 
 
-S_N, P_0 = 1500.0, 0.9
-"""Default rating [MVA] and dispatch [pu]: those of the two-area system's converter, whose place it can take."""
+S_N, P_0 = 1500.0, 0.9  # default rating [MVA] and dispatch [pu]: the two-area system's converter, whose place it takes
 USUAL = usual_beside(__file__)
 
 

@@ -17,10 +17,7 @@ from fmus.toolchain.port import BREAKER_TIME, DevicePort, declare_port_outputs, 
 from fmus.toolchain.symbols import Expr, fmax
 
 S_N, P_0 = 1500.0, 0.9  # default rating [MVA] and dispatch [pu]: those of `gfor` and `gfl`, whose place it takes
-
-F_0 = 10.0
-"""Default of ω_0/2π [Hz]: above electromechanical modes, which the current follows, below resonances of networks."""
-
+F_0 = 10.0  # default of ω_0/2π [Hz]: above electromechanical modes, which the current follows, below networks' own
 LEAST_VOLTAGE = 0.05  # voltage [pu] below which the current shrinks with it: at zero it has no angle to turn with
 
 

@@ -10,8 +10,7 @@ from fmus.synchronous_generator.machine import Machine
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr
 
-Governor = Callable[[ModelBuilder, Expr, Expr], Expr]
-"""Mechanical power [pu, S_n] from speed and the power of the operating point."""
+Governor = Callable[[ModelBuilder, Expr, Expr], Expr]  # mechanical power [pu, S_n] from speed and that at the start
 
 Stabilizer = Callable[[ModelBuilder, Expr, Expr, Expr], Expr]
 """Signal [pu] from w − 1, electrical power and the power of the operating point."""

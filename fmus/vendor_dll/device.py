@@ -27,8 +27,7 @@ _MEASURED_KIND = (
 )
 """Signals that can be given in the DLL's own unit."""
 
-_PER_UNIT = ("V_ref", "u", "i_s")
-"""Signals in per unit alone: whether a unit would mean a peak or an rms value, nothing says."""
+_PER_UNIT = ("V_ref", "u", "i_s")  # in per unit alone: whether a unit would mean a peak or an rms value, nothing says
 
 _WORDS_FOR_PER_UNIT = ("pu", "p.u.", "p.u", "PU")
 

@@ -12,20 +12,15 @@ from scipy.linalg.blas import zgemm
 
 from orchestrator.arrays import Matrix, Vector
 
-WIDTH = 16
-"""Vectors at once. An eigenvalue that is there as often as that or more may be there more often than it was found."""
-
+WIDTH = 16  # vectors at once; an eigenvalue as often there as that may be there more often than it was found
 MOST = 640  # largest number of vectors; 48,000 states take 0.5 GB for them
-TOLERANCE = 1e-7
-"""Of ν: the part that the rest may be of what is found. Left and right vectors together give ν to the square of it."""
+TOLERANCE = 1e-7  # of ν: what the rest may be of what is found; left and right vectors together give ν to its square
 
 ROUGH, _BEYOND = 1e-2, 8
 """What lies beyond a limit is known where so many values there, the largest, have settled to this part of themselves or
 to half their distance from the limit."""
 
-_GROWTH = 1.25
-"""Values are looked at where the vectors have become more by this factor; there are many operations in it."""
-
+_GROWTH = 1.25  # values are looked at where the vectors are more by this factor; there are many operations in it
 _DEPENDENT = 1e-12  # A direction that is smaller than this part of the largest one is none
 _AGAIN = 1e-2  # where what is new of the vectors is less than this part of them, it is made orthogonal twice
 _EQUAL = 1e-6  # values of ν that differ by less than this part are one

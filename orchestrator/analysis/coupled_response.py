@@ -42,9 +42,7 @@ _SECONDS, _WALL, _LEAST, _SHORT = 5.0, 8.0, 0.1, 1.0
 """Longest simulated time for which a response is followed [s], longest computing time for it [s], least simulated time
 [s], and the simulated time below which the verdict states how short it was [s]."""
 
-_SAMPLE, _WINDOWS = 5e-3, 10
-"""Time between compared points [s], and windows in which errors are taken relative to the response."""
-
+_SAMPLE, _WINDOWS = 5e-3, 10  # between compared points [s], and windows in which errors are relative to the response
 _DENSE = 500  # up to this number of states, a power of the step map costs less than single steps
 _STANDS, _MOVES = 1e-10, 1e-7
 """A state stands still if its elements of the step map differ from those of a constant by less than the first figure,

@@ -29,8 +29,7 @@ from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
 
 DENSE = 200  # up to this number of states, the full spectrum is cheaper
-_STRETCH = 1.35
-"""The range is first cut into stretches whose ends have this ratio: the region is a wedge, so discs grow upwards."""
+_STRETCH = 1.35  # ratio of the ends of the stretches of the range: the region is a wedge, so discs grow upwards
 
 _SHORT_STRETCH = 1.15
 """The same where a model has a hub: a factorisation is worth few vectors there, and short stretches keep the crowd of

@@ -25,8 +25,7 @@ _FLAT = (-1 / 24, 13 / 12, -1 / 24)
 """Weights of three values that follow one another: they undo the loss of fast signals in values that are held over a
 step, up to the fourth power of the frequency."""
 
-LARGEST_ERROR = 1e-3
-"""A mode for which the approximation of a delay is off by more than this part is not that of the step map."""
+LARGEST_ERROR = 1e-3  # a mode for which a delay's approximation is off by more than this part is not the step map's
 
 
 @dataclass(frozen=True)

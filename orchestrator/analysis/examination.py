@@ -42,11 +42,8 @@ SLOW_HZ = 5.0
 warning."""
 
 _SLOWEST_HZ = 0.01
-_GROWTH = 1.0
-"""The coupling is unstable if the step map grows faster than the continuous system by more than this [1/s]."""
-
-_COMPARED = 6
-"""Number of modes of a large system that are compared, least damped first: each costs a sparse factorisation."""
+_GROWTH = 1.0  # the coupling is unstable if the step map grows faster than the continuous system by more [1/s]
+_COMPARED = 6  # modes of a large system that are compared, least damped first: each costs a factorisation
 
 _ADVISED = (5e-2, 2e-2, 1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
 """Steps [s] that are tried to advise a shorter one, longest first, and the largest number of tried steps."""

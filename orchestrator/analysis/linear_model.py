@@ -19,9 +19,7 @@ from orchestrator.arrays import Matrix, Vector
 
 HELD = " (held)"
 DELAYED = " (delayed"  # in the name of a state that stands for what is on its way over a connection
-
-LEAST_IN_BLOCKS = 4_000
-"""Models with fewer states are searched with one vector at a time, and keep the last digits of their modes."""
+LEAST_IN_BLOCKS = 4_000  # with fewer states, one vector at a time, which keeps the last digits of modes
 
 PERTURBED, DIRECTIONAL, PACKED, IDENTIFIED = "perturbed", "directional", "packed", "identified"
 """Origins of a component's linear model: perturbation of its running FMU, directional derivatives of the FMU, a model

@@ -16,8 +16,7 @@ LEAST_SHARE = 0.02  # A group whose participation is below this part of the othe
 LEAST_COMMON = 0.5  # A group in which less than this part of the participation is a common motion swings within itself
 CLEAR = 0.8  # A name is in doubt if another mode reaches this part of the measure of the mode that it would go to
 CONTESTED = 0.5  # from this part on it is worth asking which of both the mode was, before something was changed
-NO_RESONANCE = 1 / np.sqrt(2)
-"""From this damping ratio on a mode amplifies no frequency, and is no rival of one that does."""
+NO_RESONANCE = 1 / np.sqrt(2)  # from this damping ratio on a mode amplifies nothing, and is no rival of one that does
 
 LEFT_OVER = 0.5
 """A name takes a mode that is not its best one, because that has another name, only from this part of the best one's

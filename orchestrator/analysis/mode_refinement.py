@@ -26,8 +26,7 @@ _ROUNDS = 8
 _SETTLED = 1e-8  # the eigenvalues have settled where a round moves none of them by more than this part
 _REST = 1e-4  # what A·r may differ from λ·r by, as a part of λ and r. The eigenvalue has the square of it.
 _SPREAD = 1.1  # eigenvalues whose sizes differ by up to this factor share a point
-_BESIDE = 1e-3
-"""The point lies beside the middle of its eigenvalues by this part: on one of them nothing could be solved."""
+_BESIDE = 1e-3  # by this part the point lies beside its eigenvalues' middle: on one nothing could be solved
 
 
 @dataclass(frozen=True)

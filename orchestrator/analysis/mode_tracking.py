@@ -16,9 +16,7 @@ from orchestrator.arrays import Complex, Vector
 
 THRESHOLD = 0.5  # least similarity with which two modes count as the same mode
 _MARGIN = 0.3  # A mode is left unmatched if the similarities of its two best candidates differ by less than this
-_DISTANCE_WEIGHT = 0.1
-"""Weight of the relative distance between eigenvalues; the similarity, from 0 to 1, has the weight 1."""
-
+_DISTANCE_WEIGHT = 0.1  # of the relative distance between eigenvalues; the similarity, from 0 to 1, has 1
 _EDGE = 1.1  # A mode whose frequency is within this factor of an end of the range may leave or enter the range there
 
 At = TypeVar("At", bound=Hashable)

@@ -26,8 +26,7 @@ HIGHEST_SWING_HZ = 5.0
 
 _DEAD = 1e-9  # A multiplier of the step map smaller than this decays within one step and is not a mode
 ALL_VECTORS = 400  # up to this number of states, all eigenvectors are computed: they take no time that anyone notices
-_REAL = 1e-2
-"""A pair whose imaginary part is smaller than this share of its real part is a double real pole split by rounding."""
+_REAL = 1e-2  # a pair with an imaginary part below this share of the real one is a double real pole split by rounding
 
 
 def damping_ratio(eigenvalue: complex) -> float:

@@ -22,9 +22,7 @@ from orchestrator.coupling.schedule import Schedule, gauss_seidel
 from orchestrator.errors import AnalysisError
 
 _SIZE = 1e-6  # of a perturbation, relative to the state's scale
-_LOOKS = 40
-"""Times in a period at which a perturbed system is looked at: modes up to 20 times the period's frequency are told."""
-
+_LOOKS = 40  # at a perturbed system in a period: modes up to 20 times the period's frequency are told
 _ALIVE = 1e-4  # multipliers over a period below this belong to what decays within it
 _REAL = 1e-6  # largest imaginary part of the map that is put together from its modes again, relative to the map
 _MOVING, _SAME = 1e-4, 1e-9

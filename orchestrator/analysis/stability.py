@@ -28,9 +28,7 @@ from orchestrator.analysis.modes import (
 )
 from orchestrator.errors import few
 
-WHOLE = 4000
-"""Up to this number of states, all eigenvalues are computed; in larger systems only growing ones are searched for."""
-
+WHOLE = 4000  # up to so many states, all eigenvalues are computed; in larger systems growing ones are searched for
 _GROWING = 1e-6  # A real part above this [1/s], and above 1e-8 of the eigenvalue's size, is growth and not rounding
 
 SLOW = 0.05

@@ -14,8 +14,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import BoundDescription
 
-BALANCE = 0.02
-"""Deviation of the power from what was asked [of it] up to which signs and bases are right; losses are below it."""
+BALANCE = 0.02  # deviation of the power from what was asked up to which signs and bases are right; losses are below
 
 NO_LIMIT = 3.3
 """Current [pu, S_n] over the last cycle of a disturbance that no converter with a current limit gives.

@@ -6,8 +6,7 @@ from pydantic import Field, field_validator, model_validator
 
 from orchestrator.toml_files import Table
 
-REQUIRED = "REQUIRED"
-"""Word that `gfor fmu bind` writes for an unknown value. A binding that still contains it is refused."""
+REQUIRED = "REQUIRED"  # what `gfor fmu bind` writes for an unknown value; a binding that still has it is refused
 
 
 class DraftedTable(Table):

@@ -24,8 +24,7 @@ from orchestrator.fmi.interrupts import calls
 
 _SOURCE = Path(__file__).with_name("drive.c")
 _CALLS = {1: "fmi2SetReal", 2: "fmi2DoStep", 3: "fmi2GetReal"}
-_STRETCH = 20000
-"""Number of steps in one call of the C library; an interrupt from the keyboard takes effect between two calls."""
+_STRETCH = 20000  # steps in one call of the C library; an interrupt from the keyboard takes effect between two
 
 STILL = 1e-9
 """Largest change of an output over a second [pu] at which the device counts as being in steady state; of its mean over

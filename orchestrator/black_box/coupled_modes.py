@@ -30,9 +30,7 @@ from orchestrator.fmi.component import Component
 from orchestrator.study.modes import ModesResult, modes_from, modes_of, running
 
 STEADY = 1e-6  # largest difference of the box's current [pu] at the ideal bus from the power flow's
-
-STILL = 1e-9
-"""Largest change of a known component's state in one communication step; the same limit holds without a black box."""
+STILL = 1e-9  # largest change of a known component's state in a step; the same limit holds without black box
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ from orchestrator.errors import AnalysisError
 ORDERS = ((2, 2), (2, 4), (3, 5), (4, 6), (4, 8), (5, 9), (6, 10), (8, 14))
 """Numbers of real poles and of complex pairs that are tried, in turn."""
 
-_WANTED = 1e-5
-"""Largest relative error of a fit with which no larger one is tried; the measurement's own bound where that is more."""
+_WANTED = 1e-5  # relative error of a fit with which no larger one is tried; the measurement's bound where more
 
 _MOST_ITERATIONS = 30
 """Largest number of iterations of the pole relocation. A fit that has not converged by then has more poles than the

@@ -57,8 +57,7 @@ def pulse_response(m: Numbers, frequencies: Numbers, step_size: float) -> Comple
 
 METHODS = ("multisine", "pulse")
 _MOST_SECONDS = 400.0  # time after which a response must have settled [s]
-_APART = 10.0
-"""Shortest time between two periods that are compared [s]: short periods in direct succession always look alike."""
+_APART = 10.0  # shortest time between two compared periods [s]: short ones in direct succession look alike
 
 _AWAY = 0.1
 """Every excitation has a mean of zero or ends at zero, and the response must do the same. A device whose response keeps

@@ -13,8 +13,7 @@ from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.request import CertificationRequest
 from orchestrator.safe_files import write_text
 
-BASE = BUILT_IN / "norm631" / "case.toml"
-"""Case file of the study with our converter, from which a certificate's case is made."""
+BASE = BUILT_IN / "norm631" / "case.toml"  # with our converter, from which a certificate's case is made
 
 WITHOUT, WITH = "without", "with"
 FMU, BINDING, CASE = "converter.fmu", "vendor.toml", "case.toml"  # names of files in a certificate's folder

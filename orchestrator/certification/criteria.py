@@ -19,8 +19,7 @@ from orchestrator.results.mode_json import eigenvalue_json
 FREQUENCIES = (0.1, 1.5)  # range of frequencies of the judged modes [Hz], both ends included
 PAIRED = (0.08, 1.875)  # range of frequencies in which a judged mode may lie in the other system [Hz]
 LEAST_DAMPING = 0.05  # damping ratio that a judged mode needs
-LEAST_AMPLITUDE = 0.01
-"""Components below this fraction of a signal's largest oscillation are ignored: they fit its remainder."""
+LEAST_AMPLITUDE = 0.01  # smaller parts of a signal's largest oscillation are ignored: they fit its remainder
 
 NAMES = ("off", "on", "response")
 AGREED = 5.0  # more points between the dampings of an eigenvalue and of the recorded response are a finding

@@ -13,16 +13,14 @@ from orchestrator.arrays import Numbers
 LARGEST_RATIO = 0.25  # ΔP5M5 over ΔP1M1 must be less than this
 JUDGED_SWING = 5
 
-RESOLUTION = 1e-3
-"""A turn of the signal counts if it moves back by more than this part of the signal's whole range after the event."""
+RESOLUTION = 1e-3  # a turn of the signal counts if it moves back by more than this part of its range after the event
 
 SLOWEST_PERIOD = 10.0
 """Longest period of a judged mode [s]. If the signal does not turn for this time, no judged mode is left above the
 resolution."""
 
 
-FASTEST = 5.0
-"""Parts of a signal above this frequency [Hz] are removed before it is judged: over three times the fastest mode."""
+FASTEST = 5.0  # parts of a signal above this [Hz] are removed before it is judged: over three times the fastest mode
 
 
 @dataclass(frozen=True, slots=True)

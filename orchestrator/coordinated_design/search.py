@@ -19,8 +19,7 @@ from orchestrator.pod_design.closed_loop import PodSetting
 from orchestrator.pod_design.lead_lag import angle_deg, compensation_deg
 from orchestrator.sensitivities.sensitivities import damping_change
 
-_RADIUS, _SMALLEST, _LARGEST = 0.15, 2e-4, 0.4
-"""Of the region in which the sensitivities are trusted, as parts of the ranges."""
+_RADIUS, _SMALLEST, _LARGEST = 0.15, 2e-4, 0.4  # of where the sensitivities are trusted, as parts of the ranges
 _STEPS = 60
 _PRICE = 10.0  # what a breach costs, in damping ratio
 _BESIDE = 1e-3  # weight of the least damping of those modes that are moved more than hardly, beside that of all

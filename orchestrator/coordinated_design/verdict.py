@@ -11,8 +11,7 @@ from orchestrator.coordinated_design.point import PointModes
 from orchestrator.operating_points.outages import Outage
 from orchestrator.operating_points.points_file import OperatingCase
 
-ASTRAY = 1e-3
-"""From this difference of damping ratios on, the search's linear models and the modes computed anew disagree."""
+ASTRAY = 1e-3  # from this difference of damping ratios on, the search's models and the modes anew disagree
 
 
 @dataclass(frozen=True)

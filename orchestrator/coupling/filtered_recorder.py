@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from orchestrator.coupling.observers import ObservedRun
 from orchestrator.coupling.recorder import Recorder, RowSink
 
-PASS_BAND, STOP_BAND = 0.4, 0.5
-"""Frequencies below the first pass, those above the second are taken away, in parts of 1/interval."""
-
+PASS_BAND, STOP_BAND = 0.4, 0.5  # in parts of 1/interval: what is below passes, what is above is taken away
 _HALF = 25  # the filter reaches so many intervals to both sides
 _BETA = 7.857  # of the Kaiser window: 80 dB
 

@@ -66,8 +66,7 @@ class DropOut:
         return "frozen" if self.substitute is None else f"lost, replaced by {self.substitute:g}"
 
 
-Imperfection = Bias | Noise | Quantisation | Delay | DropOut
-"""What can be wrong with a connection; one of each at a time."""
+Imperfection = Bias | Noise | Quantisation | Delay | DropOut  # what can be wrong with a connection; each at most once
 
 
 @dataclass

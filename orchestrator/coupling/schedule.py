@@ -16,8 +16,7 @@ ScheduleName = Literal["gauss-seidel", "jacobi", "midpoint", "newton"]
 
 SCHEDULES: tuple[ScheduleName, ...] = ("gauss-seidel", "jacobi", "midpoint", "newton")
 
-SECOND_ORDER: tuple[ScheduleName, ...] = ("midpoint", "newton")
-"""Schedules in which inputs follow straight lines during a step."""
+SECOND_ORDER: tuple[ScheduleName, ...] = ("midpoint", "newton")  # inputs follow straight lines in a step
 
 FirstInputs = Literal["consistent", "once", "start", "zero"]
 """What connected inputs hold in the first step.

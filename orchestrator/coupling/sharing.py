@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-HANDOVER = 2e-6
-"""What a further thread costs a group in every step [s]: it is told to begin, and fetches what others wrote."""
+HANDOVER = 2e-6  # what a further thread costs in every step [s]: it is told to begin, and fetches what others wrote
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,7 @@ def worth_sharing(group: Sequence[int], bound: NDArray[np.bool_]) -> bool:
 
 _BLOCK = 50  # communication steps done one way before the other has its turn
 _BLOCKS = 8  # of a trial, half of them each way: other programs on the same cores disturb both alike
-_VALID = 5000
-"""Communication steps for which a trial's outcome counts; another follows, because the load of a machine changes."""
+_VALID = 5000  # communication steps for which a trial's outcome counts: the load of a machine changes
 
 
 class Trial:

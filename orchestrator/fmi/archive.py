@@ -32,8 +32,7 @@ MOST_XML_ELEMENTS = 600_000
 """Of one document: an FMU of about 200,000 variables, three elements each. A network of 9,241 buses has 484,788."""
 
 FREE_BYTES = 64 * 1024**2
-MOST_RATIO = 100
-"""Unpacked size over packed size that is accepted beyond the first `FREE_BYTES`; binaries reach 10, zip bombs 1000."""
+MOST_RATIO = 100  # most unpacked over packed size beyond the first `FREE_BYTES`; binaries reach 10, zip bombs 1000
 
 _OUTSIDE = (
     "an absolute path, or one with a drive or a backslash",

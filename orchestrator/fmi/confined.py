@@ -21,8 +21,7 @@ from orchestrator.fmi.messages import FLOODED
 from orchestrator.fmi.process_tree import MOST_FILES
 from orchestrator.fmi.protection import Protection
 
-_WINDOWS_FAULTS = 0x80000000
-"""On Windows, a process that dies of a fault ends with that fault's status, which is at least this."""
+_WINDOWS_FAULTS = 0x80000000  # on Windows, a process that dies of a fault ends with its status, at least this
 
 
 class ProcessFault(StrEnum):

@@ -12,11 +12,8 @@ from pathlib import Path
 from orchestrator.fmi.protection import CPU, DISK, MEMORY, TASKS
 
 _OUR_TASKS = 3  # processes of ours around an FMU that count as its own
-TO_BEGIN = 60.0
-"""Wall-clock time for a process to begin, before it comes to the FMU [s]: on a busy machine that is not the FMU's."""
-
-LEAST_MEMORY = 32.0
-"""With less, the worker itself cannot load an FMU and answer [MB]; such a limit was meant in another unit."""
+TO_BEGIN = 60.0  # wall-clock time for a process to begin [s], before the FMU: a busy machine is not its fault
+LEAST_MEMORY = 32.0  # with less [MB] the worker itself cannot load an FMU and answer; another unit was meant
 
 TOO_MUCH_MEMORY, TOO_MANY_TASKS, TOO_MUCH_DISK = 93, 94, 95
 """Exit codes of a supervisor that ended an FMU's processes for what they took together."""

@@ -20,8 +20,7 @@ MOST, ROOM = 16384, 1 << 18  # references of one question; numbers of a question
 SET, STEP, GET = 1, 2, 4
 TALK, RUN = 2, 3
 OK = 0
-DIED, HUNG, NOT_A_NUMBER, INTERRUPTED, TAMPERED = 64, 65, 66, 67, 68
-"""Answers of a mailbox that no FMU gives; those of mailbox.c."""
+DIED, HUNG, NOT_A_NUMBER, INTERRUPTED, TAMPERED = 64, 65, 66, 67, 68  # answers that no FMU gives; as in mailbox.c
 
 
 class Head(ctypes.Structure):

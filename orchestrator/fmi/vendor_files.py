@@ -16,14 +16,11 @@ from orchestrator.safe_files import file_hash
 DLL_ENDINGS = (".so", ".dll", ".dylib")
 DEVICE_ENDING = ".toml"  # of a file that lays a circuit around a DLL
 _KEPT = "dlls"  # not the folder of our own FMUs, which are trusted: a vendor's code runs in a process of its own
-_FOR_NOW = "for-now"
-"""Folder beside a kept FMU with one whose DLL could not be tried at that time; each process tries it once."""
+_FOR_NOW = "for-now"  # beside a kept FMU, one whose DLL could not be tried at that time; each process tries once
 
 _log = logging.getLogger("gfor")
 _tried_now: dict[Path, Path] = {}  # FMUs for now that this process made, by where they would be kept for good
-
-READER = "orchestrator.fmi.dll_reading"
-"""Module whose process, closed off, reads a DLL; also one for Windows, under Wine."""
+READER = "orchestrator.fmi.dll_reading"  # module whose process, closed off, reads a DLL, also for Windows, under Wine
 
 
 def foreign_platforms(library: Path) -> tuple[str, ...]:

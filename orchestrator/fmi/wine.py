@@ -29,8 +29,7 @@ PREFIX = "wine"
 _LIBRARIES = "x86_64-windows"
 _WHERE = ("/usr/lib/x86_64-linux-gnu/wine", "/usr/lib/wine", "/usr/lib64/wine", "/usr/local/lib/wine",
           "/usr/local/lib64/wine")  # fmt: skip
-_BESIDE = ("lib64/wine", "lib/wine")
-"""From the folder above that of the loader, where Wine is not one of the system's own."""
+_BESIDE = ("lib64/wine", "lib/wine")  # from the folder above the loader's, where Wine is not one of the system's own
 NOTE = "wine-socket"
 """Debian's server has its sockets in such a folder in the place that TMPDIR names; its name stands in the prefix."""
 _LONGEST = 20.0  # for the server to begin [s]
@@ -215,7 +214,5 @@ class Server:
             shutil.rmtree(path, ignore_errors=True)
 
 
-in_process: list[Server] = []
-"""The server of this process, which closed itself off after it was started; none elsewhere."""
-
+in_process: list[Server] = []  # the server of this process, which closed itself off after its start; none elsewhere
 PROGRAMS = 16  # that a process which closed itself off can start: instances at once, and those that crashed

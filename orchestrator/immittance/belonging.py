@@ -12,8 +12,7 @@ from orchestrator.immittance.loop import CutLoop
 from orchestrator.immittance.scan import PortPoint, Scan
 from orchestrator.immittance.sides import NEAR_ZERO, Known
 
-_UNLIKE = (0.003, 30.0)
-"""Median size of the loop beyond which one of two scans is more likely in per unit than so weak or so strong."""
+_UNLIKE = (0.003, 30.0)  # median size of the loop beyond which one scan is rather in per unit than so weak or strong
 
 _OTHER_POINT = 0.01
 """Relative difference of the voltage, and of the power over the larger one, from which on an operating point is another

@@ -19,9 +19,7 @@ _BEYOND = 30.0
 _END, _SMALL = 1.5, 0.95
 """Part of the range's end over which both sides must be passive, or the loci smaller than the second figure."""
 
-_BEGIN = np.deg2rad(60.0)
-"""Furthest phase of det(1 + L) at the lowest frequency from the real axis, on which it begins at 0 Hz."""
-
+_BEGIN = np.deg2rad(60.0)  # most that det(1 + L) at the lowest frequency is off the real axis, where it begins
 _RANGE = (2.0, 400.0)  # what a scan has to hold at least [Hz]: swings, and what filters and delays do
 _SETTLED = 1.5  # growth of det(1 + L) over the last half of the range of models from which on it does not end there
 _INVARIANT, _FRAMES = 1e-3, 16

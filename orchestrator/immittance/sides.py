@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from orchestrator.arrays import Complex, Matrix, Numbers, Vector
 from orchestrator.immittance.poles import unstable_poles
 
-NEAR_ZERO = 1e-3
-"""Poles of models this near to 0 [rad/s] are the free angle's and clocks'; the path goes round them to the right."""
+NEAR_ZERO = 1e-3  # this near to 0 [rad/s] poles are the free angle's and clocks'; the path passes on the right
 
 ON_AXIS = 1e-7
 """Poles of models whose damping is less than this are on the axis, as of coils and capacitors without losses; the path

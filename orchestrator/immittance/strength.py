@@ -14,8 +14,7 @@ from orchestrator.immittance.loop import NO_MODES, CutLoop
 from orchestrator.immittance.margins import told
 from orchestrator.immittance.sides import Known, Side
 
-_MOST, _APART, _NEAR = 3, 1.15, 0.9
-"""Critical frequencies that are told, the least ratio of two of them, and the largest distance."""
+_MOST, _APART, _NEAR = 3, 1.15, 0.9  # critical frequencies told, least ratio of two, largest distance
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,7 @@ _SHARE = 0.8
 """Part of all that is fed that one place must feed to be named. Over 540 forcings with known places in `two_area` and
 `ieee39` the method that applies gives the right place 0.91 and more."""
 
-_BALANCE = 0.7
-"""What is fed beside what is taken, 0.75 and more with all units in view; with less, another place feeds as well."""
-
+_BALANCE = 0.7  # what is fed beside what is taken, 0.75 and more with all units in view; with less, others feed too
 _CONCENTRATED = 0.9  # participation of one place from which it is no mode's shape
 _POWER, _VOLTAGE = 0.16, 0.4
 """Reactive work beside dissipating work: up to the first the oscillation acts through active power, and the Q-V phase

@@ -22,8 +22,7 @@ _STEADY, _RESTLESS = 0.25, 0.35
 
 _TREND = 0.7  # part of the envelope's variance that an exponential must explain to be one
 _SINE = 1.85  # fourth moment beside the square of the second: 1.5 of a sine, 3 of noise
-_LEAST_PART = 0.2
-"""Amplitude, as a part of the largest of its kind of signal, from which a signal is looked at for disturbances."""
+_LEAST_PART = 0.2  # of the largest amplitude of its kind, from which a signal is looked at for disturbances
 
 _CLEAN, _SKIRT = 0.04, 5.0
 """Spread of the envelope up to which nothing else is asked; beyond it what is left beside the line, near it and further

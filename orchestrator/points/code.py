@@ -17,8 +17,7 @@ _SHOWING = ("acceptance", "api", "cli", "explore", "interop", "report")
 """Packages whose code does not change the result of any point; a test checks that the code of a point never imports
 them."""
 
-LIBRARIES = ("numpy", "scipy")
-"""What computes the figures beside this package's own code; another version may give others."""
+LIBRARIES = ("numpy", "scipy")  # what computes the figures beside our code; another version may give others
 
 _SENTENCE = re.compile(r"^(?!\d)(?=.*[a-z]{2})(?=.* )(?!.*->)(?!.*;\n)", re.DOTALL)
 """Texts that tell something: docstrings, and pieces of messages. Names and values are without a space, or begin with a

@@ -28,8 +28,7 @@ worker busy."""
 
 _SAFE_PATH = "PYTHONSAFEPATH"
 
-_LONGEST = 60
-"""Length of a folder's path in which sockets still have a name that is short enough: it may have about 100 bytes."""
+_LONGEST = 60  # length of a folder's path in which sockets' names are short enough: about 100 bytes may be had
 
 
 class Processes:

@@ -22,8 +22,7 @@ from orchestrator.safe_files import flush, not_written, write_bytes
 if TYPE_CHECKING:
     from orchestrator.cases.prepare import PreparedScenario
 
-_NUMBER, _CSV_NUMBER = 8, 13
-"""Bytes of a recorded value: compressed parts and the joined file together, and its digits in the table."""
+_NUMBER, _CSV_NUMBER = 8, 13  # bytes of a value: compressed parts with the joined file; digits in the table
 
 
 def recorded_size(prepared: PreparedScenario, *, csv: bool) -> float:

@@ -12,8 +12,7 @@ from orchestrator.operating_points.item import Status
 from orchestrator.screening.study import ScreenedItem, ScreeningResult
 
 _LEADING = 2
-_ALIKE, _FREQUENCY = 0.8, 0.15
-"""Trajectories are one mode above this likeness of their shares, and within this part of the frequency."""
+_ALIKE, _FREQUENCY = 0.8, 0.15  # one mode above this likeness of shares, within this part of the frequency
 
 _SHOWN = 5
 

@@ -10,8 +10,7 @@ SIZES = (1e-2, 1e-3)
 
 _AGREE = 0.02  # two sizes agree within this part of the derivative
 _KINK = 0.1  # A derivative upwards and one downwards that differ by more than this part belong to a limit on one side
-_STAYS_APART = 0.75
-"""In a smooth system twice the change doubles the difference between up and down; at a kink it stays."""
+_STAYS_APART = 0.75  # where smooth, twice the change doubles the difference between up and down; at a kink it stays
 
 _FLOOR = 2e-6
 """What an effect of one percent is not judged below, as a part of |λ|, with the first size: blocks that are perturbed

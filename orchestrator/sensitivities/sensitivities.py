@@ -43,9 +43,7 @@ _DOUBLE = 1e-3
 """Two eigenvalues nearer than this part of |λ| count as a double one: no derivative of either alone exists, and a
 defective pair is split this far by the perturbation's rounding."""
 
-_SAME = 0.1
-"""The step map's mode and that of the continuous model differ by less than this part of |λ|; see `resolution`."""
-
+_SAME = 0.1  # the step map's mode and the continuous model's differ by less than this part of |λ|; see `resolution`
 _FAR = 0.1  # step map and continuous model disagree on a derivative from this part on
 
 _NO_STEADY_STATE = (

@@ -28,8 +28,7 @@ from orchestrator.siting.residues import SeenMode
 from orchestrator.siting.study import DEVICE, DROOP, SiteResult, SupportShift
 
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
-_NONE = 1e-5
-"""Damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 MW/Hz would give a hundredth of a point."""
+_NONE = 1e-5  # damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 give a hundredth of a point
 
 _SHOWN = 12
 

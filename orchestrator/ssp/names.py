@@ -12,9 +12,7 @@ FMU_TYPE = "application/x-fmu-sharedlibrary"
 PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
 PARAMETER_MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 
-STUDY_TYPE = f"{REVERSE_DOMAIN}.study"
-"""Type of our annotation, which holds the parts of a scenario that SSP cannot express."""
-
+STUDY_TYPE = f"{REVERSE_DOMAIN}.study"  # of our annotation, with the parts of a scenario that SSP cannot express
 OSP_TYPE = "com.opensimulationplatform"  # type of libcosim's annotation, which carries the communication step
 
 NAMESPACES = {

@@ -72,8 +72,7 @@ def _remark(both: tuple[Numbers, Numbers], coarse: int, count: int, labels: tupl
 
 
 _UNEVEN = 0.01  # part of the interval by which samples may be off
-_WAVEFORM = 0.5
-"""Part of a signal's power near the line's frequency from which it is an instantaneous value of the grid."""
+_WAVEFORM = 0.5  # part of a signal's power near the line's frequency from which it is a value of the grid's wave
 
 _NEAR = 0.15
 _LEAST_NOISE = 1e-5  # singular values below this part of the largest are noise: the resolution of 16 bits

@@ -22,8 +22,7 @@ from orchestrator.fmi.description import VariableInfo
 from orchestrator.units import read_value, to_unit
 
 _FORMS = "START:STOP:COUNT, log:START:STOP:COUNT or a list such as 0.1,0.2,0.5"
-_KEYS = r"[^.\s]+\.[^\s,]+(\s*,\s*[^.\s]+\.[^\s,]+)*"
-"""One name ``component.parameter`` or several; each may be a pattern."""
+_KEYS = r"[^.\s]+\.[^\s,]+(\s*,\s*[^.\s]+\.[^\s,]+)*"  # one ``component.parameter`` or several; each may be a pattern
 _LENGTH, _SCR = "length", "scr"
 _MOST = 100_000
 _ALPHA_INFO = VariableInfo(ALPHA, 0, "Real", "parameter", "fixed", "", None, 0.0, 1.0, "Share of the converters")

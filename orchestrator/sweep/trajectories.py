@@ -9,8 +9,7 @@ import numpy as np
 from orchestrator.analysis.mode_tracking import Followed, ModeSet, near_an_end, number_trajectories
 from orchestrator.sweep.point import PointRecord
 
-GridPlace = tuple[float, ...]
-"""Indices of a point on all axes. Refining points have a fractional index on the last axis."""
+GridPlace = tuple[float, ...]  # indices of a point on all axes; refining points have a fractional one on the last axis
 
 
 class Beginning(IntEnum):

@@ -29,8 +29,7 @@ class Swing:
     turns_hz: float | None = None
 
 
-STEADY = 0.05
-"""An oscillation is sustained if the logarithm of its amplitude changes by less than this over the judged part."""
+STEADY = 0.05  # the logarithm of a sustained oscillation's amplitude changes less over the judged part
 
 PERIODS = 4.5
 """Number of periods that the response must have of an oscillation that grows or lasts. With fewer it cannot be told

@@ -6,8 +6,7 @@ from functools import partial
 
 from orchestrator.coupling.system import System
 
-BYPASS_TIME = 0.01
-"""Time constant [s] with which the state of a block that is left out follows its input, as the models have it."""
+BYPASS_TIME = 0.01  # with which the state of a block that is left out follows its input [s], as the models have it
 
 
 @dataclass(frozen=True)

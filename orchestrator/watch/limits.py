@@ -29,8 +29,7 @@ AT_LIMIT = 1 - 1e-9
 digits."""
 
 
-KIND = "current_limit.kind"
-"""Parameter of the grid-forming converter: 0 for its box in q and d, above for its other limits."""
+KIND = "current_limit.kind"  # of the grid-forming converter: 0 for its box in q and d, above for its other limits
 
 
 def _current_limit(what: str, axis: str) -> Limit:
@@ -56,8 +55,7 @@ LIMITS = (
 """Limits of the catalogue's models. A foreign FMU with the same variables is watched as well."""
 
 
-SCALED = 1e-3
-"""The same for a limit in proportion to a signal: the model may take that from an earlier pass of its iteration."""
+SCALED = 1e-3  # the same for a limit in proportion to a signal, which may be of an earlier pass of its iteration
 
 
 def limits_of(plan: ComponentPlan) -> list[Limit]:

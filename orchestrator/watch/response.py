@@ -43,9 +43,7 @@ CLEAN = 0.15
 """In a stretch with noise, the largest part of a swing that a reported oscillation leaves unexplained. An oscillation
 that noise excites wanders in amplitude and phase, and leaves more."""
 
-_SMOOTHEST = 3
-"""Number of signals in which a clean oscillation is searched in a stretch with noise: those that noise moves least."""
-
+_SMOOTHEST = 3  # signals in which a clean oscillation is searched in a stretch with noise: those least noisy
 _TRIED = 8  # number of signals in which oscillations are searched: those that swing most at the end
 ONE = 0.3
 """An oscillation continues over events if it explains the swing between any two of them except for less than this

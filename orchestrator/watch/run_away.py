@@ -20,15 +20,13 @@ synchronous area need not stay connected (Regulation (EU) 2016/631, article 13, 
 instantaneous trips of the Western, the Eastern and the Texas Interconnection (NERC PRC-024, attachment 1). Great
 Britain and Ireland have 52 Hz for minutes, and Québec 55.5 to 66 Hz."""
 
-BAND = (0.9, 1.1)
-"""Band of the speed of a unit that has lost synchronism, as parts of its start: it is no frequency of the grid."""
+BAND = (0.9, 1.1)  # of the speed of a unit out of synchronism, as parts of its start: it is no frequency of the grid
 
 OUTSIDE = 1.0
 """A frequency is reported if it is outside of its band for longer than this in all [s]. A deep dip may push a rotor
 there for a short time."""
 
-OUTSIDE_AT_END = 0.2
-"""The same for a frequency that is outside without a break until the end [s]; none is asked outside of `BAND`."""
+OUTSIDE_AT_END = 0.2  # the same for a frequency outside without a break until the end [s]; none outside of `BAND`
 
 LEAST_AWAY = 0.004
 """A frequency that moves away is told in a short stretch from this distance from the rated one on, as a part of it:
@@ -48,13 +46,9 @@ LEAST_SPEED = 5e-4
 """Smallest drift of a speed in half of the stretch, as a part of its start: more than the dead band of a primary
 control (20 mHz)."""
 
-LEAST_VOLTAGE = 0.01
-"""Smallest drift of a voltage in half of the stretch, as a part of 1 or of the start: one step of a tap changer."""
-
+LEAST_VOLTAGE = 0.01  # least drift of a voltage in half of the stretch, of 1 or of the start: a tap changer's step
 SMOOTH = 0.15  # the swing around a drift, as root mean square, must be less than this part of the drift
-HELD = 0.5
-"""Part of the ratings on the grid from which on governors at their limits leave nothing that stops a frequency."""
-
+HELD = 0.5  # part of the ratings on the grid from which governors at their limits leave a frequency without a hold
 _RATE_TIME = 1.0  # the reported rate is the mean over this time at the end [s]
 
 

@@ -14,9 +14,7 @@ from orchestrator.coupling.recorder import Recorder
 from orchestrator.coupling.system import System
 from orchestrator.errors import InputError
 
-LOOK_INTERVAL = 5e-3
-"""Approximate time between two looks [s]. The extremes of coupled outputs show what happens between two looks."""
-
+LOOK_INTERVAL = 5e-3  # about the time between two looks [s]; extremes of coupled outputs show what happens between
 MOST_LOOKS = 20_000  # largest number of looks; in longer runs the looks are farther apart
 
 

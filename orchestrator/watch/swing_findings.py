@@ -8,8 +8,7 @@ from orchestrator.watch.oscillation import Oscillation, too_fast
 from orchestrator.watch.seen import shown
 from orchestrator.watch.stretches import Stretch
 
-_PARTS, _SHORT = 40, 0.1
-"""Largest number of pieces and their least length [s]. The oscillation is searched in the first piece."""
+_PARTS, _SHORT = 40, 0.1  # most pieces, and their least length [s]; the oscillation is searched in the first
 
 
 def swing_rises(swing: Swing) -> bool:

@@ -112,9 +112,7 @@ def not_judged(masked: Mapping[Stretch, Sequence[Unrest]]) -> list[Finding]:
 
 
 LEAST_GROWTH = 1e-6  # smallest reported growth: distance of a signal from its start, as a part of 1 or of the start
-LEAST_MOTION = 1e-4
-"""Smallest reported motion without growth, such as that from a start that is not a steady state, in the same unit."""
-
+LEAST_MOTION = 1e-4  # least motion reported without growth, as from a start off the steady state, in the same unit
 _STEEP = 0.2  # A motion grows by itself if it had less than this part of its extent after half the time
 FEWEST_LOOKS = 3  # least number of looks over which a growth rises; a faster rise is a jump
 _ROUNDING, _LARGE = 1e-13, 0.03  # range in which a growth is measured, as parts of 1 or of the start

@@ -30,8 +30,7 @@ SETTLING = 2.0
 """Shortest stretch in which a swing that goes on is a fault [s]. In a shorter one it may be what an event excites in
 the network, such as a current's offset, which takes up to a second to decay; growth is a fault in any."""
 
-SHORTEST_BETWEEN = 1.0
-"""Shortest stretch between two events of which a departure is told [s]: a fault that is cleared is shorter."""
+SHORTEST_BETWEEN = 1.0  # shortest stretch of which a departure is told [s]: a fault that is cleared is shorter
 
 LEAST_DEPARTURE, LEAST_SHARE = 1e-3, 0.1
 """Least motion that is told, as a part of 1 or of the signal's start, and as a part of all its motion."""

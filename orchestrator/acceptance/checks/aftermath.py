@@ -32,9 +32,7 @@ _STILL, _ELSEWHERE, _NOTHING = 1e-4, 0.01, 0.01
 """Movement in a window [pu, S_n] of a device at rest; distance that is another rest; current of one that gives none."""
 
 _LATCHED = 0.9  # part of the current limit, or of the rating, from which a device at rest may be held by its limit
-_LEAST = 32.0
-"""Bytes kept by each step of a dip that count as a leak; a new page of the heap is up to 12 in some hundred steps."""
-
+_LEAST = 32.0  # bytes kept by each step of a dip that are a leak; a new page of the heap is up to 12 in some hundred
 _BLOCKS = 5  # parts of a disturbance, between which the memory is read
 _SOON = (0, 2, 4)  # numbers of those soon after which it is asked as well
 _PART = 0.75  # time to spend, in parts of the time for which an FMU is made to run

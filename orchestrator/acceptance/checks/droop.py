@@ -15,9 +15,7 @@ ABSORBING = OperatingAt(1.0, 3.0, 0.7, -0.3)
 """As `POINT`, while it takes reactive power, also behind an impedance of 0.25 pu; angles turn beyond half a turn."""
 
 VOLTAGE = 0.02
-FREQUENCY = 0.001
-"""Changes [pu] that are made, up and down; half the difference of both answers has no terms of second order."""
-
+FREQUENCY = 0.001  # changes [pu], up and down; half the difference of both answers has no terms of second order
 CHARGING = OperatingAt(1.0, 0.0, -0.6, 0.1)  # while it takes active power
 _FURTHER = (OperatingAt(1.0, 0.0, 0.2, 0.02), OperatingAt(1.0, 0.0, 0.2, 0.3), OperatingAt(1.0, 0.0, -0.5, 0.1))
 _FURTHER_ABSORBING = (OperatingAt(1.0, 0.0, 0.2, -0.25), OperatingAt(1.0, 0.0, 0.2, -0.4),

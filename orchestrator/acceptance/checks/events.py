@@ -10,16 +10,10 @@ from orchestrator.acceptance.checks.running import EQUAL
 from orchestrator.acceptance.checks.subject import OperatingAt, Subject
 from orchestrator.arrays import Numbers
 
-EPISODE = 1.2
-"""Duration of an episode [s]: time for a deep dip of 0.45 s; an FMU that computes slowly gets a shorter one."""
-
-_HOLD, _WIGGLE = 10, 0.3
-"""Small steps beside the events: for how many steps they stay, and their height in parts of the usual one."""
-
+EPISODE = 1.2  # duration of an episode [s]: time for a deep dip of 0.45 s; a slow FMU gets a shorter one
+_HOLD, _WIGGLE = 10, 0.3  # small steps beside the events: how many they stay for, and height in parts of the usual
 _SPENT = 1.0  # time [s] that events may take
-
-_FAINT = 1e-3
-"""Relative difference of two runs with events that counts where they differ slightly without: dips amplify it."""
+_FAINT = 1e-3  # relative difference of two runs with events that counts where they differ slightly without
 
 RANGES = {
     "shallow": (0.76, 0.95), "middle": (0.56, 0.74), "low": (0.36, 0.54), "deep": (0.06, 0.34), "swell": (1.06, 1.28),

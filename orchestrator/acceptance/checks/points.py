@@ -171,9 +171,7 @@ _LATE = 20_000.0  # A start [s] at which single precision has no milliseconds le
 _SAME, _STILL = 1e-4, 100.0
 """Difference of two answers, in parts of their range, up to which they are alike; and in parts of a rest's motion."""
 
-_ROUNDED = 1e-8
-"""Part of an output's size by which an angle of six million radians, which has no more digits, changes it."""
-
+_ROUNDED = 1e-8  # part of an output's size by which an angle of six million radians, short of digits, changes it
 _FASTER, _LASTS = 0.012, 9.0  # frequency [pu] by which it is turned forth, and back for twice as long; in all [s]
 _TURNED = 5e-5  # difference of the currents that two angles bring [pu, S_n]: a jump of some hundredths of a milliradian
 

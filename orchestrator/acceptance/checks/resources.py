@@ -16,8 +16,7 @@ _BLOCKS, _BLOCK = 8, 0.2  # parts of a measurement, and the longest time of one 
 _LEAST = 4.0  # bytes kept by each step that count as a leak
 _RESETS, _FEW = 5, 4  # resets in a block, and instances between two counts of open files
 _INSTANCE = 120.0  # bytes kept by each instance, or each saved state
-_SLIGHT = 4096.0
-"""Bytes kept by each instance that no study notices: some tools never free an instance's name or its log's."""
+_SLIGHT = 4096.0  # bytes kept by each instance that no study notices: some tools never free its name or log
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,7 @@ from orchestrator.arrays import Complex
 from orchestrator.binding.misfits import NO_LIMIT
 from orchestrator.errors import ComponentError
 
-_TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)
-"""When something happens [s]: a timer or a counter in an FMU may run out between two of them."""
-
+_TIMES = (0.1, 1.0, 2.5, 3.0, 5.0)  # of events [s]: a timer or a counter in an FMU may run out between two
 _LASTS = 0.15  # duration of a disturbance [s]; a fault is cleared within it
 _RIDDEN, _OVERLOAD = 2.0, 10.0
 """Longest dip [s] after which it is asked to be back; one in which a limit that dies with time has died."""
@@ -41,12 +39,8 @@ _UNEVEN, _MUCH = 1.6, 2.2
 """Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only; the
 first also of a jump in a voltage that lasts."""
 
-_BACK = 0.3
-"""Distance of the current from where it was [pu, S_n], from which the next disturbance begins with a new instance."""
-
-_AT_LEAST = 14
-"""Runs that are made however long they take: at all times, dips that stay, after what lasts, with imported power."""
-
+_BACK = 0.3  # distance of the current from where it was [pu, S_n] from which the next one hits a new instance
+_AT_LEAST = 14  # runs, however long they take: at all times, dips that stay, after what lasts, with imported power
 _PART = 1.5  # wall-clock time to spend, in parts of the time for which an FMU is made to run
 
 

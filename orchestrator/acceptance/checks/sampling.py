@@ -14,8 +14,7 @@ _LENGTHS = (200, 2000, 20000)  # steps of a run; the next longer one where the l
 _SINGLE = 400  # steps of a run in which every input is set, and every output read, by itself
 _CHANGES = 4  # times from change to change that a sample time takes to be seen
 _MOST_MOVE = 0.7  # part of all steps that must move the outputs for a step that does not to be a step that was skipped
-_MOST_STEPS = 1.05
-"""Mean number of steps from change to change up to which it is every step; it may rest where a number is rounded."""
+_MOST_STEPS = 1.05  # mean steps from change to change that are every step: it may rest where a number is rounded
 
 
 @check("sample_time", "Do its outputs change with every step, or at times of its own?", needs=(*SAME, "reading"))

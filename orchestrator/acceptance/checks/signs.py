@@ -23,9 +23,7 @@ _EARLY = (0.005, 0.025)
 """Cycle in which a converter is still the source behind its impedance that it was; oscillations of the network's
 frequency have no mean over it."""
 
-_MORE = 0.97
-"""Reactive power in the end, in parts of the first cycle's, from which it is looked closer: a droop leaves less."""
-
+_MORE = 0.97  # late reactive power, in parts of the first cycle's, from which to look closer: a droop leaves less
 _SOME = 1e-3  # change of power [pu, S_n] that is an answer
 _SETTLED = 0.05  # part of an answer by which it may still move
 _AWAY = 0.5  # power [pu, S_n] by which it may differ after such small changes, and be stable

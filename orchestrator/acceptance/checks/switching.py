@@ -13,9 +13,7 @@ from orchestrator.acceptance.checks.comparing import scales
 from orchestrator.arrays import Numbers
 
 _LEVELS = 4  # A signal with more values than that does not switch
-_ALIKE = 0.05
-"""Difference of all else at the moments of switching, relative to its range, beyond what one step moves it."""
-
+_ALIKE = 0.05  # difference of all else at the moments of switching, of its range, beyond what one step moves it
 _DWELL = 0.1  # relative difference of the times between two switchings
 _STEPS = 2.0  # how many of the longer steps a time between two switchings may differ by
 

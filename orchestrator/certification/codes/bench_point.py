@@ -28,8 +28,7 @@ from orchestrator.watch.watch import Watch
 
 PLANT, DUPLICATE, BENCH = "converter", "duplicate", "bench"
 
-CAPACITANCE = 0.05
-"""Capacitance at the connection point [pu of the plant's rating]: a voltage must not jump between two FMUs."""
+CAPACITANCE = 0.05  # at the connection point [pu of the plant's rating]: no voltage may jump between FMUs
 
 RECORDED = ("v_re", "v_im", "v", "p", "q", "duplicate.p", "duplicate.q", "source.p", "source.q")
 

@@ -16,8 +16,7 @@ from orchestrator.points.task import Kept, computed
 from orchestrator.watch.finding import UNSTABLE
 
 ENDED = "runs"  # criterion of a run that ends early; its value is the time of the end
-_TIMED = ("stable", ENDED)
-"""Criteria without a figure of their own that are the further off the earlier something goes wrong."""
+_TIMED = ("stable", ENDED)  # criteria without a figure: the further off the earlier they go wrong
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,7 @@ import numpy as np
 from orchestrator.arrays import Complex, Numbers
 
 LAG = 0.01  # lag with which the damping follows the frequency of the grid [s]
-LATE = 0.02
-"""By how much the bounds come later where waveforms are measured [s]: the mean over a period of 50 Hz takes as long."""
-
+LATE = 0.02  # what the bounds come later by for waveforms [s]: the mean over a period of 50 Hz takes as long
 SLACK = 0.01  # by how much later a bound that asks for something begins [s]
 TUNNEL, TUNNEL_SHARE = 0.02, 0.05
 """Distance of the bounds in the end: the larger one of these, of the rating and of the peak [pu, 1]."""

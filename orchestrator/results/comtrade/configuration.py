@@ -10,9 +10,7 @@ from dataclasses import dataclass, replace
 from orchestrator.errors import InputError
 
 FORMS = ("ASCII", "BINARY", "BINARY32", "FLOAT32")  # forms of the samples
-REVISIONS = ("1991", "1999", "2001", "2013")
-"""Revisions of the standard; 2001 is IEC's edition of 1999. A file of 1991 names none."""
-
+REVISIONS = ("1991", "1999", "2001", "2013")  # 2001 is IEC's edition of 1999; a file of 1991 names none
 MOST_CHANNELS = 10_000  # of one recording; large stations record some hundred
 
 
