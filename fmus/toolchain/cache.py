@@ -14,7 +14,8 @@ from fmus.toolchain.extras import SetupError
 
 _LOG = logging.getLogger("gfor")
 _HASH = ".sha256"
-_checked: dict[Path, tuple[int, int, int]] = {}  # files found intact in this process: inode, size, time of change
+_checked: dict[Path, tuple[int, int, int]] = {}
+"""Files found intact in this process: inode, size and time of the last change."""
 
 
 class CacheError(SetupError):

@@ -31,7 +31,9 @@ CODES = {
 }
 ADD, SUB, MUL = (CODES[operation] for operation in (Op.ADD, Op.SUB, Op.MUL))
 Operation = tuple[int, ...]  # code, and the values that it takes
-MUL_ADD, MUL_SUB, SUB_MUL, MUL_ADD_MUL, MUL_SUB_MUL = range(29, 34)  # a·b + c, a·b − c, c − a·b, a·b + c·d, a·b − c·d
+
+MUL_ADD, MUL_SUB, SUB_MUL, MUL_ADD_MUL, MUL_SUB_MUL = range(29, 34)
+"""Codes of a·b + c, a·b − c, c − a·b, a·b + c·d, a·b − c·d."""
 
 
 def with_pairs(operations: dict[int, Operation], results: Iterable[int]) -> dict[int, Operation]:

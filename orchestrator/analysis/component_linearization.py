@@ -190,7 +190,7 @@ SIZES = (1e-5, 2e-5)
 """Two sizes of central differences, relative to max(1, |value|). The difference between both results shows their
 accuracy."""
 
-AGREES = 1e-4  # most that an element differs from its central difference: a hundredth of a point of damping
+AGREES = 1e-4  # largest relative difference of an element from its central one: a hundredth of a point of damping
 _NEARBY = (1e-7, 1e-9, 1e-11)  # smaller sizes, which are tried if a limit lies within the first ones
 _BENT, _FITS = 0.1, 0.01
 """A difference quotient that changes by more than the first part depends on the size. A quotient that differs by less
