@@ -11,7 +11,7 @@ from typing import Any
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.imperfection_tables import sets_imperfection
-from orchestrator.cases.names import close_names, whose
+from orchestrator.cases.names import SERVICE, close_names, whose
 from orchestrator.cases.schema import ConventionsTable, Value
 from orchestrator.cases.values import TWICE, check_system_base, convert, flatten, given_twice
 from orchestrator.fmi.description import VariableInfo
@@ -103,9 +103,14 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
     variable may be a pattern, too."""
     if sets_imperfection(key):
         return  # done when the connections are made
+    if other := _switch(draft, key, value):
+        draft.note(where, other)
+        return
     pattern, _, variable = key.partition(".")
     meant = fnmatch.filter(draft.tables, pattern) if variable else []
     fitting = [name for name in meant if name not in draft.given.exchanged]
+    if pattern in draft.known and pattern not in draft.tables:
+        draft.found.absent[key] = where
     having = [name for name in fitting if _has(draft, name, variable)]
     if pattern not in draft.tables and all(name in draft.system.components for name in fitting):
         if fitting == meant and fitting and not having:
@@ -113,10 +118,26 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
             hint = close_names(variable, settable, f"{', '.join(fitting[:5])} are what fits the pattern")
             draft.note(where, f"no component that fits {pattern!r} has a variable {variable!r}; {hint}")
         fitting = having
+    if variable == "S_n" and key in draft.given.from_outside:
+        draft.found.ratings |= {name: draft.system.components[name].number(variable) for name in having}
     for name in fitting:
         for each in _meant(draft, name, variable) or [variable]:
             _assign(draft, name, each, value, where)
     _check_component(draft, pattern, where)
+
+
+def _switch(draft: Draft, key: str, value: Value) -> str:
+    """How an element is switched that a key means by another word, or without its grid; "" for any other key."""
+    owner, _, word = key.rpartition(".")
+    element, grid = owner.rpartition(".")[2], draft.grid or ""
+    homes = ((element, "connected"), (grid, f"{element}.connected"), (grid, f"{element}.scale"))
+    found = [(name, variable) for name, variable in homes if _has(draft, name, variable)]
+    if word not in SERVICE or not found or _has(draft, key.partition(".")[0], key.partition(".")[2]):
+        return ""
+    (name, variable), off = found[0], str(value).lower() in ("0", "0.0", "false", "no", "off", "out", "open")
+    off = off != (word in ("out", "off"))
+    state = str(int(not off)) if variable.endswith("scale") else str(not off).lower()
+    return f"{element} is switched {'off' if off else 'on'} by {name}.{variable}={state}; write that"
 
 
 def _has(draft: Draft, name: str, variable: str) -> bool:

@@ -91,14 +91,11 @@ class Case(CaseDefinition):
             return other.prepare(scenarios, overrides, step_size, stop_time, parameters, dispatch)
         problems = list(self.problems)
         unknown = [name for name in scenarios if name not in self.scenarios]
-        problems += [
-            Problem("--scenario", f"there is no scenario {name!r}; the case has: {', '.join(self.scenarios)}")
-            for name in unknown
-        ]
+        has = f"the case has: {', '.join(self.scenarios)}"
+        problems += [Problem("--scenario", f"there is no scenario {name!r}; {has}") for name in unknown]
         doubles = [name for name, count in Counter(scenarios).items() if count > 1]
-        problems += [
-            Problem("--scenario", f"the scenario {name!r} is chosen more than once; name it once") for name in doubles
-        ]
+        twice = "is chosen more than once; name it once"
+        problems += [Problem("--scenario", f"the scenario {name!r} {twice}") for name in doubles]
         if unknown or doubles:
             raise CaseError(str(self.path), problems)
         prepared, questions, named = [], [], mentions.Named()
@@ -112,7 +109,7 @@ class Case(CaseDefinition):
             questions += [q for q in preparer.draft.found.questions if q not in questions]
         if not problems and self.numbered and mentions.unmatched(self.table, named, self.place):
             problems += self._mentions
-        problems += [] if problems else self._switched_on(scenarios or [*self.scenarios], parameters)
+        problems += [] if problems else self._switched_on([p for p in prepared if p], parameters, overrides or {})
         if problems:  # unusual data may be the reason of the failure
             kind = problems[0].kind  # a question besides is of no kind of its own
             asked = [Problem(q.place, f"questioned besides: {q.text}", kind) for q in questions]
@@ -128,17 +125,25 @@ class Case(CaseDefinition):
         changed += [f"{key} = {value}" for values in given for key, value in values.items()]
         return [replace(p, beside=beside, questions=(*p.questions, *idle), changed=few(changed, _NAMED)) for p in ready]
 
-    def _switched_on(self, scenarios: Sequence[str], parameters: Sequence[ParameterFile]) -> list[Problem]:
-        """Controllers that a file switches on in one of several scenarios, where the scenario has it off."""
-        found = []
-        for file in parameters if len(scenarios) > 1 else ():
+    def _switched_on(
+        self, ready: Sequence[PreparedScenario], parameters: Sequence[ParameterFile], overrides: Mapping[str, Value]
+    ) -> list[Problem]:
+        """Controllers that a file switches on where the scenario has it off: in one of several scenarios, or beside
+        another one that is on there, which no value says."""
+        found, said = [], [key for values in (overrides, *(file.values for file in parameters)) for key in values]
+        for file in parameters:
             for key in (key for key, value in file.values.items() if value is True and key.endswith(".enabled")):
                 pattern, _, variable = key.partition(".")
-                each = [(s, self.components_of(s).items()) for s in scenarios]
+                systems = [p.system for p in ready if file.text]
+                others = [x for system in systems for x in idle_values.others_on(system, pattern, variable, said)]
+                each = [(p.name, self.components_of(p.name).items()) for p in ready if others or len(ready) > 1]
                 on = {s: p.value(variable) for s, plans in each for name, p in plans if fnmatchcase(name, pattern)}
-                if len(on) > 1 and (off := [scenario for scenario, is_on in on.items() if not is_on]):
-                    text = f"it would switch this on in {', '.join(off)} too, where it is off: choose one scenario"
-                    found.append(Problem(file.place(key), f"{text} of {', '.join(on)}"))
+                if off := [scenario for scenario, is_on in on.items() if not is_on]:
+                    text = f"too, where it is off: choose one scenario of {', '.join(on)}"
+                    if len(on) == 1:
+                        remedy = f"choose another scenario, or set {others[0]} = true too where both are meant"
+                        text = f"beside {others[0]}, where it is off: {remedy}"
+                    found.append(Problem(file.place(key), f"it would switch this on in {', '.join(off)} {text}"))
         return found
 
     def _beside(
@@ -163,24 +168,17 @@ class Case(CaseDefinition):
             return (), None
         powers, plans = before.power_flow.powers, before.system.components
         off = [key for key in overrides if key not in on]
-        lost = [
-            unit
-            for unit, power in powers.items()
-            if power
-            and any(fnmatchcase(f"{head}{unit}.connected", key) for key in off for head in ("", f"{table.grid}."))
-        ]
+        heads = ("", f"{table.grid}.")
+        fed_by = [unit for unit, power in powers.items() if power]
+        lost = [u for u in fed_by if any(fnmatchcase(f"{h}{u}.connected", key) for key in off for h in heads)]
         if not lost:
             return (), None
         drawn, loads = 0.0, [x.name for x in before.network.loads] if before.network else []
-        kept = {
-            key: value
-            for key, value in on.items()
-            if not any(fnmatchcase(f"{table.grid}.{x}", key.rpartition(".")[0]) for x in loads)
-        }
-        if kept != on and (intact := self._preparer(name, kept, parameters).prepare(None, None)):
-            drawn = sharing.load_of(loads, intact.system.components[table.grid]) - sharing.load_of(
-                loads, plans[table.grid]
-            )
+        of_loads = {k for k in on if any(fnmatchcase(f"{table.grid}.{x}", k.rpartition(".")[0]) for x in loads)}
+        kept = {key: value for key, value in on.items() if key not in of_loads}
+        if of_loads and (intact := self._preparer(name, kept, parameters).prepare(None, None)):
+            before_mw, now_mw = (sharing.load_of(loads, x[table.grid]) for x in (intact.system.components, plans))
+            drawn = before_mw - now_mw
             powers = intact.power_flow.powers if intact.power_flow else powers
         fed = sum(powers[unit].real * plans[unit].number("S_n") for unit in lost)
         rule = self.sharing or sharing.SharingRule(table.sharing)

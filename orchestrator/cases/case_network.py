@@ -44,11 +44,8 @@ def check_network_is_used(draft: Draft, everything: Tables) -> None:
     if draft.given.case.network is None or draft.given.case.units is not None or unknown:
         return
     if not any(takes_network(table) for table in tables):
-        draft.note(
-            draft.given.place("network"),
-            "no component is built from this network; give the grid the model 'grid' or 'phasor_grid', or remove "
-            "the table",
-        )
+        remedy = "give the grid the model 'grid' or 'phasor_grid', or remove the table"
+        draft.note(draft.given.place("network"), f"no component is built from this network; {remedy}")
 
 
 def find_network(draft: Draft, everything: Tables) -> None:
@@ -96,21 +93,17 @@ def _from_table(draft: Draft, grid: ComponentTable, everything: Tables) -> Netwo
     data = draft.data
     if data is None:
         if draft.given.case.network is None:
-            draft.note_network(
-                draft.given.place("power_flow", "grid"),
-                f"the model {grid.model!r} needs a [network] table with buses, lines and loads",
-            )
+            text = f"the model {grid.model!r} needs a [network] table with buses, lines and loads"
+            draft.note_network(draft.given.place("power_flow", "grid"), text)
         return None
     if draft.found.network_failed:
         return None
     held = {table.bus for table in everything.values()}
     idle = [bus for bus in data.generation if bus not in held]
     if idle:
-        draft.note_network(
-            draft.given.place("network"),
-            f"the source has generators at {', '.join(idle)}, where the case has no unit and no component; "
-            "add a row to the units' file, or a component with this bus",
-        )
+        remedy = "add a row to the units' file, or a component with this bus"
+        text = f"the source has generators at {', '.join(idle)}, where the case has no unit and no component; {remedy}"
+        draft.note_network(draft.given.place("network"), text)
         return None
     ports = tuple(Port(n, t.bus) for n, t in draft.tables.items() if t.bus)
     name = f"{draft.given.case.name}_grid"

@@ -1,11 +1,14 @@
 """What a case file says twice, of nothing, or against itself. Nothing of a scenario is needed to see it."""
 
 from collections.abc import Callable, Iterable, Iterator
+from itertools import permutations
 
+from orchestrator.cases.build_choices import STAND_IN
 from orchestrator.cases.names import close_names
-from orchestrator.cases.schema import CaseTable
+from orchestrator.cases.schema import CaseTable, ComponentTable
 from orchestrator.cases.values import TWICE, flatten, given_twice
 from orchestrator.errors import Problem
+from orchestrator.units import to_unit
 
 Locate = Callable[..., str]
 
@@ -44,10 +47,8 @@ def _references(case: CaseTable, place: Locate) -> Iterator[Problem]:
             if name not in modes:
                 known = f"[analysis] has: {', '.join(modes)}" if modes else "[analysis] names no mode"
                 hint = close_names(name, modes, known)
-                yield Problem(
-                    place("reference", "modes", scenario, name),
-                    f"there is no mode {name!r} that the figures could stand beside; {hint}",
-                )
+                text = f"there is no mode {name!r} that the figures could stand beside; {hint}"
+                yield Problem(place("reference", "modes", scenario, name), text)
 
 
 def _plots(case: CaseTable, place: Locate) -> Iterator[Problem]:
@@ -82,9 +83,28 @@ def _again(names: Iterable[str]) -> Iterator[tuple[str, int]]:
         seen.add(name)
 
 
+def _stand_ins(case: CaseTable, place: Locate) -> Iterator[Problem]:
+    """Devices and what stands for them without dynamics in other scenarios, where their powers differ."""
+    fed = {name: power for name, table in case.components.items() if (power := _power(table)) is not None}
+    for name, other in permutations(fed, 2):
+        device, still = case.components[name], case.components[other]
+        apart = all({name, other} & set(scenario.remove) for scenario in case.scenarios.values())
+        if (still.model or "").startswith(STAND_IN) and device.bus == still.bus and apart and fed[name] != fed[other]:
+            text = f"{name} feeds {fed[name]:.4g} MW, and {other}, which stands for it, {fed[other]:.4g} MW"
+            yield Problem(place("components", other), f"{text}: give both the same S_n and P_0")
+
+
+def _power(table: ComponentTable) -> float | None:
+    S_n, P = (table.parameters.get(key, "") for key in ("S_n", "P_0"))
+    try:
+        return float(f"{to_unit(S_n, 'MVA') * to_unit(P, 'pu'):.3g}") if table.bus else None
+    except (TypeError, ValueError):
+        return None
+
+
 def doubts(case: CaseTable, place: Locate) -> list[Problem]:
     ring = case.analysis.ring_down
-    found = []
+    found = [*_stand_ins(case, place)]
     if ring is not None and not case.analysis.modes:
         text = "no mode is looked for in the ring-down, because [analysis] names none; add 'modes', or remove it"
         found.append(Problem(place("analysis", "ring_down"), text))

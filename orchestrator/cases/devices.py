@@ -52,10 +52,8 @@ def _split(text: str) -> tuple[str | None, Path]:
     if not sign or Path(text).exists() or "/" in name or "\\" in name:
         return None, Path(text)
     if not _NAME.fullmatch(name):
-        raise InputError(
-            f"{text}: a device cannot be called {name!r}, since its folder gets that name; take letters, digits and "
-            "._+- with no point in front"
-        )
+        rule = "since its folder gets that name; take letters, digits and ._+- with no point in front"
+        raise InputError(f"{text}: a device cannot be called {name!r}, {rule}")
     if not rest:
         raise InputError(f"{text}: the file of {name} is missing; write {name}=FILE.fmu")
     return name, Path(rest)
@@ -105,10 +103,8 @@ def _bindings(names: Sequence[str], given: Sequence[str]) -> dict[str, Path]:
         elif len(names) == 1:
             name, path = names[0], Path(text)
         else:
-            raise InputError(
-                f"--binding {text}: it does not say whose it is; with several devices write NAME=FILE.toml, with NAME "
-                f"one of {', '.join(names)}"
-            )
+            form = f"with several devices write NAME=FILE.toml, with NAME one of {', '.join(names)}"
+            raise InputError(f"--binding {text}: it does not say whose it is; {form}")
         if name in found:
             raise InputError(f"--binding {text}: {name} has {found[name]} already; a device has one binding")
         found[name] = path

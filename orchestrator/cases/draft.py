@@ -8,7 +8,7 @@ from fmus.grid.network import Network
 from orchestrator.cases.build_choices import Layer
 from orchestrator.cases.network_data import NetworkData
 from orchestrator.cases.parameter_files import ParameterFile
-from orchestrator.cases.schema import CaseTable, ComponentTable, ScenarioTable
+from orchestrator.cases.schema import CaseTable, ComponentTable, EventTable, ScenarioTable
 from orchestrator.cases.sharing import Dispatch
 from orchestrator.coupling.system import System
 from orchestrator.errors import MOST_PROBLEMS, TOO_MANY, CaseError, ErrorKind, Problem
@@ -47,6 +47,10 @@ class DraftInput:
     # one.
     layers: list[Layer] = field(default_factory=list)
 
+    @property
+    def events(self) -> Sequence[EventTable]:
+        return self.case.events if self.scenario.events is None else self.scenario.events
+
 
 @dataclass
 class Findings:
@@ -54,6 +58,9 @@ class Findings:
     questions: list[Problem] = field(default_factory=list)
     # what is asked about values, by ``component.variable``, of the digits that the files have, in another unit.
     thousandfold: dict[str, str] = field(default_factory=dict)
+    ratings: dict[str, float] = field(default_factory=dict)  # S_n of components before one from outside [MVA]
+    # components of other scenarios to which a layer gives values, by ``component.variable``, with the place.
+    absent: dict[str, str] = field(default_factory=dict)
     not_reached: list[float] = field(default_factory=list)
     # components whose form the network cannot take, each with its model; what follows from that is not noted.
     misfits: dict[str, str] = field(default_factory=dict)

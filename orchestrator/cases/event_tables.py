@@ -11,21 +11,9 @@ from orchestrator.cases.draft import Draft, Findings
 from orchestrator.cases.fault_tables import component_events, note_conflicts, wire_events
 from orchestrator.cases.islands import question_islands
 from orchestrator.cases.names import close_names
+from orchestrator.coupling import events as coupled
 from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.events import (
-    BranchChange,
-    BusFault,
-    Event,
-    Fault,
-    Forcing,
-    LineSwitching,
-    LoadChange,
-    LoadSwitching,
-    ParameterChange,
-    ReferenceChange,
-    ShuntSwitching,
-    UnitSwitching,
-)
+from orchestrator.coupling.events import Event
 from orchestrator.coupling.system import ComponentPlan, Endpoint
 from orchestrator.errors import InputError, Problem
 
@@ -37,19 +25,13 @@ _LONG_FAULT = 10.0  # duration of a fault [s] above which one without a unit is 
 def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Event, ...]:
     """The events of the scenario, or of the case if the scenario has no events, up to the stop time [s]. Problems are
     noted."""
-    own = draft.given.scenario.events is not None
-    tables = draft.given.scenario.events if draft.given.scenario.events is not None else draft.given.case.events
+    head = () if draft.given.scenario.events is None else ("scenarios", draft.given.name)
     if clock is None:
         return ()
     fed = {c.target: c.source for c in draft.system.connections}
     events: list[tuple[Event, str]] = []
-    for index, table in enumerate(tables):
-        where = (
-            draft.given.place("scenarios", draft.given.name, "events", index)
-            if own
-            else draft.given.place("events", index)
-        )
-        where = table.place or where
+    for index, table in enumerate(draft.given.events):
+        where = table.place or draft.given.place(*head, "events", index)
         if not _is_point(draft, clock, table.time, "the event", where):
             continue
         if table.time >= stop:
@@ -58,7 +40,7 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
         else:
             draft.found.questions += [Problem(where, text) for text in _endless(table, stop)]
         for event in _all_events_of(draft, table, clock, stop, where):
-            checked = event if isinstance(event, Fault) else _checked(draft, event, fed, where)
+            checked = event if isinstance(event, coupled.Fault) else _checked(draft, event, fed, where)
             if checked is not None and _is_point(draft, clock, event.time, "the event", where):
                 events.append((checked, where))
     where = "--stop" if stop != draft.given.case.solver.stop_time else draft.given.place("solver", "stop_time")
@@ -150,9 +132,8 @@ def forcing_events(draft: Draft, table: schema.ForcingTable, clock: Clock, stop:
     plan = draft.system.components.get(table.component)
     if plan is None:
         if table.component not in draft.given.scenario.remove:
-            known = close_names(
-                table.component, list(draft.system.components), f"the case has: {', '.join(draft.tables)}"
-            )
+            names = list(draft.system.components)
+            known = close_names(table.component, names, f"the case has: {', '.join(draft.tables)}")
             draft.note(where, f"there is no component {table.component!r}; {known}")
         return []
     tunable = {_reference_of(v): v for v, info in plan.description.variables.items()
@@ -171,7 +152,7 @@ def forcing_events(draft: Draft, table: schema.ForcingTable, clock: Clock, stop:
         if end <= table.time < stop:
             draft.note(where, f"end = {end:g} s is not after time = {table.time:g} s; give a later end")
         return []
-    return [Forcing(table.time, table.component, tunable[wanted], table.frequency, table.amplitude, table.shape,
+    return [coupled.Forcing(table.time, table.component, tunable[wanted], table.frequency, table.amplitude, table.shape,
                     table.end)]  # fmt: skip
 
 
@@ -186,48 +167,51 @@ def _unit_switching(draft: Draft, table: schema.UnitSwitchingTable, grid: str) -
     if plan is None and table.unit in draft.known:
         return []  # its share is 0, or its problem is noted already
     has_breaker = plan is not None and "connected" in plan.description.variables
-    return [UnitSwitching(table.time, grid, table.unit, isinstance(table, schema.UnitReconnectionTable), has_breaker)]
+    return [
+        coupled.UnitSwitching(
+            table.time, grid, table.unit, isinstance(table, schema.UnitReconnectionTable), has_breaker
+        )
+    ]
 
 
 def _grid_or_reference_events(table: schema.EventTable, component: str) -> list[Event]:
     match table:
         case schema.LoadChangeTable():
-            return [LoadChange(table.time, component, table.load, table.scale)]
+            return [coupled.LoadChange(table.time, component, table.load, table.scale)]
         case schema.LoadTripTable():
-            return [LoadSwitching(table.time, component, table.load, 0.0)]
+            return [coupled.LoadSwitching(table.time, component, table.load, 0.0)]
         case schema.LoadReconnectionTable():
-            return [LoadSwitching(table.time, component, table.load, table.scale)]
+            return [coupled.LoadSwitching(table.time, component, table.load, table.scale)]
         case schema.LineTripTable():
-            opened = LineSwitching(table.time, component, table.line, False)
+            opened = coupled.LineSwitching(table.time, component, table.line, False)
             if table.reclose_after is None:
                 return [opened]
             return [opened, replace(opened, time=table.time + table.reclose_after, connected=True)]
         case schema.ShuntTripTable() | schema.ShuntReconnectionTable():
-            return [
-                ShuntSwitching(table.time, component, table.shunt, isinstance(table, schema.ShuntReconnectionTable))
-            ]
+            closed = isinstance(table, schema.ShuntReconnectionTable)
+            return [coupled.ShuntSwitching(table.time, component, table.shunt, closed)]
         case schema.BusFaultTable():
             return _fault(table, component)
         case schema.LineReclosingTable():
-            return [LineSwitching(table.time, component, table.line, True)]
+            return [coupled.LineSwitching(table.time, component, table.line, True)]
         case schema.BranchChangeTable():
-            return [BranchChange(table.time, component, table.line, table.X, table.R)]
+            return [coupled.BranchChange(table.time, component, table.line, table.X, table.R)]
         case schema.ReferenceChangeTable():
-            return [ReferenceChange(table.time, component, table.reference, table.delta)]
+            return [coupled.ReferenceChange(table.time, component, table.reference, table.delta)]
         case schema.ParameterChangeTable():
             value: Any = table.value  # the check converts it to the variable's type and unit
-            return [ParameterChange(table.time, component, table.parameter, value)]
+            return [coupled.ParameterChange(table.time, component, table.parameter, value)]
         case _:
             raise TypeError(f"{type(table).__name__} is no event of the grid or of a component")
 
 
 def _fault(table: schema.BusFaultTable, grid: str) -> list[Event]:
-    events: list[Event] = [BusFault(table.time, grid, table.bus, True, table.R, table.X)]
+    events: list[Event] = [coupled.BusFault(table.time, grid, table.bus, True, table.R, table.X)]
     if table.duration is not None:
         end = table.time + table.duration
-        events.append(BusFault(end, grid, table.bus, False))
+        events.append(coupled.BusFault(end, grid, table.bus, False))
         if table.cleared_by is not None:
-            events.append(LineSwitching(end, grid, table.cleared_by, False))
+            events.append(coupled.LineSwitching(end, grid, table.cleared_by, False))
     return events
 
 
@@ -248,19 +232,15 @@ def _checked(draft: Draft, event: Event, fed: Mapping[Endpoint, Endpoint], where
             elif source := fed.get(Endpoint(component, variable)):
                 draft.note(where, f"{component}.{variable} is fed by {source}; change that one's source")
             elif info.causality != "input" and info.variability != "tunable":
-                kind = f"{info.variability} {info.causality}"
-                draft.note(
-                    where, f"{component}.{variable} is a {kind}; only tunable parameters and open inputs can change"
-                )
-            elif isinstance(event, LoadSwitching) and info.minimum is not None and event.scale < info.minimum:
-                draft.note(
-                    where,
-                    f"load {event.load!r} cannot be switched off, because nothing else determines the voltage of its "
-                    "bus; give a line there some charging B, or take load_change",
-                )
+                kind = f"{component}.{variable} is a {info.variability} {info.causality}"
+                draft.note(where, f"{kind}; only tunable parameters and open inputs can change")
+            elif isinstance(event, coupled.LoadSwitching) and info.minimum is not None and event.scale < info.minimum:
+                why = "because nothing else determines the voltage of its bus"
+                remedy = "give a line there some charging B, or take load_change"
+                draft.note(where, f"load {event.load!r} cannot be switched off, {why}; {remedy}")
             else:
                 converted = convert_value(draft, info, value, where)
-                if isinstance(event, ParameterChange) and converted is not None:
+                if isinstance(event, coupled.ParameterChange) and converted is not None:
                     event = replace(event, value=converted)
     return event if len(draft.found.problems) == before else None
 
@@ -269,15 +249,15 @@ def _unknown(event: Event, component: str, variable: str, plan: ComponentPlan) -
     names = plan.description.variables
     wanted, kind, known = "", "", list[str]()
     match event:
-        case LineSwitching() | BranchChange():
+        case coupled.LineSwitching() | coupled.BranchChange():
             wanted, kind, known = event.line, "line", lines_among(names)
-        case LoadChange():
+        case coupled.LoadChange():
             wanted, kind, known = event.load, "load", _elements(names, "scale")
-        case ShuntSwitching():
+        case coupled.ShuntSwitching():
             wanted, kind, known = event.shunt, "shunt", _elements(names, "connected")
-        case BusFault():
+        case coupled.BusFault():
             wanted, kind, known = event.bus, "bus", _elements(names, "v_0")
-        case UnitSwitching():
+        case coupled.UnitSwitching():
             wanted, kind, known = event.unit, "unit", _elements(plan.description.inputs, "i_re")
     if kind and wanted not in known:
         some = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")

@@ -6,17 +6,9 @@ from itertools import pairwise
 from orchestrator.cases import schema
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.imperfection_tables import connections_meant, imperfection_of, note_long_delay
+from orchestrator.coupling import events as coupled
 from orchestrator.coupling.clock import Clock
-from orchestrator.coupling.events import (
-    Event,
-    Forcing,
-    NotANumber,
-    ParameterChange,
-    Silence,
-    UnitSwitching,
-    WireFault,
-    WireRecovery,
-)
+from orchestrator.coupling.events import Event
 from orchestrator.coupling.imperfections import DropOut
 from orchestrator.coupling.system import System
 from orchestrator.errors import InputError
@@ -47,9 +39,9 @@ def wire_events(draft: Draft, table: schema.WireEventTable, clock: Clock, stop: 
             continue
         draft.system.foresee(connection, imperfection)
         target = connection.target.component
-        events.append(WireFault(table.time, target, connection, imperfection))
+        events.append(coupled.WireFault(table.time, target, connection, imperfection))
         if end is not None:
-            events.append(WireRecovery(end, target, connection, imperfection))
+            events.append(coupled.WireRecovery(end, target, connection, imperfection))
     return events
 
 
@@ -64,17 +56,14 @@ def component_events(draft: Draft, table: schema.ComponentFaultTable, where: str
         return _trip(draft, table, where)
     if isinstance(table, schema.TimeOutTable):
         if not is_isolated(plan.description, plan.isolated):
-            draft.note(
-                where,
-                f"component {name!r} runs in this process, where nothing limits how long it takes to answer; give it "
-                "'isolated = true' to try a time-out",
-            )
+            why = f"component {name!r} runs in this process, where nothing limits how long it takes to answer"
+            draft.note(where, f"{why}; give it 'isolated = true' to try a time-out")
             return []
-        return [Silence(table.time, name)]
+        return [coupled.Silence(table.time, name)]
     if not any(c.source.component == name for c in draft.system.connections):
         draft.note(where, f"component {name!r} feeds nothing, so that nobody would notice what its outputs are")
         return []
-    return [NotANumber(table.time, name)]
+    return [coupled.NotANumber(table.time, name)]
 
 
 def component_faults(tables: Iterable[schema.EventTable], system: System) -> list[str]:
@@ -98,15 +87,15 @@ def _trip(draft: Draft, table: schema.ComponentTripTable, where: str) -> list[Ev
     port = f"{name}.{_BREAKER}"
     grid = next((other for other, plan in components.items() if port in plan.description.variables), None)
     if grid is not None:
-        return [UnitSwitching(table.time, grid, name, connected=False, has_breaker=own)]
+        return [coupled.UnitSwitching(table.time, grid, name, connected=False, has_breaker=own)]
     if own:
-        return [ParameterChange(table.time, name, _BREAKER, False)]
+        return [coupled.ParameterChange(table.time, name, _BREAKER, False)]
     given = [c for c in draft.system.connections if c.source.component == name]
     if not given:
         draft.note(where, f"component {name!r} has no breaker and feeds nothing, so that its trip would change nothing")
     for connection in given:
         draft.system.foresee(connection, DropOut(0.0))
-    return [WireFault(table.time, c.target.component, c, DropOut(0.0)) for c in given]
+    return [coupled.WireFault(table.time, c.target.component, c, DropOut(0.0)) for c in given]
 
 
 def note_conflicts(draft: Draft, events: Sequence[tuple[Event, str]], clock: Clock) -> list[Event]:
@@ -116,24 +105,21 @@ def note_conflicts(draft: Draft, events: Sequence[tuple[Event, str]], clock: Clo
         for what in _set_by(event):
             first = seen.setdefault((clock.index(event.time, "the event"), what), (event, where))
             if first[0] is not event:
-                draft.note(
-                    where,
-                    f"{what} is set at {event.time:g} s by {first[1]} already, and only one of the two could hold; "
-                    "remove one, or give it another time",
-                )
+                text = f"{what} is set at {event.time:g} s by {first[1]} already, and only one of the two could hold"
+                draft.note(where, f"{text}; remove one, or give it another time")
     obsolete = _replaced_ends(draft, events)
     return [event for event, _ in events if id(event) not in obsolete]
 
 
 def _set_by(event: Event) -> Iterator[str]:
     match event:
-        case WireFault():
+        case coupled.WireFault():
             yield f"{_kind(event)} of {event.connection}"
-        case WireRecovery():
+        case coupled.WireRecovery():
             return
-        case Forcing():
+        case coupled.Forcing():
             yield f"{event.component}.{event.variable}"
-        case NotANumber():
+        case coupled.NotANumber():
             yield f"the outputs of {event.component}"
         case _:
             for component, settings in event.changes().items():
@@ -143,12 +129,12 @@ def _set_by(event: Event) -> Iterator[str]:
 
 def _replaced_ends(draft: Draft, events: Sequence[tuple[Event, str]]) -> set[int]:
     """Ends at which another imperfection of the kind begins; one that begins before the other's end is noted."""
-    by_kind: dict[tuple[str, str], list[tuple[WireFault, WireRecovery | None, str]]] = {}
+    by_kind: dict[tuple[str, str], list[tuple[coupled.WireFault, coupled.WireRecovery | None, str]]] = {}
     for k, (event, where) in enumerate(events):
-        if isinstance(event, WireFault):
+        if isinstance(event, coupled.WireFault):
             after = events[k + 1][0] if k + 1 < len(events) else None
-            mine = isinstance(after, WireRecovery) and after.connection == event.connection
-            end = after if mine and isinstance(after, WireRecovery) else None
+            mine = isinstance(after, coupled.WireRecovery) and after.connection == event.connection
+            end = after if mine and isinstance(after, coupled.WireRecovery) else None
             by_kind.setdefault((str(event.connection), _kind(event)), []).append((event, end, where))
     obsolete = set()
     for (connection, kind), faults in by_kind.items():
@@ -157,14 +143,11 @@ def _replaced_ends(draft: Draft, events: Sequence[tuple[Event, str]]) -> set[int
                 obsolete.add(id(end))
             elif one.time < other.time and (end is None or end.time > other.time):
                 until = "the run's end" if end is None else f"{end.time:g} s"
-                draft.note(
-                    elsewhere,
-                    f"{kind} of {connection} begins at {other.time:g} s, while that of {where} lasts from "
-                    f"{one.time:g} s to {until}; give that one an end by then",
-                )
+                lasts = f"while that of {where} lasts from {one.time:g} s to {until}; give that one an end by then"
+                draft.note(elsewhere, f"{kind} of {connection} begins at {other.time:g} s, {lasts}")
     return obsolete
 
 
-def _kind(event: WireFault) -> str:
+def _kind(event: coupled.WireFault) -> str:
     kind = type(event.imperfection)
     return "the loss" if kind is DropOut else f"the {kind.__name__.lower()}"

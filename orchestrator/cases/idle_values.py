@@ -1,11 +1,15 @@
 """Values that cannot act: of a part that is switched off, or of a component that is connected with no other."""
 
 import fnmatch
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from itertools import groupby
+from types import MappingProxyType
 
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.system import System
-from orchestrator.errors import Problem
+from orchestrator.errors import Problem, few
+
+_SHOWN = 3
 
 DAMPING_CONTROLLERS = ("pod_p", "pod_q")  # parts of converters that act by a gain ``K`` and have no effect at rest
 
@@ -29,8 +33,13 @@ def why_idle(system: System, name: str, variable: str, moved: Collection[str] = 
     return ""
 
 
-def idle_values(system: System, keys: Iterable[str], places: Mapping[str, str], events: Sequence[Event]) -> Idle:
-    """What keys with patterns set, and where that cannot act; a switch that is given too, or moves later, is meant."""
+def idle_values(
+    system: System, keys: frozenset[str], places: Mapping[str, str], events: Sequence[Event],
+    absent: Mapping[str, str] = MappingProxyType({}),
+) -> Idle:  # fmt: skip
+    """What keys with patterns set, and where that cannot act; a switch that is given too, or moves later, is meant.
+
+    ``absent``: places of values that components of other scenarios were given."""
     given = [
         (name, variable)
         for pattern, _, variable in (key.partition(".") for key in keys)
@@ -40,10 +49,25 @@ def idle_values(system: System, keys: Iterable[str], places: Mapping[str, str], 
     moved = {f"{who}.{key}" for event in events for who, new in event.changes().items() for key in new}
     moved |= {f"{name}.{variable}" for name, variable in given}
     found: dict[str, Problem | None] = {}
+    for name, of_one in groupby(sorted(absent.keys() & keys), lambda key: key.partition(".")[0]):
+        missing = list(of_one)
+        text = f"{few(missing, _SHOWN)} cannot act: the scenario has no {name}"
+        found |= dict.fromkeys(missing, Problem(absent[missing[0]], text))
     for name, variable in given:
         key, why = f"{name}.{variable}", why_idle(system, name, variable, moved)
         found[key] = Problem(places.get(key, ""), f"{key} cannot act: {why}") if why else None
     return found
+
+
+def others_on(system: System, pattern: str, variable: str, said: Sequence[str]) -> list[str]:
+    """Switches of damping controllers beside one, ``pattern.variable``, that are on though no key says so."""
+    switches = {f"{controller}.enabled" for controller in DAMPING_CONTROLLERS}
+    on = [
+        f"{name}.{switch}"
+        for name, plan in system.components.items() if variable in switches and fnmatch.fnmatchcase(name, pattern)
+        for switch in sorted((switches - {variable}) & plan.description.variables.keys()) if plan.value(switch)
+    ]  # fmt: skip
+    return [other for other in on if not any(fnmatch.fnmatchcase(other, key) for key in said)]
 
 
 def idle_everywhere(scenarios: Sequence[Idle]) -> list[Problem]:

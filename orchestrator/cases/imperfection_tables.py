@@ -143,14 +143,8 @@ def signal_info(system: System, connection: Connection) -> VariableInfo:
 def is_none(imperfection: Imperfection) -> bool:
     """Whether it changes nothing: a delay, bias, deviation or step of 0."""
     match imperfection:
-        case Bias():
-            return imperfection.value == 0
-        case Noise():
-            return imperfection.deviation == 0
-        case Quantisation():
-            return imperfection.step == 0
-        case Delay():
-            return imperfection.seconds == 0
+        case Bias(value=size) | Noise(deviation=size) | Quantisation(step=size) | Delay(seconds=size):
+            return size == 0
         case _:
             return False
 

@@ -80,15 +80,19 @@ def _records(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
             yield Problem(place("solver", "record"), f"{pattern!r}: no scenario has such an output to record; {hint}")
 
 
-def _signals(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
+def shown_signals(case: CaseTable, place: Locate) -> list[tuple[str, str]]:
+    """Signals of the ring-down and of plots, each with its place."""
     entries = [(place("analysis", "ring_down"), case.analysis.ring_down.signal)] if case.analysis.ring_down else []
-    entries += [
+    return entries + [
         (place("plots", k, "panels", n, "signal"), signal)
         for k, plot in enumerate(case.plots)
         for n, panel in enumerate(plot.panels)
         for signal in (panel.signal, *panel.also)
     ]
-    for where, expression in entries:
+
+
+def _signals(case: CaseTable, named: Named, place: Locate) -> Iterator[Problem]:
+    for where, expression in shown_signals(case, place):
         yield from _signal(where, expression, named)
 
 

@@ -11,6 +11,9 @@ LONGEST = 200  # bytes of a name that becomes a file's, in UTF-8: file systems t
 TWINS = {"current_limit": "current_demand", "current_demand": "current_limit"}
 """Outputs of one meaning in EMT and phasor models."""
 
+SERVICE = ("in_service", "status", "closed", "connected", "enabled", "out", "off")
+"""What others call the switch of an element."""
+
 _RESERVED = re.compile(r"(?:con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
 _FORBIDDEN = re.compile(r'[\x00-\x1f\x7f/\\:*?"<>|]')
 

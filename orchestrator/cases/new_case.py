@@ -125,9 +125,8 @@ def write_case(wanted: WantedCase) -> NewCase:
     sources = sources_of(wanted.files)
     device = None if wanted.device is None else _described(wanted.device, wanted.binding, is_dll=wanted.is_dll)
     if "units" in sources:  # tables say neither
-        machines = {
-            bus_name(row["bus"]): number(row, "rating_mva") for row in rows_of(sources["units"], ("rating_mva",))
-        }
+        rows = rows_of(sources["units"], ("rating_mva",))
+        machines = {bus_name(row["bus"]): number(row, "rating_mva") for row in rows}
         largest = max(machines, key=machines.__getitem__)
         wanted = replace(wanted, slack=wanted.slack or largest, frequency=wanted.frequency or "50 Hz")
     base = _prepared(_Text(wanted, sources).text, wanted, ["base"])[0]
@@ -224,9 +223,8 @@ class _Place:
 def _called(files: Sequence[Path]) -> dict[str, list[str]]:
     """The buses by the names that a RAW file gives them."""
     found: dict[str, list[str]] = {}
-    for record in (
-        record for path in files if path.suffix.lower() == ".raw" for record in read_records(path).of("bus")
-    ):
+    raw = [path for path in files if path.suffix.lower() == ".raw"]
+    for record in (record for path in raw for record in read_records(path).of("bus")):
         found.setdefault(record.text(1, "").strip(), []).append(bus_name(str(record.whole(0, "the bus' number"))))
     return found
 
@@ -262,9 +260,9 @@ def _placed(wanted: WantedConverter, base: PreparedScenario, called: Mapping[str
     if wanted.less not in at_slack and abs(wanted.p_mw - power) < 1e-6:
         raise InputError(f"--converter: {wanted.less} would feed nothing; write 'instead of {wanted.less}'")
     if wanted.p_mw > power + 1e-6:
+        most = f"give the converter at most {power:.5g} MW, or leave the rest to the slack without 'less'"
         raise InputError(
-            f"--converter: {wanted.less} feeds {power:.5g} MW and cannot feed {wanted.p_mw:g} MW less; give the "
-            f"converter at most {power:.5g} MW, or leave the rest to the slack without 'less'"
+            f"--converter: {wanted.less} feeds {power:.5g} MW and cannot feed {wanted.p_mw:g} MW less; {most}"
         )
     if wanted.less in at_slack:
         return found  # the slack feeds what is left, whatever it is given
@@ -357,9 +355,8 @@ class _Text:
     def _tables(self) -> str:
         tables = [f"{k} = {self._path(self._sources[k])}" for k in ("lines_file", "loads_file") if k in self._sources]
         if "buses" in self._sources:
-            tables.append(
-                f"buses = {_listed([bus_name(row['bus']) for row in rows_of(self._sources['buses'], ('bus',))])}"
-            )
+            buses = [bus_name(row["bus"]) for row in rows_of(self._sources["buses"], ("bus",))]
+            tables.append(f"buses = {_listed(buses)}")
         return "\n".join(tables)
 
     def _converter(self) -> str:
@@ -370,9 +367,8 @@ class _Text:
         if device is not None:
             what = f"{'dll' if w.is_dll else 'fmu'} = {self._path(device)}"
             what += f"\nbinding = {self._path(w.binding)}" if w.binding else ""
-        values = (
-            f'S_n = "{place.rating_mva:g} MVA", P_0 = {place.p_mw / place.rating_mva:.6g}, v_0 = {self._place.v_pu:g}'
-        )
+        power = f"P_0 = {place.p_mw / place.rating_mva:.6g}"
+        values = f'S_n = "{place.rating_mva:g} MVA", {power}, v_0 = {self._place.v_pu:g}'
         without = values + "".join(f", pod_{x}.enabled = false" for x, starts in self._pods.items() if starts)
         still = f'model = "static_generation{"" if w.kind == "emt" else "_phasor"}"'
         parts = ((_CONVERTER, what, without, f"P_0 in parts of S_n: {place.p_mw:g} MW"),

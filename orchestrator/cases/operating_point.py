@@ -32,10 +32,8 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     slack = units.get(wanted, wanted)
     if slack not in units.values():
         known = close_names(wanted, dict.fromkeys(units.values()), f"units: {', '.join(units)}")
-        draft.note(
-            draft.given.place("power_flow", "slack"),
-            f"{wanted!r} is neither a unit of this scenario nor a bus with one; {known}",
-        )
+        text = f"{wanted!r} is neither a unit of this scenario nor a bus with one; {known}"
+        draft.note(draft.given.place("power_flow", "slack"), text)
         return None
     note_contradictions(draft, units)
     if draft.found.problems:
@@ -61,8 +59,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
 
 
 def _returning(draft: Draft) -> set[str]:
-    events = draft.given.case.events if draft.given.scenario.events is None else draft.given.scenario.events
-    return {event.unit for event in events if isinstance(event, UnitReconnectionTable)}
+    return {event.unit for event in draft.given.events if isinstance(event, UnitReconnectionTable)}
 
 
 def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
@@ -94,8 +91,8 @@ def _voltage_questions(draft: Draft, flow: PowerFlow) -> list[Problem]:
     return [
         Problem(
             draft.given.place("power_flow"),
-            f"the power flow gives voltages outside of {low:g} to {high:g} pu: {few(unusual, _SHOWN)}; check loads, "
-            "shunts and stray_B there",
+            f"the power flow gives voltages outside of {low:g} to {high:g} pu: "
+            f"{few(unusual, _SHOWN)}; check loads, shunts and stray_B there",
         )
     ]
 

@@ -36,25 +36,18 @@ def read_parameter_file(path: Path) -> ParameterFile:
             f"{path}: a parameter file needs a table [set] with values, such as\n{_EXAMPLE}\n"
             f"this one has at its top: {', '.join(raw) or 'nothing'}"
         )
-    problems = [
-        Problem(
-            _named(path, line_of(text, (key,)), key),
-            "this key is unknown; a parameter file has the table [set] and no other",
-        )
-        for key in raw
-        if key != _TABLE
-    ]
+    unknown = "this key is unknown; a parameter file has the table [set] and no other"
+    problems = [Problem(_named(path, line_of(text, (key,)), key), unknown) for key in raw if key != _TABLE]
     problems += [Problem(_place(path, text, key), TWICE) for key in given_twice(flatten(table))]
     values: dict[str, Value] = {}
     for parts, value in flatten(table):
         key = ".".join(parts)
         if "." not in key:
-            problems.append(
-                Problem(_place(path, text, key), "it is not of the form component.parameter, such as gfor.pod_p.K")
-            )
+            form = "it is not of the form component.parameter, such as gfor.pod_p.K"
+            problems.append(Problem(_place(path, text, key), form))
         elif not isinstance(value, bool | int | float | str):
-            problems.append(Problem(_place(path, text, key), f"{value!r} is neither a number, a text with a unit, "
-                                                             "nor true or false"))  # fmt: skip
+            kinds = f"{value!r} is neither a number, a text with a unit, nor true or false"
+            problems.append(Problem(_place(path, text, key), kinds))
         else:
             values[key] = value
     if problems:

@@ -15,6 +15,7 @@ from orchestrator.cases.plausible_networks import network_doubts
 from orchestrator.cases.plausible_ranges import SMALLEST_SHARE
 from orchestrator.cases.plausible_sources import SOLVED, source_doubts
 from orchestrator.cases.plausible_values import UnusualValue, outside, place_of, unit_of, value_of
+from orchestrator.cases.power_flow import PowerFlow
 from orchestrator.coupling.schedule import SECOND_ORDER
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import Problem, few
@@ -107,10 +108,8 @@ def _check_meant(draft: Draft) -> None:
         elsewhere = variable in (*PARTS, SOLVED) or variable.partition(".")[0] in _OF_PARTS
         here = (v for p in plans for v in p.description.variables)
         if plans and not elsewhere and not any(fnmatch.fnmatchcase(v, variable) for v in here):
-            draft.note(
-                draft.given.place("meant"),
-                f"{pattern!r}: {component} has no variable {variable!r}; `gfor fmu info` lists them",
-            )
+            text = f"{component} has no variable {variable!r}; `gfor fmu info` lists them"
+            draft.note(draft.given.place("meant"), f"{pattern!r}: {text}")
 
 
 def _doubts(draft: Draft) -> Iterator[UnusualValue]:
@@ -154,11 +153,29 @@ def _ratings(draft: Draft) -> Iterator[UnusualValue]:
             yield UnusualValue(f"{name}.{rated}", draft.given.place("components", name, "binding"), text)
 
 
-def question_loading(draft: Draft) -> None:
-    """Ask about units whose operating point exceeds their rating, of machines in active power. It is the power flow's
-    if there is one."""
+def question_loading(draft: Draft, flow: PowerFlow | None) -> None:
+    """Ask about units whose operating point exceeds their rating, of machines in active power, and about powers that
+    another rating moves. The operating point is the power flow's if there is one."""
+    question(draft, _rescaled(draft, flow))
     asked = {question.place for question in draft.found.questions}  # one question about a rating is enough
     question(draft, (d for d in _overloaded(draft) if d.place not in asked))
+
+
+def _rescaled(draft: Draft, flow: PowerFlow | None) -> Iterator[UnusualValue]:
+    """Powers in parts of a rating from outside, where nothing from there says the power too."""
+    said = [key for key in draft.given.from_outside if key.endswith(".P_0")]
+    for name, before in draft.found.ratings.items():
+        plan = draft.system.components[name]
+        P, S_n = value_of(plan, "P_0"), value_of(plan, "S_n")
+        if flow is None or name not in flow.powers or name in flow.balancing or not P or not S_n or S_n == before:
+            continue
+        if unit_of(plan, "P_0") == "pu" and not any(fnmatch.fnmatchcase(f"{name}.P_0", key) for key in said):
+            text = (
+                f"S_n = {S_n:g} MVA where the file has {before:g} MVA moves its power from {P * before:.4g} to "
+                f"{P * S_n:.4g} MW, which {flow.slack}, the slack, takes up: P_0 = {P:.4g} is in parts of S_n"
+            )
+            text += f", and {name}.P_0={P * before / S_n:.4g} keeps the power" if abs(P * before) <= S_n else ""
+            yield UnusualValue(f"{name}.S_n", place_of(draft, name, "S_n"), text)
 
 
 def overloads(plans: Mapping[str, ComponentPlan], meant: Iterable[str]) -> dict[str, float]:

@@ -9,7 +9,7 @@ from statistics import median
 from fmus.grid.network import Line, Network, ThreeWinding
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.plausible_ranges import COMPENSATION, LINE_B, LINE_RATIO, LINE_X, MOST_R_OVER_X, STRAY_B
-from orchestrator.cases.plausible_values import UnusualValue, outside, value_of
+from orchestrator.cases.plausible_values import UnusualValue, outside, place_of_source, value_of
 from orchestrator.coupling.system import ComponentPlan
 from orchestrator.errors import few
 
@@ -146,9 +146,4 @@ def _place(draft: Draft, kind: str, element: str, key: str, *variables: str) -> 
     if table is not None and element in getattr(table, kind):
         return draft.given.place("network", kind, element, key)
     in_file = draft.data.places.get(element) if draft.data else None
-    source = next((key for key in ("pandapower", "matpower", "raw") if table is not None and getattr(table, key)), None)
-    what = "line" if kind == "lines" else "transformer"
-    return (
-        in_file
-        or f"{draft.given.place('network', source) if source else draft.given.place('network')}, {what} {element!r}"
-    )
+    return in_file or f"{place_of_source(draft)}, {'line' if kind == 'lines' else 'transformer'} {element!r}"

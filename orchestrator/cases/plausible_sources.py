@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from orchestrator.cases.draft import Draft
-from orchestrator.cases.plausible_values import UnusualValue, place_of, unit_of, value_of
+from orchestrator.cases.plausible_values import UnusualValue, place_of, place_of_source, unit_of, value_of
 from orchestrator.coupling.system import ComponentPlan
 
 SOLVED = "solved"  # of the grid, in ``meant``: the source's voltages are a flat start on purpose
@@ -28,7 +28,7 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
         or draft.given.case.network is None
     ):
         return
-    where = _place(draft)
+    where = place_of_source(draft)
     if draft.data.misfit:
         yield UnusualValue(f"{draft.grid}.{SOLVED}", where, draft.data.misfit)
     yield from _negative_loads(draft, draft.grid, where)
@@ -39,12 +39,6 @@ def source_doubts(draft: Draft) -> Iterator[UnusualValue]:
     yield from _saturation(draft)
     yield from _own_converters(draft)
     yield from _unlike_others(draft)
-
-
-def _place(draft: Draft) -> str:
-    table = draft.given.case.network
-    source = next((k for k in ("raw", "matpower", "pandapower", "cgmes") if table and getattr(table, k)), None)
-    return draft.given.place("network", source) if source else draft.given.place("network")
 
 
 def _negative_loads(draft: Draft, grid: str, where: str) -> Iterator[UnusualValue]:

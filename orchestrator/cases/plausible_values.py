@@ -26,6 +26,13 @@ def place_of(draft: Draft, name: str, *variables: str) -> str:
     )
 
 
+def place_of_source(draft: Draft) -> str:
+    """The key that names another program's data, or else the table of the network."""
+    table = draft.given.case.network
+    source = [key for key in ("raw", "matpower", "pandapower", "cgmes") if table and getattr(table, key)]
+    return draft.given.place("network", *source[:1])
+
+
 def value_of(plan: ComponentPlan, variable: str) -> float | None:
     value = plan.value(variable) if variable in plan.description.variables else None
     return None if value is None or isinstance(value, bool | str) else float(value)

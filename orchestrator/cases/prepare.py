@@ -127,10 +127,8 @@ class Preparer:
         draft = self.draft
         for name in draft.given.scenario.remove:
             if name not in draft.known:
-                draft.note(
-                    draft.given.place("scenarios", draft.given.name, "remove"),
-                    f"there is no component {name!r} to remove",
-                )
+                where = draft.given.place("scenarios", draft.given.name, "remove")
+                draft.note(where, f"there is no component {name!r} to remove")
         check_network_is_used(draft, self._everything)
         find_network(draft, self._everything)
         for name, table in draft.tables.items():
@@ -146,7 +144,7 @@ class Preparer:
         check_inputs(draft)
         check_plausibility(draft)
         flow = None if draft.found.problems else power_flow_of(draft)
-        question_loading(draft)
+        question_loading(draft, flow)
         clock = clock_of(draft, step_size)
         told: frozenset[str] = frozenset()
         if clock is not None:
@@ -166,32 +164,18 @@ class Preparer:
         loads = draft.network.loads if draft.network else ()
         draft.found.questions += open_question(draft.given.case.network, loads, draft.given.place("network"))
         draft.found.questions += [*doubts(draft.given.case, draft.given.place), *self._area_questions()]
+        plans = draft.system.components
         return PreparedScenario(
-            case=self._case,
-            name=draft.given.name,
-            title=draft.given.scenario.title or draft.given.name,
-            system=draft.system,
-            schedule=schedule,
-            step_size=clock.step_size,
-            stop_time=stop,
-            record=record,
-            record_every=every,
-            record_filtered=draft.given.case.solver.record_filter == "low-pass",
-            events=events,
-            not_reached=tuple(sorted(draft.found.not_reached)),
-            power_flow=flow,
-            values={f"{n}.{v}": x for n, p in draft.system.components.items() for v, x in p.parameters.items()}
-            | imperfections,
-            questions=tuple(draft.found.questions),
-            about_rows=(*about_rows, *left_out),
-            references=references,
-            places={name: draft.place_of_component(name) for name in draft.system.components},
-            told=told,
-            network=draft.network,
-            source_slack=draft.data.slack if draft.data else None,
-            idle=idle_values(draft.system, draft.given.from_outside, draft.places, events),
+            self._case, draft.given.name, draft.given.scenario.title or draft.given.name, draft.system, schedule,
+            clock.step_size, stop, record, every, events, flow,
+            {f"{n}.{v}": x for n, p in plans.items() for v, x in p.parameters.items()} | imperfections,
+            questions=tuple(draft.found.questions), about_rows=(*about_rows, *left_out), references=references,
+            record_filtered=draft.given.case.solver.record_filter == "low-pass", told=told, network=draft.network,
+            places={name: draft.place_of_component(name) for name in plans},
+            not_reached=tuple(sorted(draft.found.not_reached)), source_slack=draft.data.slack if draft.data else None,
+            idle=idle_values(draft.system, draft.given.from_outside, draft.places, events, draft.found.absent),
             given={key: value for layer in draft.given.layers for key, value in layer.given.items()},
-        )
+        )  # fmt: skip
 
     def _add_component(self, name: str, table: ComponentTable) -> None:
         where = self.draft.given.place("components", name)
@@ -291,11 +275,9 @@ class Preparer:
         return planned.description
 
     def _area_questions(self) -> list[Problem]:
-        areas = self.draft.given.case.analysis.areas
+        given, system = self.draft.given, self.draft.system
+        counts = "{} is in {}; it counts to {}, the first"
         return [
-            Problem(
-                self.draft.given.place("analysis", "areas", found[1]),
-                f"{name} is in {' and '.join(found)}; it counts to {found[0]}, the first",
-            )
-            for name, found in in_two_areas(areas, self.draft.system).items()
+            Problem(given.place("analysis", "areas", found[1]), counts.format(name, " and ".join(found), found[0]))
+            for name, found in in_two_areas(given.case.analysis.areas, system).items()
         ]

@@ -4,6 +4,7 @@ import fnmatch
 from collections.abc import Sequence
 
 from orchestrator.cases.draft import Draft
+from orchestrator.cases.mentions import shown_signals
 from orchestrator.cases.names import close_names, variables_of
 from orchestrator.cases.scheduling import schedule_of
 from orchestrator.cases.schema import LONGEST_STEP, ForcingTable
@@ -43,10 +44,8 @@ def check_length(draft: Draft, clock: Clock | None, stop: float) -> None:
 def checked_schedule(draft: Draft) -> Schedule:
     schedule, solver = _chosen(draft), draft.given.case.solver
     if solver.tolerance is not None and not schedule.is_second_order:
-        draft.note(
-            draft.given.place("solver", "tolerance"),
-            f'a tolerance goes with schedule = "midpoint" or "newton", not with {solver.schedule!r}',
-        )
+        text = f'a tolerance goes with schedule = "midpoint" or "newton", not with {solver.schedule!r}'
+        draft.note(draft.given.place("solver", "tolerance"), text)
     if draft.found.network_failed:
         return schedule
     try:
@@ -99,22 +98,13 @@ def recorded(draft: Draft) -> tuple[tuple[str, ...], list[Problem]]:
     questions: list[Problem] = []
     plans = {name: plan.description for name, plan in draft.system.components.items()}
     outputs = [f"{n}.{v}" for n, fmu in plans.items() for v in fmu.outputs if fmu.variables[v].type == "Real"]
-    events = draft.given.case.events if draft.given.scenario.events is None else draft.given.scenario.events
-    forced = any(isinstance(event, ForcingTable) for event in events)
+    forced = any(isinstance(event, ForcingTable) for event in draft.given.events)
     patterns = [*draft.given.case.solver.record, *(NEEDED_FOR_SOURCES if forced else ())]
     wanted = {name for pattern in patterns for name in fnmatch.filter(outputs, pattern)}
     if outputs and not wanted and draft.given.case.solver.record:
         text = f"nothing is recorded in scenario {draft.given.name!r}: none of its outputs fits a pattern"
         questions.append(Problem(draft.given.place("solver", "record"), text))
-    ring = draft.given.case.analysis.ring_down
-    shown = [(draft.given.place("analysis", "ring_down"), ring.signal)] if ring else []
-    shown += [
-        (draft.given.place("plots", k, "panels", n, "signal"), signal)
-        for k, plot in enumerate(draft.given.case.plots)
-        for n, panel in enumerate(plot.panels)
-        for signal in (panel.signal, *panel.also)
-    ]
-    for place, expression in shown:
+    for place, expression in shown_signals(draft.given.case, draft.given.place):
         if missing := [name for name in _variables(expression) if name in outputs and name not in wanted]:
             text = f"{expression!r} is not shown, because solver.record leaves out {' and '.join(missing)}"
             questions.append(Problem(place, text))

@@ -177,12 +177,10 @@ def shared_flow(
     change, before = dispatch.change, (0.0, 0.0)
     for _ in range(_ROUNDS):
         found = shares(reserves, change)
-        flow = solve(
-            [
-                replace(one, P_0=found[one.name] / one.S_n) if one.name in found and one.connected else one
-                for one in left
-            ]
-        )
+        moved = {
+            one.name: replace(one, P_0=found[one.name] / one.S_n) for one in left if one.name in found and one.connected
+        }
+        flow = solve([moved.get(one.name, one) for one in left])
         missing = sum(flow.powers[name].real * rating[name] - found[name] for name in at_slack)
         if abs(missing) <= _CLOSE:
             return replace(flow, powers=_as_shared(flow, found, rating, at_slack))

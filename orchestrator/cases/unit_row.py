@@ -40,23 +40,16 @@ class UnitRow:
 
 
 def checked(row: UnitRow, place: str) -> UnitRow:
+    unit = f"{place}: the unit at bus {row.label}"
     if not row.rating_mva > 0:
-        raise InputError(
-            f"{place}: the unit at bus {row.label} has a rating of {row.rating_mva:g} MVA; it must exceed 0"
-        )
+        raise InputError(f"{unit} has a rating of {row.rating_mva:g} MVA; it must exceed 0")
     if abs(row.p_mw) > row.rating_mva:
-        raise InputError(
-            f"{place}: the unit at bus {row.label} feeds {row.p_mw:g} MW, more than its rating of "
-            f"{row.rating_mva:g} MVA; raise the rating or lower p_mw"
-        )
+        most = f"its rating of {row.rating_mva:g} MVA; raise the rating or lower p_mw"
+        raise InputError(f"{unit} feeds {row.p_mw:g} MW, more than {most}")
     if not row.q_min_mvar <= row.q_max_mvar:
-        raise InputError(
-            f"{place}: the unit at bus {row.label} has q_min_mvar = {row.q_min_mvar:g}, more than its q_max_mvar = "
-            f"{row.q_max_mvar:g}; swap them"
-        )
+        limits = f"q_min_mvar = {row.q_min_mvar:g}, more than its q_max_mvar = {row.q_max_mvar:g}"
+        raise InputError(f"{unit} has {limits}; swap them")
     if not 0 < row.v_pu <= _MOST_VOLTAGE:
-        raise InputError(
-            f"{place}: the unit at bus {row.label} has v_pu = {row.v_pu:g}; it is in pu of the nominal voltage, and "
-            f"must lie between 0 and {_MOST_VOLTAGE:g}"
-        )
+        rule = f"it is in pu of the nominal voltage, and must lie between 0 and {_MOST_VOLTAGE:g}"
+        raise InputError(f"{unit} has v_pu = {row.v_pu:g}; {rule}")
     return row

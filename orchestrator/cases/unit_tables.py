@@ -52,10 +52,8 @@ def unit_components(draft: Draft) -> dict[str, ComponentTable]:
     for row in rows:
         if draft.data is not None and draft.data.buses and row.bus not in draft.data.buses:
             hint = close_names(row.bus, draft.data.buses, f"there are: {few(draft.data.buses, 8)}")
-            draft.note_network(
-                row.place or draft.given.place("units"),
-                f"the unit at bus {row.label}: the network has no bus {row.bus!r}; {hint}",
-            )
+            text = f"the unit at bus {row.label}: the network has no bus {row.bus!r}; {hint}"
+            draft.note_network(row.place or draft.given.place("units"), text)
     alphas = _alphas(draft, table, rows)
     models = (
         (table.generator, "generator_parameters", table.generator_parameters),

@@ -81,20 +81,15 @@ def check_inputs(draft: Draft) -> None:
     """Every input needs a source, and only one."""
     for wire in draft.system.connections:
         if wire.target.variable in draft.system.components[wire.target.component].inputs:
-            draft.note(
-                draft.given.place("components", wire.target.component, "inputs"),
-                f"{wire.target} is given a constant, but {wire.source} feeds it; remove the one or the other",
-            )
+            text = f"{wire.target} is given a constant, but {wire.source} feeds it; remove the one or the other"
+            draft.note(draft.given.place("components", wire.target.component, "inputs"), text)
     for endpoint in draft.system.unconnected_inputs():
         if draft.found.network_failed and (draft.tables[endpoint.component].bus or endpoint.component == draft.grid):
             continue
         if endpoint.component == draft.grid and endpoint.variable.rpartition(".")[0] in draft.found.misfits:
             continue
-        draft.note(
-            draft.given.place("components", endpoint.component),
-            f"scenario {draft.given.name!r}: nothing feeds the input {endpoint}; "
-            "connect it, or give it a constant under 'inputs'",
-        )
+        text = f"nothing feeds the input {endpoint}; connect it, or give it a constant under 'inputs'"
+        draft.note(draft.given.place("components", endpoint.component), f"scenario {draft.given.name!r}: {text}")
 
 
 def _connect_to_bus(draft: Draft, name: str, bus: str, taken: list[str]) -> None:

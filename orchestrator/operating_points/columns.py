@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from orchestrator.cases.names import close_names
+from orchestrator.cases.names import SERVICE, close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import convert
@@ -99,6 +99,8 @@ def reading_of(column: str, elements: Elements, prepared: PreparedScenario) -> R
     if column == "generation":
         return lambda text: _generation(_factor(column, text), elements, prepared)
     name, dot, quantity = column.partition(".")
+    if quantity in SERVICE and quantity != IN_SERVICE and name in {*elements.lines, *elements.loads, *elements.shunts}:
+        raise InputError(f"{name} is switched by the column {name}.{IN_SERVICE}, with 1 or 0")
     if dot and quantity == IN_SERVICE:
         return _service(column, name, elements, prepared)
     if dot and quantity in (ACTIVE, REACTIVE):

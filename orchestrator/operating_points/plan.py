@@ -48,7 +48,7 @@ def read_operating_points(
     elements = Elements.of(prepared)
     own = OperatingCase("case", 1.0, {}, (), str(case.path))
     rows = [own] if points is None else read_points(Path(points), prepared, elements)
-    asked = () if points is None else tuple(questions_about(Path(points), prepared, elements))
+    asked = () if points is None else tuple(questions_about(Path(points), rows, prepared, elements))
     lost = read_outages(cast("str | None", outages), elements)
     if len(rows) * len(lost) > _MOST:
         raise InputError(

@@ -2,19 +2,21 @@
 
 import fnmatch
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from orchestrator.cases.csv_rows import PLACE, Row, place_of, rows_of
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
+from orchestrator.cases.sharing import load_of
 from orchestrator.errors import InputError, Problem
 from orchestrator.operating_points.columns import ACTIVE, IN_SERVICE, Elements, Reading, Setting, own_power, reading_of
 from orchestrator.units import read_value
 
 _LABELS = ("time", "name")
 _ANOTHER_UNIT = 25.0  # times smaller than the case's own is a whole column of powers that is asked about
+_LEFT = 0.05  # part of the case's load that is asked about where points leave it to the slack
 
 
 @dataclass(frozen=True)
@@ -83,8 +85,11 @@ def _name_of(row: Row, label: str) -> str:
     return name
 
 
-def questions_about(path: Path, prepared: PreparedScenario, elements: Elements) -> Iterator[Problem]:
-    """Questions about the columns of a file that `read_points` has read: powers that cannot act, or look like pu."""
+def questions_about(
+    path: Path, points: Sequence[OperatingCase], prepared: PreparedScenario, elements: Elements
+) -> Iterator[Problem]:
+    """Questions about a file that `read_points` has read: powers that cannot act, or look like pu, or that nobody but
+    the slack feeds."""
     rows = rows_of(path, ())
     for column in rows[0]:
         place, own = f"{path}, line 1: column {column!r}", own_power(column, elements, prepared)
@@ -97,6 +102,26 @@ def questions_about(path: Path, prepared: PreparedScenario, elements: Elements) 
             unit = "MW" if column.endswith(ACTIVE) else "Mvar"
             text = f"at most {most:g} {unit}, where the case itself has {own:.4g} {unit}; are these values in pu?"
             yield Problem(place, text)
+    others = [unit for unit in elements.units if unit not in elements.balancing]
+    if not others or any(f"{unit}.P_0" in point.values for point in points for unit in others):
+        return
+    load = load_of(elements.loads, prepared.system.components[elements.grid])
+    more = {point.name: _drawn(point, prepared, elements) - load for point in points}
+    for name, out in ((point.name, point.out) for point in points):
+        more[name] += sum(own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in others if unit in out)
+    worst = max(more, key=lambda name: abs(more[name]))
+    if abs(more[worst]) > _LEFT * abs(load):
+        who, which = ", ".join(elements.balancing) or elements.slack, "more" if more[worst] > 0 else "less"
+        text = f"at {worst} the slack ({who}) feeds {abs(more[worst]):.4g} MW {which}, as no column gives other units"
+        yield Problem(str(path), f"{text} a power: add UNIT.P_mw or a factor 'generation', 1 where the slack is meant")
+
+
+def _drawn(point: OperatingCase, prepared: PreparedScenario, elements: Elements) -> float:
+    """Active power of the loads at a point [MW]."""
+    plan, head = prepared.system.components[elements.grid], f"{elements.grid}."
+    own = {k.removeprefix(head): v for k, v in point.values.items() if k.startswith(head) and not isinstance(v, str)}
+    on = [load for load in elements.loads if load not in point.out]
+    return load_of(on, replace(plan, parameters=plan.parameters | own))
 
 
 def _reading(path: Path, column: str, elements: Elements, prepared: PreparedScenario) -> Reading:
@@ -151,9 +176,8 @@ class _Values:
         """Add a column's values; a unit's own power goes before the factor of all."""
         for key, value in values.items():
             if self._by.get(key, "generation") != "generation":
-                raise InputError(
-                    f"{self._place}: the columns {self._by[key]} and {column} both set {key}; leave one of them empty"
-                )
+                both = f"the columns {self._by[key]} and {column} both set {key}; leave one of them empty"
+                raise InputError(f"{self._place}: {both}")
             self.found[key], self._by[key] = value, column
 
 
@@ -203,20 +227,17 @@ def _hours(row: Row, place: str) -> float:
 def _check_switches(settings: Mapping[str, Setting], elements: Elements, place: str) -> None:
     switched = {column.partition(".")[0]: column for column in settings if column.endswith(f".{IN_SERVICE}")}
     for column in settings:
-        component, _, variable = column.partition(".")
         for name, other in switched.items():
-            if (variable == "connected" and fnmatch.fnmatchcase(name, component)) or (
-                variable == f"{name}.connected" and fnmatch.fnmatchcase(elements.grid, component)
-            ):
-                raise InputError(
-                    f"{place}: the columns {other} and {column} both switch {name}; leave one of them empty"
-                )
+            switches = (f"{name}.connected", f"{elements.grid}.{name}.connected")
+            if any(fnmatch.fnmatchcase(switch, column) for switch in switches):
+                both = f"the columns {other} and {column} both switch {name}; leave one of them empty"
+                raise InputError(f"{place}: {both}")
 
 
 def _check_slack(out: tuple[str, ...], elements: Elements, place: str) -> None:
     left = {bus for unit, bus in elements.units.items() if unit not in out}
     if elements.slack and elements.slack not in left:
-        raise InputError(
-            f"{place}: all units at the slack bus {elements.slack} are out of service, so nothing feeds what is left; "
-            "take another slack in [power_flow]"
+        out_of_service = (
+            f"all units at the slack bus {elements.slack} are out of service, so nothing feeds what is left"
         )
+        raise InputError(f"{place}: {out_of_service}; take another slack in [power_flow]")

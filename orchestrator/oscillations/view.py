@@ -108,7 +108,8 @@ def sources_table(found: Sequence[Sources]) -> PlainTable:
 
 def _rows(one: Sources) -> Iterator[Sequence[str]]:
     for x in one:
-        begin = "before" if x.found.begin is None else f"{x.found.begin:.1f}"
+        half = 1.5 / x.found.frequency  # of the window that sees it begin
+        begin = f"in the first {half:.1f}" if x.found.begin is None else f"{x.found.begin:.1f} ± {half:.1f}"
         multiples = ", ".join(str(order) for order in x.found.harmonics)
         source = x.source or (f"{x.drives}, perhaps others" if x.drives else "not known")
         yield one.label, f"{x.found.frequency:.4f}", str(x.evidence.kind), source, begin, multiples

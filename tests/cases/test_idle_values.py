@@ -46,10 +46,17 @@ def test_lead_and_lag_of_a_gain_of_0_and_what_is_connected_with_nothing():
     assert why_idle(prepared.system, "gfor", "pod_p.T_S1", {"gfor.pod_p.K"}) == ""
     alone = System()
     alone.components.update(prepared.system.components)
-    idle = idle_values(alone, ["grid.X_L"], {"grid.X_L": "here"}, ())
+    idle = idle_values(alone, frozenset(["grid.X_L"]), {"grid.X_L": "here"}, ())
     assert [str(q) for q in idle_everywhere([idle])] == [
         "here: grid.X_L cannot act: grid is connected with no other component"
     ]
+
+
+@pytest.mark.parametrize(("scenarios", "told"), [(["base"], 1), (["gfor"], 0), (["base", "gfor"], 0)])
+def test_values_for_a_component_of_another_scenario_are_told_once(scenarios, told):
+    prepared = CASE.prepare(scenarios, {"gfor.P_0": 0.4, "gfor.v_0": 1.0})
+    found = [str(q) for q in prepared[0].questions if "cannot act" in str(q)]
+    assert found == ["--set gfor.P_0: gfor.P_0, gfor.v_0 cannot act: the scenario has no gfor"] * told
 
 
 @pytest.mark.parametrize(("scenarios", "told"), [(["gfor"], 1), (["gfor", "pod_p"], 0)])

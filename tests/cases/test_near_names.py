@@ -97,3 +97,19 @@ def test_a_component_that_is_not_there_has_no_variable(monkeypatch):
     draft = SimpleNamespace(system=SimpleNamespace(components={"sg1": plan}))
     asked = (("sg1", "H"), ("sg1", "K"), ("sg1", "X"), ("sg2", "H"), ("sg2", "K"))
     assert [assignment._has(draft, *one) for one in asked] == [True, True, False, False, False]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("L.in_service", 0, "L is switched off by grid.L.connected=false"),
+        ("grid.L.status", 1, "L is switched on by grid.L.connected=true"),
+        ("L.connected", False, "L is switched off by grid.L.connected=false"),
+        ("sg1.out", True, "sg1 is switched off by sg1.connected=false"),
+        ("load_2.closed", False, "load_2 is switched off by grid.load_2.scale=0"),
+    ],
+)
+def test_an_outage_in_other_words_is_one_error_with_ours(key, value, words):
+    with pytest.raises(CaseError) as caught:
+        load_case("two_area").prepare(["base"], {key: value})
+    assert [str(p) for p in caught.value.problems] == [f"--set {key}: {words}; write that"]

@@ -2,13 +2,14 @@
 
 import io
 import sys
+import tomllib
 from dataclasses import replace
 from functools import partial
 
 import pytest
 
 from orchestrator.analysis.continuation import ModesMeetError
-from orchestrator.cases.case import load_case
+from orchestrator.cases.case import case_of_text, load_case
 from orchestrator.cases.new_case import WantedCase, _switched, read_converter, write_case
 from orchestrator.cases.parameter_files import read_parameter_file
 from orchestrator.errors import CaseError, InputError
@@ -65,6 +66,24 @@ def test_the_converter_takes_over_what_the_machine_feeds_less(files):
     assert compute_modes(converter).stability.stable
 
 
+@pytest.mark.parametrize(
+    ("edit", "asked"),
+    [
+        (('"100 MVA", P_0 = 0.6', '"100 MVA", P_0 = 0.6'), 0),
+        (('"100 MVA", P_0 = 0.6', '"100 MVA", P_0 = 0.9'), 1),
+        (('"100 MVA", P_0 = 0.6', '"200 MVA", P_0 = 0.6'), 1),
+        (('"100 MVA", P_0 = 0.6', '"0.2 GVA", P_0 = 0.3'), 0),
+    ],
+)
+def test_a_device_of_another_power_than_what_stands_for_it_is_asked_about(files, edit, asked):
+    case, new = made(files)
+    text = new.text.replace(*edit, 1)  # of the device, which comes first
+    case = case_of_text(text, tomllib.loads(text), case.path)
+    found = [str(q) for q in case.prepare(["base"])[0].questions if "which stands for it" in str(q)]
+    assert len(found) == asked
+    assert all("gfor feeds " in one for one in found)
+
+
 def test_a_file_of_values_is_for_the_scenario_it_was_made_for(files, tmp_path):
     case, _ = made(files)
     (tmp_path / "pod.toml").write_text('[set]\n"gfor.pod_p.enabled" = true\n')
@@ -75,6 +94,9 @@ def test_a_file_of_values_is_for_the_scenario_it_was_made_for(files, tmp_path):
     (alone,) = case.prepare(["converter"], {"sg1.machine.H": 4.0}, parameters=[file])
     assert alone.changed == "pod.toml, sg1.machine.H = 4.0"
     assert case.prepare(["converter"])[0].changed == ""
+    with pytest.raises(CaseError, match=r"it would switch this on in pod_q beside gfor.pod_q.enabled, where it is off"):
+        case.prepare(["pod_q"], parameters=[file])
+    case.prepare(["pod_q"], {"gfor.pod_q.enabled": True}, parameters=[file])  # who says so means both
 
 
 def test_a_mode_is_followed_along_the_gains_to_what_the_device_brings(files, monkeypatch):

@@ -322,6 +322,22 @@ generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0, machine.T
     assert re.match(r".*units.csv, line 5, sg33.machine.H: sg33: machine.H = 6500 s", own)
 
 
+@pytest.mark.parametrize(
+    ("values", "moves"),
+    [
+        ({"sg1.S_n": "1800 MVA"}, "moves its power from 1350 to 1620 MW, which "),
+        ({"sg1.S_n": "1800 MVA", "sg1.P_0": 0.75}, ""),
+        ({"sg1.S_n": "1500 MVA"}, ""),
+        ({"sg2.S_n": "6000 MVA"}, ""),  # it feeds what is left
+    ],
+)
+def test_a_rating_that_moves_a_power_is_asked_about(values, moves):
+    found = [
+        str(q) for q in load_case("two_area").prepare(["base"], values)[0].questions if "in parts of S_n" in str(q)
+    ]
+    assert [moves in text for text in found] == [True] * bool(moves), found
+
+
 def test_questions_about_two_values_at_one_place_both_stay():
     found = SimpleNamespace(questions=[])
     draft = SimpleNamespace(found=found, given=SimpleNamespace(case=SimpleNamespace(meant=())))

@@ -171,12 +171,40 @@ def test_powers_are_shared_and_loads_draw_what_is_said(two_area, tmp_path):
     assert both.values["grid.load_3.scale"] == 0.5
 
 
+def questions(path, prepared, elements):
+    return [str(one) for one in questions_about(path, read_points(path, prepared, elements), prepared, elements)]
+
+
+@pytest.mark.parametrize(
+    ("columns", "cells", "left"),
+    [
+        ("load", "0.9", "less"),
+        ("load_2.P_mw", "2000", "less"),
+        ("load_3.in_service", "0", "less"),
+        ("sg1.in_service", "0", "more"),
+        ("load,generation", "0.9,1", ""),
+        ("load,sg1.P_mw", "0.9,800", ""),
+        ("load", "0.99", ""),
+        ("sg1.P_mw", "600", ""),
+    ],
+)
+def test_a_load_that_only_the_slack_follows_is_asked_about(two_area, tmp_path, columns, cells, left):
+    _, prepared, elements = two_area
+    path = tmp_path / "points.csv"
+    path.write_text(f"name,{columns}\nas it is{',' * cells.count(',')},\nother,{cells}\n")
+    found = questions(path, prepared, elements)
+    assert len(found) == bool(left)
+    if left:
+        assert f"at other the slack ({', '.join(elements.balancing)}) feeds " in found[0]
+        assert f" MW {left}, as no column gives other units a power" in found[0]
+
+
 def test_powers_that_look_like_pu_are_asked_about(two_area, tmp_path):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
     for units, asked in ((1.0, []), (0.01, ["sg1.P_mw", "load_2.P_mw"])):
         path.write_text(f"name,sg1.P_mw,load_2.P_mw,load\na,{900 * units},{1100 * units},0.9\nb,0,,1\n")
-        found = [str(one) for one in questions_about(path, prepared, elements)]
+        found = questions(path, prepared, elements)
         assert len(found) == len(asked)
         assert all(name in text and "in pu?" in text for name, text in zip(asked, found, strict=True))
 
@@ -185,13 +213,13 @@ def test_powers_that_look_like_pu_are_asked_about(two_area, tmp_path):
 def test_a_power_of_the_slacks_unit_is_asked_about(two_area, tmp_path, column):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
-    path.write_text(f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,700,900,1\nb,,,1\n")
-    (found,) = [str(one) for one in questions_about(path, prepared, elements)]
+    path.write_text(f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,0.7,900,1\nb,,,1\n")
+    (found,) = questions(path, prepared, elements)
     assert (
         f"cannot act on {', '.join(elements.balancing)}: {elements.slack} is the slack and feeds what is left" in found
     )
     path.write_text("name,sg2.P_mw,generation\na,,0.9\n")
-    assert not [*questions_about(path, prepared, elements)], "an empty column gives no power"
+    assert not questions(path, prepared, elements), "an empty column gives no power"
     (point,) = read_points(path, prepared, elements)
     assert {name for name in point.values if name.endswith(".P_0")} == {
         f"{unit}.P_0" for unit in elements.units if unit not in elements.balancing
