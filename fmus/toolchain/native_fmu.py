@@ -18,15 +18,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 from fmus.toolchain import description_common as common
 from fmus.toolchain.archive import digest_of, guid_of
 from fmus.toolchain.c_text import c_number, c_string, identity_source
-from fmus.toolchain.compiler import (
-    ENDINGS,
-    TARGETS,
-    compile_for,
-    compile_library,
-    joined_source,
-    library_of,
-    recipe,
-)  # fmt: skip
+from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_library, joined_source, library_of, recipe
 from fmus.toolchain.description import model_description, with_guid
 from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.extras import installed_version
@@ -160,7 +152,6 @@ def _adjoint(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> F
 
 
 LIBRARIES = {version: (_C / "native.c", _C / f"fmi{version[0]}.c") for version in ("2.0", "3.0")}
-_KINDS = ("Real", "Integer", "Boolean")
 
 
 def model_data(model: Model, tape: bytes, digest: str) -> bytes:
@@ -174,7 +165,7 @@ def model_data(model: Model, tape: bytes, digest: str) -> bytes:
     parts += [bytes.fromhex(digest)[:16], array("d", start).tobytes()]
     for p in parameters:
         bounds = -inf if p.minimum is None else p.minimum, inf if p.maximum is None else p.maximum
-        parts.append(struct.pack("<2d2i", *bounds, _KINDS.index(p.type), p.tunable))
+        parts.append(struct.pack("<2d2i", *bounds, [*_TYPES].index(p.type), p.tunable))
     content = b"".join([*parts, text, tape])
     return struct.pack("<8s3I", b"gformodl", VERSION, 20 + len(content), zlib.crc32(content)) + content
 
@@ -211,7 +202,7 @@ def _data(model: Model) -> str:
 
 
 _FOLDERS_3 = {
-    # zig target -> platform tuple of FMI 3.0
+    # zig target -> platform tuple of FMI 3.0; a Mac's library is for both kinds
     "x86_64-linux-gnu.2.17": "x86_64-linux",
     "x86_64-windows-gnu": "x86_64-windows",
     "x86_64-macos": "x86_64-darwin",
@@ -269,17 +260,8 @@ class NativeFmu:
             if self._version == "3.0":
                 members["sources/buildDescription.xml"] = build_description(self.model.name, self._source_file)
         for platform in platforms:
-            for folder, library in self._libraries(platform, code).items():
+            library = compile_library(code, platform) if code else library_of(platform, *LIBRARIES[self._version])
+            targets = TARGETS[platform] if self._version == "3.0" else ()
+            for folder in [_FOLDERS_3[target] for target in targets] or [platform]:
                 members[f"binaries/{folder}/{self.model.name}{ENDINGS[platform]}"] = library.read_bytes()
         return members
-
-    def _libraries(self, platform: str, code: str) -> dict[str, Path]:
-        """By folder of the archive; ``code``: what to compile for this model alone."""
-        if self._version == "2.0":
-            return {platform: compile_library(code, platform) if code else library_of(platform, *LIBRARIES["2.0"])}
-        return {
-            _FOLDERS_3[target]: compile_for(code, target, ENDINGS[platform])
-            if code
-            else library_of(platform, *LIBRARIES["3.0"])
-            for target in TARGETS[platform]
-        }
