@@ -177,7 +177,7 @@ def _model_source(data: bytes) -> str:
 
 
 def _start(model: Model) -> list[float]:
-    return [variable.start for variable in (*model.parameters, *model.inputs)]
+    return [p.start for p in model.parameters] + [u.start for u in model.inputs]
 
 
 def _data(model: Model) -> str:
