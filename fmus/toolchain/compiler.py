@@ -107,7 +107,7 @@ def joined_source(*files: Path) -> str:
     """Files of C as one text, with those that they include of the toolchain's written in; messages name the line."""
 
     def header(match: re.Match[str]) -> str:
-        return (Path(__file__).parent / "c" / match[1]).read_text(encoding="utf-8")
+        return joined_source(Path(__file__).parent / "c" / match[1])
 
     parts = []
     for file in files:

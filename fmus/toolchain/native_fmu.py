@@ -1,24 +1,31 @@
 """The recipe for a native FMU, for co-simulation by FMI 2.0 or 3.0: compiled code, no Python anywhere.
 
-It is made of the same kernel as the Python-backed FMU and gives the same answers. Beyond that it has exact
+It is made of the same kernel or tape as the Python-backed FMU and gives the same answers. Beyond that it has exact
 directional derivatives and may be stepped from many threads, one per instance at a time.
 
-Its source is one translation unit per version of FMI, with nothing in it but the C library."""
+Compiled, its source is one translation unit per version of FMI, with nothing in it but the C library. A tape lies in
+``resources/model.bin``, and one library of each version of FMI reads it for all models."""
 
+import struct
+import zlib
+from array import array
 from importlib.metadata import version as version_of
 from itertools import chain, islice
+from math import inf
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fmus.toolchain import description_common as common
 from fmus.toolchain.archive import digest_of, guid_of
 from fmus.toolchain.c_text import c_number, c_string, identity_source
-from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_for, compile_library, recipe
+from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_library, joined_source, library_of, recipe
 from fmus.toolchain.description import model_description, with_guid
 from fmus.toolchain.exporter import this_machine
+from fmus.toolchain.extras import installed_version
 from fmus.toolchain.kernel import c_source
 from fmus.toolchain.model import FmiVersion, Model
 from fmus.toolchain.symbols import Expr, Function, jtimes, jtimes_transposed, symbols
+from fmus.toolchain.tape import VERSION, tape_of
 
 _TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}  # FMI 2.0's name of a type → FMI 3.0's
 
@@ -144,10 +151,38 @@ def _adjoint(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> F
     return Function(name, [*known, *seeds], [list(islice(total, len(vector))) for vector in known])
 
 
+LIBRARIES = {version: (_C / "native.c", _C / f"fmi{version[0]}.c") for version in ("2.0", "3.0")}
+
+
+def model_data(model: Model, tape: bytes, digest: str) -> bytes:
+    """A model as ``c/model.c`` reads it; ``digest``: [hex] of all that its FMU is made from."""
+    texts = [text.encode() for text in (guid_of(digest), *model.value_references, *model.requirement_texts)]
+    text = b"\0".join([*texts, b""])
+    text += bytes(-len(text) % 8)
+    start, parameters = _start(model), model.parameters
+    counts = len(model.value_references), len(model.requirement_texts), len(start), len(parameters), len(text)
+    parts = [struct.pack("<7I", *counts, max(map(len, texts)), model.value_references["internal_step"])]
+    parts += [bytes.fromhex(digest)[:16], array("d", start).tobytes()]
+    for p in parameters:
+        bounds = -inf if p.minimum is None else p.minimum, inf if p.maximum is None else p.maximum
+        parts.append(struct.pack("<2d2i", *bounds, [*_TYPES].index(p.type), p.tunable))
+    content = b"".join([*parts, text, tape])
+    return struct.pack("<8s3I", b"gformodl", VERSION, 20 + len(content), zlib.crc32(content)) + content
+
+
+def _model_source(data: bytes) -> str:
+    """A model's data as text of C, for a source that has it within."""
+    numbers = ", ".join(map(hex, array("I", data)))
+    return f"#include <stdint.h>\nstatic const uint32_t MODEL[] = {{{numbers}}};\n#define MODEL MODEL"
+
+
+def _start(model: Model) -> list[float]:
+    return [p.start for p in model.parameters] + [u.start for u in model.inputs]
+
+
 def _data(model: Model) -> str:
     parameters, rules = model.parameters, model.requirement_texts
     texts = [*rules, *model.value_references]
-    start = [p.start for p in parameters] + [u.start for u in model.inputs]
     rows = [
         f"{{{p.type.upper()}, {c_number(p.minimum, '-INFINITY')}, {c_number(p.maximum, 'INFINITY')}, {int(p.tunable)}}}"
         for p in parameters
@@ -159,7 +194,7 @@ def _data(model: Model) -> str:
         'static const char *const KIND[] = {"Real", "Integer", "Boolean"};',
         "struct parameter { int kind; double minimum, maximum; int tunable; };",
         f"static const char *const NAME[] = {{{', '.join(map(c_string, model.value_references))}}};",
-        f"static const double START[] = {{{', '.join(map(c_number, start))}}};",
+        f"static const double START[] = {{{', '.join(map(c_number, _start(model)))}}};",
         f"static const struct parameter PARAMETER[] = {{{', '.join(rows)}}};",
         f"static const char *const RULE[] = {{{', '.join(map(c_string, rules)) or '0'}}};",
     ]
@@ -167,7 +202,7 @@ def _data(model: Model) -> str:
 
 
 _FOLDERS_3 = {
-    # zig target -> platform tuple of FMI 3.0
+    # zig target -> platform tuple of FMI 3.0; a Mac's library is for both kinds
     "x86_64-linux-gnu.2.17": "x86_64-linux",
     "x86_64-windows-gnu": "x86_64-windows",
     "x86_64-macos": "x86_64-darwin",
@@ -179,13 +214,16 @@ class NativeFmu:
     cache_prefix = "native_"
 
     def __init__(self, model: Model, version: FmiVersion = "2.0", *, sources: bool = False) -> None:
-        self.model, self._version = (model := model.written_out), version
+        self.model, self._version = model, version
         self._source_file = f"{model.name}.c" if sources else ""
-        self._code = native_source(model, version)
+        compiled = model.kind != "network" and installed_version("ziglang")
+        self._tape = b"" if compiled else tape_of(model)
+        self._code = native_source(model, version) if compiled else joined_source(*LIBRARIES[version])
         self._icons = terminals_and_icons(model) if version == "3.0" and has_port(model) else None
         icons = [self._icons.decode()] if self._icons else []
         self._text = self._description("").decode()
-        self.digest = digest_of(self._code, self._text, *recipe(), *icons)
+        data = model_data(model, self._tape, "00").hex() if self._tape else ""
+        self.digest = digest_of(self._code, data, self._text, *recipe(), *icons)
 
     def _description(self, guid: str) -> bytes:
         tool = f"gfor-cosim {version_of('gfor-cosim')}"
@@ -208,9 +246,13 @@ class NativeFmu:
 
     def contents(self, platforms: tuple[str, ...]) -> dict[str, bytes]:
         """The archive's members, with a binary for each platform [FMI 2.0 names]."""
-        guid = guid_of(self.digest)
-        code = identity_source(guid, self.digest) + self._code
+        code, data = identity_source(guid_of(self.digest), self.digest) + self._code, b""
         members = {"modelDescription.xml": self.description()}
+        if self._tape:
+            data = model_data(self.model, self._tape, self.digest)
+            code = f"{_model_source(data)}\n{self._code}" if self._source_file else ""
+        if data and not code:
+            members["resources/model.bin"] = data
         if self._icons:
             members["terminalsAndIcons/terminalsAndIcons.xml"] = self._icons
         if self._source_file:
@@ -218,12 +260,8 @@ class NativeFmu:
             if self._version == "3.0":
                 members["sources/buildDescription.xml"] = build_description(self.model.name, self._source_file)
         for platform in platforms:
-            ending = ENDINGS[platform]
-            binaries = (
-                {platform: compile_library(code, platform)}
-                if self._version == "2.0"
-                else {_FOLDERS_3[target]: compile_for(code, target, ending) for target in TARGETS[platform]}
-            )
-            for folder, library in binaries.items():
-                members[f"binaries/{folder}/{self.model.name}{ending}"] = library.read_bytes()
+            library = compile_library(code, platform) if code else library_of(platform, *LIBRARIES[self._version])
+            targets = TARGETS[platform] if self._version == "3.0" else ()
+            for folder in [_FOLDERS_3[target] for target in targets] or [platform]:
+                members[f"binaries/{folder}/{self.model.name}{ENDINGS[platform]}"] = library.read_bytes()
         return members

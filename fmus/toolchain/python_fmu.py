@@ -46,7 +46,7 @@ class PythonFmu:
         self._tape = tape_of(model)
         compiled = model.compiled and installed_version("ziglang")
         self._c = c_source(model) + _IN_C.read_text(encoding="utf-8") if compiled else ""
-        code = self._c or joined_source(LIBRARY)
+        code = self._c or joined_source(*LIBRARY)
         self._python = _TAPE_KERNEL.read_text(encoding="utf-8")
         self._slave = _SLAVE.read_text(encoding="utf-8")
         self._tool = f"gfor-cosim {version('gfor-cosim')} with PythonFMU {version('pythonfmu')}"
@@ -86,7 +86,7 @@ class PythonFmu:
         }
         for platform in platforms:
             name, library = (
-                ("kernel", compile_library(self._c, platform)) if self._c else ("tape", library_of(platform, LIBRARY))
+                ("kernel", compile_library(self._c, platform)) if self._c else ("tape", library_of(platform, *LIBRARY))
             )
             contents[f"resources/kernel/{platform}/{name}{ENDINGS[platform]}"] = library.read_bytes()
         package = Path(pythonfmu.__file__).parent

@@ -129,7 +129,7 @@ class Slave(Fmi2Slave):
         workspace = (ctypes.c_double * kernel.workspace_size(tape))()
         kernel.begin.argtypes, kernel.begin.restype = [POINTER, POINTER], None
         kernel.begin(tape, ctypes.addressof(workspace))
-        self._use(kernel, workspace, ctypes.addressof(workspace))
+        self._use(kernel, workspace)
 
     def _quicken(self, functions, *addresses):
         """Lay functions in C before the three methods that a master calls in every step."""
@@ -144,16 +144,15 @@ class Slave(Fmi2Slave):
             own = made(first + place * 4 * ctypes.sizeof(POINTER), ctypes.addressof(self._now), None)
             setattr(self, name, own)
 
-    def _use(self, kernel, workspace, *further):
-        """``further``: arguments of its functions behind the variables."""
+    def _use(self, kernel, workspace):
         # The cheapest call is one of objects without a prototype, then one of addresses as integers.
         self._kernel, self._workspace, advance = kernel, workspace, kernel["advance"]
         z, own = POINTER(ctypes.addressof(self._z)), POINTER(ctypes.addressof(workspace))
         self._advance = lambda h, n: functools.partial(advance, z, ctypes.c_double(h), ctypes.c_int(n), own)
-        self._arguments = (ctypes.addressof(self._z), *further)
+        self._arguments = (ctypes.addressof(self._z), ctypes.addressof(workspace))
         for function in (kernel.initialise, kernel.outputs, kernel.derivatives, kernel.requirements):
-            function.argtypes, function.restype = [POINTER] * len(self._arguments), None
-        kernel.requirements.argtypes = [POINTER] * (len(self._arguments) + 1)
+            function.argtypes, function.restype = [POINTER] * 2, None
+        kernel.requirements.argtypes = [POINTER] * 3
         self._margins_address = ctypes.addressof(self._margins)
         if sys.implementation.name == "cpython" and sys.version_info >= (3, 7):
             self._quicken(kernel.python_functions, z, own, ctypes.cast(advance, POINTER))

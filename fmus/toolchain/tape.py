@@ -96,7 +96,7 @@ def runs_of(operations: dict[int, Operation]) -> list[tuple[int, list[int]]]:
 
 MAGIC, VERSION = b"gfortape", 1
 
-LIBRARY = Path(__file__).with_name("c") / "tape.c"  # what executes tapes, with the files that it includes
+LIBRARY = tuple(Path(__file__).with_name("c") / name for name in ("tape.c", "slave.c"))  # executes tapes for a slave
 
 
 def tape_of(model: Model) -> bytes:

@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from fmus.toolchain.catalogue import build_model, model_names, needs_arguments, parts_of
-from fmus.toolchain.extras import require
 from fmus.toolchain.model import FmiVersion, Model
 from orchestrator.asked import flag, names
 from orchestrator.asked import path as path_of
@@ -101,8 +100,6 @@ def build(
     flag(sources, "sources")
     if sources and not native:
         raise InputError("only native FMUs are made of C source that a tool can compile; build a native one")
-    if native:
-        require("building native FMUs", "ziglang")
     from fmus.toolchain.compiler import TARGETS  # noqa: PLC0415 - as above
     from fmus.toolchain.exporter import export  # noqa: PLC0415 - needs the extra `build`
     from fmus.toolchain.native_fmu import NativeFmu  # noqa: PLC0415 - as above

@@ -8,7 +8,6 @@ from typing import Any
 
 from fmus.grid.network import Network
 from fmus.toolchain.catalogue import build_model, entry_of
-from fmus.toolchain.extras import require
 from fmus.toolchain.notes import known, noted
 from orchestrator.fmi.description import FmuDescription, parse_description, platforms_of, read_description
 
@@ -36,8 +35,6 @@ def plan_fmu(
     model: str, network: Network | None = None, native: bool = False, parts: tuple[tuple[str, str], ...] = ()
 ) -> PlannedFmu:
     """FMU of a catalogue's model, described and not yet built."""
-    if native:
-        require(f"building the native FMU {model!r} of the catalogue", "ziglang")
     from fmus.toolchain.cache import cache_directory, intact  # noqa: PLC0415 - needs the extra `build`
 
     place = known(entry_of(model), _asked(model, network, native, parts))

@@ -8,7 +8,6 @@ from typing import Literal
 
 from fmus.toolchain.catalogue import model_names, needs_arguments
 from fmus.toolchain.compiler import TARGETS
-from fmus.toolchain.extras import require
 from fmus.toolchain.model import FmiVersion
 from orchestrator.api.dll import build_from_dll
 from orchestrator.api.models import build, catalogue_model
@@ -83,8 +82,6 @@ def run(options: argparse.Namespace) -> int:
         raise InputError("--fmi 3.0 is for native FMUs: pythonfmu's wrapper speaks FMI 2.0; add --native")
     if options.sources and not options.native:
         raise InputError("--sources is for native FMUs, which are compiled from C; add --native")
-    if options.native:
-        require("building native FMUs", "ziglang")
     names = options.names or [name for name in model_names() if not needs_arguments(name)]
     parts = {part: name for part in PARTS if (name := getattr(options, part)) is not None}
     if parts and not options.names:

@@ -15,13 +15,22 @@ _FUNCTIONS = ("initialise", "outputs", "derivatives", "requirements")
 def compiled(model):
     library = ctypes.CDLL(str(compile_library(c_source(model), host_platform())))
     library.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
-    workspace = (ctypes.c_double * max(1, library.workspace_size()))()
-    functions = {name: getattr(library, name) for name in _FUNCTIONS}
-    return SimpleNamespace(advance=lambda z, h, n: library.advance(z, h, n, workspace), **functions)
+    return _bound(library, (ctypes.c_double * max(1, library.workspace_size()))())
+
+
+def _bound(library, workspace, **more):
+    return SimpleNamespace(
+        initialise=lambda z: library.initialise(z, workspace),
+        outputs=lambda z: library.outputs(z, workspace),
+        derivatives=lambda z: library.derivatives(z, workspace),
+        requirements=lambda z, margins: library.requirements(z, workspace, margins),
+        advance=lambda z, h, n: library.advance(z, h, n, workspace),
+        **more,
+    )
 
 
 def tape_library():
-    library = ctypes.CDLL(str(compile_here(LIBRARY)))
+    library = ctypes.CDLL(str(compile_here(*LIBRARY)))
     library.tape_fault.restype, library.workspace_size.restype = ctypes.c_char_p, ctypes.c_int64
     library.tape_fault.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_int, ctypes.c_int]
     library.advance.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_void_p]
@@ -34,14 +43,7 @@ def taped(model, content=None):
     assert fault is None, fault
     workspace = (ctypes.c_double * library.workspace_size(tape))()
     library.begin(tape, workspace)
-    return SimpleNamespace(
-        tape=tape,  # as long as the instance
-        initialise=lambda z: library.initialise(z, workspace),
-        outputs=lambda z: library.outputs(z, workspace),
-        derivatives=lambda z: library.derivatives(z, workspace),
-        requirements=lambda z, margins: library.requirements(z, workspace, margins),
-        advance=lambda z, h, n: library.advance(z, h, n, workspace),
-    )
+    return _bound(library, workspace, tape=tape)  # as long as the instance
 
 
 def in_python(model):

@@ -34,9 +34,9 @@ static int32_t check(struct dll_instance *s, double *z) {
     for (int i = 0; i < NP; ++i)
         if (!(z[i] >= LEAST[i] && z[i] <= MOST[i])) return fails(s, OUT_OF_BOUNDS[i]);
     const double *arg[] = {z};
-    double *res[] = {z + C, start}, w[NW];
-    initialise_code(arg, res, w);
-    requirements(z, margins);
+    double *res[] = {z + C, start};
+    initialise_code(arg, res);
+    requirements(z, NULL, margins);
     for (int i = 0; i < NR; ++i)
         if (!(margins[i] > 0)) return fails(s, RULE[i]);
     return SAID_NOTHING;
@@ -45,7 +45,7 @@ static int32_t check(struct dll_instance *s, double *z) {
 /* What follows from the parameters, into z; an error where they were changed to what is not allowed. */
 static int32_t follow_parameters(struct dll_instance *s, double *z) {
     int32_t seen[2];
-    double start[NX], w[NW];
+    double start[NX];
     take_parameters(s, z);
     mark(z, 0, seen);
     if (memcmp(seen, s->ints + ALL_MARK, sizeof seen)) {
@@ -57,7 +57,7 @@ static int32_t follow_parameters(struct dll_instance *s, double *z) {
     }
     const double *arg[] = {z};
     double *res[] = {z + C, start};
-    initialise_code(arg, res, w);
+    initialise_code(arg, res);
     return SAID_NOTHING;
 }
 
@@ -65,7 +65,7 @@ static int32_t give_outputs(struct dll_instance *s, double *z) {
     memcpy(z + U, s->inputs, NU * sizeof *z);
     for (int i = 0; i < NU; ++i)
         if (!isfinite(z[U + i])) return fails(s, INPUT_NOT_FINITE[i]);
-    outputs(z);
+    outputs(z, NULL);
     memcpy(s->outputs, z + Y, NY * sizeof *z);
     return SAID_NOTHING;
 }
@@ -96,7 +96,7 @@ EXPORT int32_t CALLED Model_Initialize(struct dll_instance *s) {
     s->ints[READY] = 0;
     if (Model_CheckParameters(s)) return SAID_ERROR;
     take_parameters(s, z);
-    initialise(z);
+    initialise(z, NULL);
     memcpy(z + U, s->inputs, NU * sizeof *z);
     if (NS) rates(z, z + X, rate, NULL);
     for (int i = 0; i < NS; ++i) z[X + STEPWISE[i]] += rate[STEPWISE[i]] * s->time;

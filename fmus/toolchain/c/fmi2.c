@@ -30,14 +30,14 @@ EXPORT int fmi2SetDebugLogging(struct instance *s, int on, size_t n, const char 
 
 EXPORT struct instance *fmi2Instantiate(const char *name, int type, const char *guid, const char *resources,
                                         const struct callbacks *functions, int visible, int logging) {
-    (void)resources, (void)visible;
+    (void)visible;
     struct instance *s = name && *name ? create(name) : NULL;
     if (!s) return NULL;
     if (functions) s->logger = (void *)functions->logger, s->environment = functions->environment;
     s->quiet = !logging;
     if (type != 1)
         say(s, ERROR, "this FMU is for co-simulation only");
-    else if (!guid || strcmp(guid, GUID))
+    else if (!prepare(s, resources) && (!guid || strcmp(guid, GUID)))
         say(s, ERROR, "the guid %.100s is not this FMU's, which is %s; read its modelDescription.xml again",
             guid ? guid : "(none)", GUID);
     if (!s->failed) return s;

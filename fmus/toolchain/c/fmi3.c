@@ -3,7 +3,7 @@
 
 typedef void (*fmi3_logger)(void *, int, const char *, const char *);
 
-enum { TIME = NV }; /* value reference of the independent variable */
+#define TIME ((unsigned)NV) /* value reference of the independent variable */
 
 static void deliver(struct instance *s, int status, const char *text) {
     ((fmi3_logger)s->logger)(s->environment, status, CATEGORY[status], text);
@@ -20,14 +20,14 @@ EXPORT struct instance *fmi3InstantiateCoSimulation(const char *name, const char
                                                     bool logging, bool event_mode, bool early_return,
                                                     const unsigned *intermediate, size_t n_intermediate, void *environment,
                                                     fmi3_logger logger, void *update) {
-    (void)resources, (void)visible, (void)early_return, (void)intermediate, (void)n_intermediate, (void)update;
+    (void)visible, (void)early_return, (void)intermediate, (void)n_intermediate, (void)update;
     struct instance *s = name && *name ? create(name) : NULL;
     if (!s) return NULL;
     s->logger = (void *)logger, s->environment = environment;
     s->quiet = !logging;
     if (event_mode)
         say(s, ERROR, "this FMU has no event mode; its modelDescription.xml says so");
-    else if (!token || strcmp(token, GUID))
+    else if (!prepare(s, resources) && (!token || strcmp(token, GUID)))
         say(s, ERROR, "the instantiation token %.100s is not this FMU's, which is %s; read its modelDescription.xml again",
             token ? token : "(none)", GUID);
     if (!s->failed) return s;

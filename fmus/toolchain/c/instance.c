@@ -1,19 +1,20 @@
 /* One instance of a native FMU: variables, life cycle, errors. The FMI functions of either version stand on it.
 
-   Generated above: NAME, START, PARAMETER, RULE and the sizes NR (rules), TEXT (longest message), INTERNAL_STEP
-   (a value reference) and IDENTITY. `slave.py` says the same in Python for Python-backed FMUs. */
+   Above stand NAME, START, PARAMETER, RULE, the sizes NR (rules), TEXT (longest message), INTERNAL_STEP (a value
+   reference), GUID and IDENTITY: generated for one model, or by `model.c` for a model that is read (TAPE).
+   `slave.py` says the same in Python for Python-backed FMUs. */
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { NV = DX + NX };
+#define NV (DX + NX)
 enum status { OK, WARNING, DISCARD, ERROR, FATAL };
 enum phase { INSTANTIATED, INITIALISING, STEPPING, TERMINATED };
 enum { MOST_PARTS = 1000000 }; /* internal steps in one communication step */
 
 struct instance {
-    double z[NV];
+    double *z;
     int phase;
     int changed; /* parameters were set that nothing was computed from yet */
     int stale;   /* outputs are older than what they depend on */
@@ -23,15 +24,19 @@ struct instance {
     char *name;
     void *environment, *logger;
     int quiet; /* messages below an error are not wanted */
-    double *work, before[NX + 1];
+    double *work, *before;
+#ifdef TAPE
+    struct model model;
+#endif
 };
 
 /* What fmi2GetFMUstate copies. */
 struct snapshot {
     unsigned char identity[16];
     int32_t phase, changed;
-    double time, z[NV];
+    double time, z[];
 };
+#define SNAPSHOT (sizeof(struct snapshot) + NV * sizeof(double))
 
 /* A call without an instance is refused; there is nobody to log to. */
 #define NEEDS(s) \
@@ -66,7 +71,7 @@ static int set_logging(struct instance *s, int on, size_t n, const char *const c
 }
 
 static void set_to_start(struct instance *s) {
-    memset(s->z, 0, sizeof s->z);
+    memset(s->z, 0, NV * sizeof *s->z);
     for (int i = 0; i < NP; ++i) s->z[i] = START[i];
     for (int i = 0; i < NU; ++i) s->z[U + i] = START[NP + i];
     s->phase = INSTANTIATED;
@@ -75,34 +80,50 @@ static void set_to_start(struct instance *s) {
     s->time = s->step_size = 0;
 }
 
+/* An instance that can log; `prepare` makes it one of the model. */
 static struct instance *create(const char *name) {
     struct instance *s = calloc(1, sizeof *s);
-    if (!s) return NULL;
     const size_t length = strlen(name) + 1;
-    s->name = malloc(length);
-    s->work = calloc((size_t)workspace_size() + 1, sizeof *s->work);
-    if (!s->name || !s->work) {
-        free(s->name);
-        free(s->work);
+    if (s && !(s->name = malloc(length))) {
         free(s);
         return NULL;
     }
-    memcpy(s->name, name, length);
-    set_to_start(s);
+    if (s) memcpy(s->name, name, length);
     return s;
 }
 
 static void destroy(struct instance *s) {
     if (!s) return;
+#ifdef TAPE
+    forget(&s->model);
+#endif
     free(s->name);
     free(s->work);
+    free(s->z);
+    free(s->before);
     free(s);
+}
+
+static int prepare(struct instance *s, const char *resources) {
+#ifdef TAPE
+    const char *fault = read_model(&s->model, resources);
+    if (fault) return say(s, ERROR, "the FMU's resources cannot be used: %.200s: %s; unpack the FMU again", resources ? resources : "(none)", fault);
+    s->work = calloc((size_t)workspace_size(s->model.tape) + 1, sizeof *s->work);
+    if (s->work) begin(s->model.tape, s->work);
+#else
+    (void)resources;
+    s->work = calloc((size_t)workspace_size() + 1, sizeof *s->work);
+#endif
+    if (s->work) s->z = calloc((size_t)NV + 1, sizeof *s->z), s->before = calloc((size_t)NX + 1, sizeof *s->before);
+    if (!s->z || !s->before) return say(s, ERROR, "no memory for an instance");
+    set_to_start(s);
+    return OK;
 }
 
 /* Refuse parameters that break a rule of the model. */
 static int check_rules(struct instance *s, int status) {
     double margins[NR + 1];
-    requirements(s->z, margins);
+    requirements(s->z, s->work, margins);
     for (int i = 0; i < NR; ++i)
         if (!(margins[i] > 0)) status = say(s, ERROR, "parameters cannot be used: %s", RULE[i]);
     return status;
@@ -111,10 +132,10 @@ static int check_rules(struct instance *s, int status) {
 /* Bring everything that is computed up to date. */
 static int refresh(struct instance *s) {
     int status = OK;
-    if (s->changed && s->phase < STEPPING) initialise(s->z);
+    if (s->changed && s->phase < STEPPING) initialise(s->z, s->work);
     if (s->changed && s->phase == STEPPING) status = check_rules(s, OK); /* before partners see what follows from it */
     s->changed = s->stale = 0;
-    outputs(s->z);
+    outputs(s->z, s->work);
     return status;
 }
 
@@ -128,24 +149,24 @@ static int wrong_kind(struct instance *s, unsigned reference, int kind) {
     return say(s, ERROR, "%s is no %s variable; call the function of its own type", NAME[reference], KIND[kind]);
 }
 
-static int kind_of(unsigned reference) { return reference < NP ? PARAMETER[reference].kind : REAL; }
+static int kind_of(struct instance *s, unsigned reference) { return reference < (unsigned)NP ? PARAMETER[reference].kind : REAL; }
 
 static int get_values(struct instance *s, const unsigned *references, size_t n, double *values) {
     int status = OK, rates_wanted = 0;
     for (size_t i = 0; i < n; ++i) {
         if (references[i] >= NV) return unknown_reference(s, references[i]);
-        if (kind_of(references[i]) != REAL) return wrong_kind(s, references[i], REAL);
+        if (kind_of(s, references[i]) != REAL) return wrong_kind(s, references[i], REAL);
         rates_wanted |= references[i] >= DX;
     }
     if (s->stale) status = refresh(s);
-    if (rates_wanted) derivatives(s->z);
+    if (rates_wanted) derivatives(s->z, s->work);
     for (size_t i = 0; i < n; ++i) values[i] = s->z[references[i]];
     return status;
 }
 
 static int get_discrete(struct instance *s, unsigned reference, int kind, double *value) {
     if (reference >= NV) return unknown_reference(s, reference);
-    if (kind_of(reference) != kind) return wrong_kind(s, reference, kind);
+    if (kind_of(s, reference) != kind) return wrong_kind(s, reference, kind);
     *value = s->z[reference];
     return OK;
 }
@@ -277,13 +298,13 @@ static int do_step(struct instance *s, double time, double step_size) {
 
 /* -- state ------------------------------------------------------------------------------------- */
 
-static void take(struct instance *s, struct snapshot *copy) {
+static void take_snapshot(struct instance *s, struct snapshot *copy) {
     if (s->stale && s->phase < STEPPING) refresh(s);
     memcpy(copy->identity, IDENTITY, sizeof copy->identity);
     copy->phase = s->phase;
     copy->changed = s->changed || s->failed;
     copy->time = s->time;
-    memcpy(copy->z, s->z, sizeof s->z);
+    memcpy(copy->z, s->z, NV * sizeof *s->z);
 }
 
 static int restore(struct instance *s, const struct snapshot *copy) {
@@ -292,7 +313,7 @@ static int restore(struct instance *s, const struct snapshot *copy) {
     s->phase = copy->phase;
     s->changed = copy->changed;
     s->time = copy->time;
-    memcpy(s->z, copy->z, sizeof s->z);
+    memcpy(s->z, copy->z, NV * sizeof *s->z);
     s->stale = 1;
     s->failed = 0;
     s->step_size = 0;
@@ -300,15 +321,15 @@ static int restore(struct instance *s, const struct snapshot *copy) {
 }
 
 static int no_memory(struct instance *s) {
-    return say(s, ERROR, "no memory for a copy of the state (%zu bytes)", sizeof(struct snapshot));
+    return say(s, ERROR, "no memory for a copy of the state (%zu bytes)", SNAPSHOT);
 }
 
 /* The functions on saved states, of both versions of FMI; `call` is the name that the version gives them. */
 static int save(struct instance *s, struct snapshot **copy, const char *call) {
     if (!copy) return say(s, ERROR, "%s needs the address of a pointer", call);
-    if (!*copy) *copy = malloc(sizeof **copy);
+    if (!*copy) *copy = malloc(SNAPSHOT);
     if (!*copy) return no_memory(s);
-    take(s, *copy);
+    take_snapshot(s, *copy);
     return OK;
 }
 
@@ -326,21 +347,21 @@ static int release(struct snapshot **copy) {
 
 static int serialised_size(struct instance *s, const struct snapshot *copy, size_t *size, const char *call) {
     if (!copy || !size) return say(s, ERROR, "%s needs a saved state and a place for its size", call);
-    *size = sizeof *copy;
+    *size = SNAPSHOT;
     return OK;
 }
 
 static int serialise(struct instance *s, const struct snapshot *copy, void *bytes, size_t size) {
-    if (!copy || !bytes || size < sizeof *copy)
-        return say(s, ERROR, "a saved state takes %zu bytes; %zu were given", sizeof *copy, size);
-    memcpy(bytes, copy, sizeof *copy);
+    if (!copy || !bytes || size < SNAPSHOT)
+        return say(s, ERROR, "a saved state takes %zu bytes; %zu were given", SNAPSHOT, size);
+    memcpy(bytes, copy, SNAPSHOT);
     return OK;
 }
 
 static int deserialise(struct instance *s, const void *bytes, size_t size, struct snapshot **copy) {
-    if (!bytes || !copy || size != sizeof **copy)
-        return say(s, ERROR, "a saved state has %zu bytes; %zu were given", sizeof **copy, size);
-    if (!*copy) *copy = malloc(sizeof **copy);
+    if (!bytes || !copy || size != SNAPSHOT)
+        return say(s, ERROR, "a saved state has %zu bytes; %zu were given", SNAPSHOT, size);
+    if (!*copy) *copy = malloc(SNAPSHOT);
     if (!*copy) return no_memory(s);
     memcpy(*copy, bytes, size);
     return OK;
@@ -348,39 +369,51 @@ static int deserialise(struct instance *s, const void *bytes, size_t size, struc
 
 /* -- derivatives ------------------------------------------------------------------------------- */
 
+#ifdef TAPE
+static void evaluate_directions(struct instance *s, double *d, double *room) {
+    move_all(s->work, s->z, s->phase < STEPPING, d, room);
+}
+static void evaluate_adjoint(struct instance *s, double *d, double *room) {
+    seed_all(s->work, s->z, s->phase < STEPPING, d, room);
+}
+#else
+#define ROOM (NX + 2 * NP + NC)
+
 /* Directions of one evaluation, over all variables as z is: what is known goes in, what follows comes out. */
-static void evaluate_directions(struct instance *s, double *d, double *w) {
+static void evaluate_directions(struct instance *s, double *d, double *room) {
+    (void)room;
     if (s->phase < STEPPING) {
         const double *arg[] = {s->z, d};
         double *res[] = {d + C, d + X};
-        start_direction_code(arg, res, w);
+        start_direction_code(arg, res);
     }
     const double *arg[] = {s->z + X, s->z + U, s->z, s->z + C, d + X, d + U, d, d + C};
     double *res[] = {d + DX, d + Y};
-    direction_code(arg, res, w);
+    direction_code(arg, res);
 }
 
 /* The transposed: seeds on what follows go in, what is known comes out. */
-static void evaluate_adjoint(struct instance *s, double *d, double *w) {
-    double *x = w + NWD, *p = x + NX, *c = p + NP, *more = c + NC; /* behind the code's own room */
+static void evaluate_adjoint(struct instance *s, double *d, double *room) {
+    double *x = room, *p = x + NX, *c = p + NP, *more = c + NC;
     const double *arg[] = {s->z + X, s->z + U, s->z, s->z + C, d + DX, d + Y};
     double *res[] = {x, d + U, p, c};
-    adjoint_code(arg, res, w);
+    adjoint_code(arg, res);
     if (s->phase < STEPPING) { /* states and calculated parameters follow from the parameters here */
         for (int i = 0; i < NC; ++i) c[i] += d[C + i];
         for (int i = 0; i < NX; ++i) x[i] += d[X + i];
         const double *start_arg[] = {s->z, c, x};
         double *start_res[] = {more};
-        start_adjoint_code(start_arg, start_res, w);
+        start_adjoint_code(start_arg, start_res);
         for (int i = 0; i < NP; ++i) p[i] += more[i];
     }
     memcpy(d + X, x, NX * sizeof(double));
     memcpy(d, p, NP * sizeof(double));
 }
+#endif
 
 /* What can be known: inputs; running: states and tunable parameters; in initialisation: all parameters. */
 static int is_known(struct instance *s, unsigned r) {
-    if (r < NP) return kind_of(r) == REAL && (s->phase < STEPPING || PARAMETER[r].tunable);
+    if (r < NP) return kind_of(s, r) == REAL && (s->phase < STEPPING || PARAMETER[r].tunable);
     return (r >= U && r < X) || (r >= X && r < Y && s->phase >= STEPPING);
 }
 
@@ -412,7 +445,7 @@ typedef void (*evaluation)(struct instance *, double *, double *);
 /* Seeds on some variables in, the sum of what they give for others out. */
 static int propagate(struct instance *s, evaluation evaluate, const unsigned *from, size_t n_from, const double *seed,
                      const unsigned *to, size_t n_to, double *sensitivity) {
-    double *d = calloc(NV + NWD + NX + 2 * NP + NC + 1, sizeof *d);
+    double *d = calloc((size_t)NV + ROOM + 1, sizeof *d);
     if (!d) return say(s, ERROR, "no memory for a derivative");
     for (size_t i = 0; i < n_from; ++i) d[from[i]] += seed[i];
     evaluate(s, d, d + NV);

@@ -1,5 +1,5 @@
 /* Functions of a kernel around the generated code. Every quantity of an instance lies in
-   one vector z = [p | c | u | x | y | dx]; the sizes NP ... NY and NW stand above, generated.
+   one vector z = [p | c | u | x | y | dx]; the sizes NP ... NY stand above, generated.
    A tape's kernel (tape.c) has functions of the same names; integrators give both their workspace. */
 #include <math.h>
 #include <string.h>
@@ -14,51 +14,48 @@
 enum { OWN = 0, C = NP, U = C + NC, X = U + NU, Y = X + NX, DX = Y + NY };
 
 static void rates(const double *z, const double *x, double *rate, double *workspace) {
-    double w[NW];
     const double *arg[] = {x, z + U, z, z + C};
     double *res[] = {rate};
     (void)workspace;
-    derivatives_code(arg, res, w);
+    derivatives_code(arg, res);
 }
 
-KERNEL void initialise(double *z) {
-    double w[NW];
+KERNEL void initialise(double *z, double *workspace) {
+    (void)workspace;
     const double *arg[] = {z};
     double *res[] = {z + C, z + X};
-    initialise_code(arg, res, w);
+    initialise_code(arg, res);
 }
 
-KERNEL void outputs(double *z) {
-    double w[NW];
+KERNEL void outputs(double *z, double *workspace) {
+    (void)workspace;
     const double *arg[] = {z + X, z + U, z, z + C};
     double *res[] = {z + Y};
-    outputs_code(arg, res, w);
+    outputs_code(arg, res);
 }
 
-KERNEL void derivatives(double *z) { rates(z, z + X, z + DX, NULL); }
+KERNEL void derivatives(double *z, double *workspace) { rates(z, z + X, z + DX, workspace); }
 
-KERNEL void requirements(const double *z, double *r) {
-    double w[NW];
+KERNEL void requirements(const double *z, double *workspace, double *r) {
+    (void)workspace;
     const double *arg[] = {z, z + C};
     double *res[] = {r};
-    requirements_code(arg, res, w);
+    requirements_code(arg, res);
 }
 
 /* Outputs after a step, or 1 + the index of the first state that is no longer finite. */
 static int finish(double *z, double *workspace) {
-    (void)workspace;
     for (int i = 0; i < NX; ++i)
         if (!isfinite(z[X + i])) return i + 1;
-    outputs(z);
+    outputs(z, workspace);
     return 0;
 }
 
 #ifdef IMPLICIT /* the matrix of an implicit step */
 static void matrix(const double *z, double gh, double *m, double *workspace) {
-    double w[NW];
     const double *arg[] = {z, z + C, &gh};
     double *res[] = {m};
     (void)workspace;
-    iteration_code(arg, res, w);
+    iteration_code(arg, res);
 }
 #endif

@@ -202,7 +202,7 @@ static int is_sound(double *w, int which) {
 }
 
 /* Why a tape cannot be executed for a model with so many variables and rules; NULL if it can. */
-EXPORT const char *tape_fault(const void *bytes, size_t size, int variables, int rules) {
+TAPE const char *tape_fault(const void *bytes, size_t size, int variables, int rules) {
     const struct header *tape = bytes;
     if (size < sizeof *tape || memcmp(tape->magic, "gfortape", 8)) return "it is no tape";
     if (tape->version != VERSION) return "it is of another version";
@@ -234,7 +234,7 @@ EXPORT const char *tape_fault(const void *bytes, size_t size, int variables, int
 /* -- kernel ---------------------------------------------------------------------------------------------------------- */
 
 /* Numbers that an instance needs of its own, for a tape without a fault. */
-EXPORT int64_t workspace_size(const void *tape) {
+TAPE int64_t workspace_size(const void *tape) {
     struct tape t;
     double *w = (double *)&t;
     lay_out(tape, &t);
@@ -242,13 +242,13 @@ EXPORT int64_t workspace_size(const void *tape) {
 }
 
 /* Make a workspace ready; the tape stays where it is until the last call. */
-EXPORT void begin(const void *tape, double *w) {
+TAPE void begin(const void *tape, double *w) {
     memset(w, 0, (size_t)workspace_size(tape) * sizeof *w);
     lay_out(tape, OF(w));
     memcpy(SLOT + AT_GH + 1, (const struct header *)tape + 1, OF(w)->size.numbers * sizeof *w);
 }
 
-EXPORT void initialise(double *z, double *w) {
+TAPE void initialise(double *z, double *w) {
     OF(w)->known = 0;
     memcpy(SLOT, z, NP * sizeof *z);
     execute(w, INITIALISE, SLOT + AT_FIXED + OF(w)->size.fixed);
@@ -256,24 +256,22 @@ EXPORT void initialise(double *z, double *w) {
     take(w, INITIALISE, NC, NX, z + X);
 }
 
-EXPORT void outputs(double *z, double *w) {
+TAPE void outputs(double *z, double *w) {
     enter(z, w);
     at_states(w, OUTPUTS, z + X, z + Y);
 }
 
-EXPORT void derivatives(double *z, double *w) {
+TAPE void derivatives(double *z, double *w) {
     enter(z, w);
     at_states(w, DERIVATIVES, z + X, z + DX);
 }
 
-EXPORT void requirements(const double *z, double *w, double *margins) {
+TAPE void requirements(const double *z, double *w, double *margins) {
     enter(z, w);
     evaluate(w, REQUIREMENTS, margins);
 }
 
-EXPORT int advance(double *z, double h, int n, double *w) {
+TAPE int advance(double *z, double h, int n, double *w) {
     enter(z, w);
     return OF(w)->size.implicit ? advance_implicitly(z, h, n, w) : advance_explicitly(z, h, n, w);
 }
-
-#include "slave.c"

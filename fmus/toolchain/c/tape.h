@@ -11,6 +11,10 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
+#ifndef TAPE /* a native FMU keeps a tape's functions to itself */
+#define TAPE EXPORT
+#endif
+
 enum { VERSION = 1, FIXED = 0, INITIALISE, REQUIREMENTS, OUTPUTS, DERIVATIVES, MATRIX, CURRENTS, SECTIONS };
 
 struct section {

@@ -15,13 +15,13 @@ static double angle_at(const struct instance *s, double time) {
 
 static void circuit_refresh(struct instance *s, double time) {
     s->circuit[AT_ANGLE] = angle_at(s, time);
-    circuit_outputs(s->circuit);
+    circuit_outputs(s->circuit, NULL);
     s->old = 0;
 }
 
 static int circuit_check(struct instance *s) {
     double margins[RULES + 1];
-    circuit_requirements(s->circuit, margins);
+    circuit_requirements(s->circuit, NULL, margins);
     for (int i = 0; i < RULES; ++i)
         if (!(margins[i] > 0)) return say(s, ERROR, "parameters cannot be used: %s", RULE[i]);
     return OK;
@@ -83,7 +83,7 @@ static int start_at_frequency(struct instance *s) {
     int status = circuit_check(s);
     if (status) return status;
     z[AT_TRIM_P] = z[AT_TRIM_Q] = z[AT_TRIM_V] = 0;
-    circuit_initialise(z);
+    circuit_initialise(z, NULL);
     drive(s);
     const double v[] = {z[AT_V_RE], z[AT_V_IM]}, period = 1 / z[AT_FREQUENCY];
     const int most = (int)ceil((s->probing ? 0.25 : 1.0) * LONGEST_START / period), first = (int)ceil(FIRST_TRIM / period);

@@ -312,6 +312,8 @@ static int load_dll(struct instance *s) {
     return OK;
 }
 
+static int prepare(struct instance *s, const char *resources) { return (void)s, (void)resources, OK; }
+
 static void destroy(struct instance *s) {
     if (!s) return;
     s->logger = NULL;
