@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import gc
 import os
 from contextlib import nullcontext
 from functools import cache
@@ -21,7 +22,11 @@ from tests.support.skips import Skips, in_ci
 
 
 def pytest_configure(config):
-    """In CI a skip that is not on the list fails the session; with xdist the process that started the others counts."""
+    """No garbage is looked for among what is collected, which stays.
+
+    In CI a skip that is not on the list fails the session; with xdist the process that started the others counts.
+    """
+    gc.disable()
     if in_ci() and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skips(), "skips")
     if MEASURED in os.environ:
@@ -37,6 +42,11 @@ def pytest_xdist_auto_num_workers():
 @pytest.hookimpl(tryfirst=True)  # before -m chooses by the marks
 def pytest_collection_modifyitems(items):
     mark(items)
+
+
+def pytest_collection_finish():
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(autouse=True)
