@@ -17,7 +17,7 @@ from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.cli import main
 from orchestrator.spelling import as_options
-from tests.support.durations import MEASURED, Measure, mark
+from tests.support.durations import MEASURED, Measure, longest_first, mark
 from tests.support.skips import Skips, in_ci
 
 
@@ -39,9 +39,11 @@ def pytest_xdist_auto_num_workers():
     return 2 * len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
 
 
-@pytest.hookimpl(tryfirst=True)  # before -m chooses by the marks
+@pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(items):
     mark(items)
+    yield  # -m chooses by the marks
+    longest_first(items)
 
 
 def pytest_collection_finish():
