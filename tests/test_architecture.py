@@ -73,6 +73,7 @@ def imported_names(tree):
     return names
 
 
+@cache
 def imports():
     """Module → modules of the packages that it imports."""
     graph = {}
