@@ -1,5 +1,6 @@
 """Fixtures shared by all tests."""
 
+import gc
 import os
 from contextlib import nullcontext
 from functools import cache
@@ -16,12 +17,16 @@ from fmus.toolchain.native_fmu import NativeFmu
 from fmus.toolchain.python_fmu import PythonFmu
 from orchestrator.cli import main
 from orchestrator.spelling import as_options
-from tests.support.durations import MEASURED, Measure, mark
+from tests.support.durations import MEASURED, Measure, longest_first, mark
 from tests.support.skips import Skips, in_ci
 
 
 def pytest_configure(config):
-    """In CI a skip that is not on the list fails the session; with xdist the process that started the others counts."""
+    """No garbage is looked for among what is collected, which stays.
+
+    In CI a skip that is not on the list fails the session; with xdist the process that started the others counts.
+    """
+    gc.disable()
     if in_ci() and not hasattr(config, "workerinput"):
         config.pluginmanager.register(Skips(), "skips")
     if MEASURED in os.environ:
@@ -34,9 +39,16 @@ def pytest_xdist_auto_num_workers():
     return 2 * len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else None
 
 
-@pytest.hookimpl(tryfirst=True)  # before -m chooses by the marks
+@pytest.hookimpl(wrapper=True)
 def pytest_collection_modifyitems(items):
     mark(items)
+    yield  # -m chooses by the marks
+    longest_first(items)
+
+
+def pytest_collection_finish():
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(autouse=True)

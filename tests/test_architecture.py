@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,7 @@ PLAIN_DATA = {"fmus.grid.names", "fmus.toolchain.port_variables", "fmus.toolchai
 """Modules of the FMUs that the whole orchestrator may read."""
 
 
+@cache  # not while tests are collected: each worker of each run collects all
 def modules():
     """Name → syntax tree of every module of the packages."""
     found = {}
@@ -57,9 +59,6 @@ def modules():
             name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
             found[name] = ast.parse(path.read_text(encoding="utf-8"), str(path))
     return found
-
-
-MODULES = modules()
 
 
 def imported_names(tree):
@@ -74,13 +73,14 @@ def imported_names(tree):
     return names
 
 
+@cache
 def imports():
     """Module → modules of the packages that it imports."""
     graph = {}
-    for name, tree in MODULES.items():
+    for name, tree in modules().items():
         targets = imported_names(tree)
-        graph[name] = {t if t in MODULES else t.rpartition(".")[0] for t in targets if within(t, *PACKAGES)} - {name}
-        unknown = graph[name] - set(MODULES)
+        graph[name] = {t if t in modules() else t.rpartition(".")[0] for t in targets if within(t, *PACKAGES)} - {name}
+        unknown = graph[name] - set(modules())
         assert not unknown, f"{name} imports {unknown}, which does not exist"
     return graph
 
@@ -112,14 +112,14 @@ def test_the_imports_are_read():
     graph = imports()
     assert "fmus.toolchain.model" in graph["gfor_fmu.converter"]
     assert "orchestrator.coupling.observers" in graph["orchestrator.coupling.master"]
-    assert "pandapower" in imported_names(MODULES["orchestrator.cases.network_sources"])
+    assert "pandapower" in imported_names(modules()["orchestrator.cases.network_sources"])
 
 
 def test_every_room_of_the_orchestrator_is_on_a_floor_or_is_a_study():
-    for name in MODULES:
+    for name in modules():
         if within(name, "orchestrator") and name != "orchestrator":
             known = any(within(name, package) for packages in FLOORS for package in packages)
-            assert known or f"{part(name)}.command" in MODULES, name
+            assert known or f"{part(name)}.command" in modules(), name
 
 
 def test_the_toolchain_knows_no_model():
@@ -201,11 +201,11 @@ def test_only_libraries_that_come_late_are_imported_for_type_checkers_alone():
     """Any other such import hides an arrow that runs back up, or a module that a start should not wait for."""
     blocks = [
         (name, node)
-        for name, tree in MODULES.items()
+        for name, tree in modules().items()
         for node in ast.walk(tree)
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
     ]
-    assert {name for name, _ in blocks} == {n for n, tree in MODULES.items() if "TYPE_CHECKING" in _code_of(tree)}
+    assert {name for name, _ in blocks} == {n for n, tree in modules().items() if "TYPE_CHECKING" in _code_of(tree)}
     hiding = [
         (name, imported_names(node) - {"pandas", "scipy.optimize", "scipy.signal", "xarray"}) for name, node in blocks
     ]
@@ -224,7 +224,7 @@ POINTS = ("sweep.point", "screening.point", "coordinated_design.point", "interac
 
 def test_every_kept_point_is_known_here():
     """Whoever computes points has the kind of their task in a module ``…point``, whose code names their files."""
-    kinds = {name for name, tree in MODULES.items() for node in tree.body if isinstance(node, ast.ClassDef)
+    kinds = {name for name, tree in modules().items() for node in tree.body if isinstance(node, ast.ClassDef)
              if {ast.unparse(base) for base in node.bases} & {"Task", "BenchTask"}}  # fmt: skip
     assert kinds == {f"orchestrator.{name}" for name in POINTS}
 
@@ -258,7 +258,7 @@ def test_there_is_no_cycle():
 
     for name in graph:
         visit(name, [])
-    assert set(state) == set(MODULES)
+    assert set(state) == set(modules())
 
 
 @pytest.mark.parametrize(
@@ -277,7 +277,7 @@ def test_there_is_no_cycle():
     ],
 )
 def test_a_library_is_used_in_one_place(library, users):
-    found = {name for name, tree in MODULES.items() if any(within(n, library) for n in imported_names(tree))}
+    found = {name for name, tree in modules().items() if any(within(n, library) for n in imported_names(tree))}
     assert found == users
 
 
@@ -309,30 +309,30 @@ COMPUTING = {
 
 @pytest.mark.parametrize("command", sorted(ON_THE_FACE))
 def test_a_command_is_written_on_the_face(command):
-    names = {name.removeprefix("orchestrator.") for name in imported_names(MODULES[f"orchestrator.cli.{command}"])}
+    names = {name.removeprefix("orchestrator.") for name in imported_names(modules()[f"orchestrator.cli.{command}"])}
     assert names >= ON_THE_FACE[command]
     assert not names & COMPUTING
 
 
 def test_only_the_command_line_reads_options():
-    using = {name for name, tree in MODULES.items() if "argparse" in imported_names(tree)}
+    using = {name for name, tree in modules().items() if "argparse" in imported_names(tree)}
     assert using
     assert all(within(name, "orchestrator.cli") for name in using)
 
 
 def test_equations_are_written_in_models_only():
-    for name, tree in MODULES.items():
+    for name, tree in modules().items():
         if within(name, "orchestrator"):
             assert not any(within(n, "fmus.toolchain.symbols") for n in imported_names(tree)), name
 
 
 def test_the_slave_needs_nothing_but_python_and_pythonfmu():
     """It is copied into FMUs and runs where no package of this project is installed."""
-    names = imported_names(MODULES["fmus.toolchain.slave"])
+    names = imported_names(modules()["fmus.toolchain.slave"])
     foreign = {name for name in names if name.split(".")[0] not in sys.stdlib_module_names}
     assert foreign
     assert all(within(name, "pythonfmu") for name in foreign)
-    names = imported_names(MODULES["fmus.toolchain.tape_kernel"])
+    names = imported_names(modules()["fmus.toolchain.tape_kernel"])
     assert all(name.split(".")[0] in sys.stdlib_module_names for name in names)
 
 
@@ -340,7 +340,7 @@ def test_the_slave_needs_nothing_but_python_and_pythonfmu():
 
 
 def test_errors_are_raised_by_a_name_of_their_own():
-    for name, tree in MODULES.items():
+    for name, tree in modules().items():
         for node in ast.walk(tree):
             if isinstance(node, ast.Raise) and node.exc is not None:
                 raised = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
@@ -348,7 +348,9 @@ def test_errors_are_raised_by_a_name_of_their_own():
 
 
 def test_no_error_is_caught_without_saying_which():
-    handlers = [(name, n) for name, tree in MODULES.items() for n in ast.walk(tree) if isinstance(n, ast.ExceptHandler)]
+    handlers = [
+        (name, n) for name, tree in modules().items() for n in ast.walk(tree) if isinstance(n, ast.ExceptHandler)
+    ]
     assert len(handlers) > 10
     for name, node in handlers:
         assert node.type is not None, f"{name}, line {node.lineno}: bare except"
@@ -391,7 +393,7 @@ def test_what_only_looks_like_one(text):
 def test_a_class_name_has_one_meaning():
     """The Python face gives the inner case and acceptance a friendlier form under the same name."""
     homes = {}
-    for name, tree in MODULES.items():
+    for name, tree in modules().items():
         for node in tree.body:
             if within(name, "orchestrator") and isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes.setdefault(node.name, []).append(name)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.durations import LIST, LONGEST, NIGHTLY, Measure, mark, read_list
+from tests.support.durations import LIST, LONGEST, NIGHTLY, Measure, longest_first, mark, read_list
 
 
 class Item:
@@ -21,6 +21,16 @@ def test_what_is_on_the_list_is_slow_unless_it_is_always_to_be_quick():
     items = [Item(listed), Item(listed, "quick"), Item("tests/test_new.py::test_new")]
     mark(items)
     assert [item.names for item in items] == [{"slow"}, {"quick"}, set()]
+
+
+def test_the_longest_file_comes_first_where_all_are_slow():
+    short, long = "tests/a.py::test_of_no_list", next(iter(read_list()))
+    items = [Item(name, "slow") for name in (short, long)]
+    longest_first(items)
+    assert [item.nodeid for item in items] == [long, short]
+    items = [Item(short), Item(long, "slow")]
+    longest_first(items)
+    assert [item.nodeid for item in items] == [short, long]
 
 
 def test_the_list_names_tests_of_files_that_are_there_each_once():

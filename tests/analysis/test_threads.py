@@ -14,7 +14,7 @@ def blas_threads():
 
 
 def test_two_computations_and_the_block_are_under_way_at_the_same_time_with_one_thread_of_blas():
-    together = threading.Barrier(3, timeout=10)
+    together = threading.Barrier(3, timeout=60)
 
     def compute():
         together.wait()  # breaks if one of them began after another's end
@@ -42,12 +42,12 @@ def test_what_has_not_begun_is_given_up_where_the_block_fails():
 
     def wait():
         begun.release()
-        assert go_on.wait(10)
+        assert go_on.wait(60)
 
     def interrupted():
         with side_by_side() as pool:
             computations.extend(pool.submit(wait) for _ in range(3))
-            assert all(begun.acquire(timeout=10) for _ in range(2))
+            assert all(begun.acquire(timeout=60) for _ in range(2))
             threading.Timer(0.1, go_on.set).start()
             raise KeyboardInterrupt
 
@@ -66,7 +66,7 @@ def test_who_is_alone_may_ask_for_it_again_and_others_wait():
         with alone(), alone():
             assert blas_threads() == {1}
             inside.set()
-            assert go_on.wait(10)
+            assert go_on.wait(60)
 
     def another():
         with alone():

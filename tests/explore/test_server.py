@@ -114,7 +114,7 @@ def test_it_ends_a_while_after_its_last_page_was_closed():
     time.sleep(1.2)
     assert serving.is_alive()  # as long as one is open
     found.left("p", told)
-    serving.join(5)
+    serving.join(60)
     assert not serving.is_alive()
 
 
@@ -125,7 +125,7 @@ def test_it_waits_for_its_first_page():
     time.sleep(0.8)
     assert serving.is_alive()
     found.left("p", queue.SimpleQueue())
-    serving.join(5)
+    serving.join(60)
 
 
 # -- the files of the page -------------------------------------------------------------------------

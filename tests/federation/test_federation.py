@@ -403,14 +403,14 @@ def test_the_program_of_the_guide(tmp_path, temporary, started):
 def test_only_who_knows_the_word_comes_in():
     """Another program of this machine that calls first is sent away, and the hub's call after it is taken."""
     with Door() as door:
-        stranger = Frames(socket.create_connection(("127.0.0.1", door.port), timeout=5.0))
+        stranger = Frames(socket.create_connection(("127.0.0.1", door.port), timeout=60.0))
         stranger.send(JOIN, b"guessed")
         hub = call(door.port, door.word)
-        taken = door.accept(5.0)
+        taken = door.accept(60.0)
         hub.send(JOIN, b"here")
-        assert taken.receive(5.0) == (JOIN, b"here")
+        assert taken.receive(60.0) == (JOIN, b"here")
         with pytest.raises(EOFError):
-            stranger.receive(5.0)
+            stranger.receive(60.0)
         for end in (stranger, hub, taken):
             end.close()
 

@@ -1,6 +1,7 @@
 """Which schedule a tool runs is told from its output, whatever that looks like; FMPy, always there, is asked."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,8 +15,12 @@ from tests.interop import drivers
 from tests.interop.jobs import job_of, write_ssp
 
 H, N = 0.1, 20
-EVERY = [pair for extrapolation in EXTRAPOLATIONS for pair in candidates(H, N, extrapolation)]
 HEADS = ["time", *SIGNALS]
+
+
+@cache
+def every():
+    return [pair for extrapolation in EXTRAPOLATIONS for pair in candidates(H, N, extrapolation)]
 
 
 def table(rows, heads=HEADS, separator=",", text=repr):
@@ -45,7 +50,7 @@ def one(**properties):
     """Rows of the schedule with these properties; the rest as our own."""
     usual = {"order": "side by side", "first_inputs": "consistent", "extrapolation": 0.0, "early_label": 0}
     wanted = usual | {"after_exchange": False, "wire_by_wire": False} | properties
-    ((candidate, rows),) = [p for p in EVERY if all(getattr(p[0], name) == wanted[name] for name in PROPERTIES)]
+    ((candidate, rows),) = [p for p in every() if all(getattr(p[0], name) == wanted[name] for name in PROPERTIES)]
     return candidate, rows_of(rows)
 
 
@@ -54,18 +59,18 @@ def one(**properties):
 
 def test_every_schedule_is_told(told):
     """From all signals with all digits: nothing else fits but what gives the very same values."""
-    assert len(EVERY) == 228
-    for candidate, rows in EVERY:
+    assert len(every()) == 228
+    for candidate, rows in every():
         verdict = told(table(rows_of(rows)))
         assert candidate in verdict.fits
         for fit in verdict.fits:
-            other = dict(EVERY)[fit]
+            other = dict(every())[fit]
             both = ~np.isnan(rows) & ~np.isnan(other)
             assert np.abs(rows - other)[both].max() < 1e-9
 
 
 def test_every_schedule_is_told_from_two_outputs_with_six_digits(told):
-    for candidate, rows in EVERY:
+    for candidate, rows in every():
         verdict = told(table(rows_of(rows)[:, :3], HEADS[:3], text=lambda value: f"{value:.6g}"))
         assert candidate in verdict.fits
         for name in ("order", "extrapolation", "early_label"):

@@ -32,11 +32,11 @@ SECONDS = 1800.0
 def environment(tmp_path):
     """Make a virtual environment over this one, in which a guide may install; returns its variables."""
     home = tmp_path / "venv"
-    subprocess.run([sys.executable, "-m", "venv", str(home)], check=True)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(home)], check=True)
     folder = home / ("Scripts" if os.name == "nt" else "bin")
     (packages,) = home.rglob("site-packages")
     (packages / "beneath.pth").write_text(f"{sysconfig.get_path('purelib')}\n", encoding="utf-8")
-    for command, module in {"gfor": "orchestrator.cli", "pytest": "pytest", "mypy": "mypy"}.items():
+    for command, module in {"gfor": "orchestrator.cli", "pip": "pip", "pytest": "pytest", "mypy": "mypy"}.items():
         script = folder / command
         script.write_text(f'#!/bin/sh\nexec {folder}/python -m {module} "$@"\n', encoding="utf-8")
         script.chmod(0o755)

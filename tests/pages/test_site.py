@@ -8,18 +8,24 @@ import pytest
 
 from tests.pages.markdown import ROOT, name_of, pages
 from tests.pages.notebooks import NOTEBOOKS
+from tests.support.once import made_once
 
+pytestmark = pytest.mark.slow  # all of them, or the site would be built for the quick ones as well
 pytest.importorskip("mkdocs")
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     """The folder of the built site."""
-    folder = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(ROOT / ".docs" / "mkdocs.yml")]
-    done = subprocess.run([*command, "--site-dir", str(folder)], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return folder
+
+    def build(folder):
+        command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(ROOT / ".docs" / "mkdocs.yml")]
+        done = subprocess.run(
+            [*command, "--site-dir", str(folder)], cwd=ROOT, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+
+    return made_once(tmp_path_factory, "site", build)
 
 
 def test_every_page_is_there(site):

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.analysis.continuation import follow_along, pair_at, pairs_near
@@ -27,6 +27,7 @@ from orchestrator.pod_design.lead_lag import (
 angles = st.floats(-179.9, 180)
 
 
+@settings(deadline=None)
 @given(angles, st.floats(0.5, 12.0), st.integers(1, 3))
 def test_the_lead_lag_turns_the_sensitivity_to_180_degrees(phase, centre, stages):
     if abs(compensation_deg(phase)) / stages >= 89:
@@ -36,6 +37,7 @@ def test_the_lead_lag_turns_the_sensitivity_to_180_degrees(phase, centre, stages
     assert abs(abs(angle_deg(turned)) - 180) < 1e-6
 
 
+@settings(deadline=None)
 @given(angles, st.floats(0.5, 12.0))
 def test_the_lead_lag_is_centred_and_leads_for_positive_angles(phase, centre):
     if abs(compensation_deg(phase)) / 3 >= 89:

@@ -5,6 +5,7 @@ is not on the list, for example a new one, counts as quick.
 """
 
 import os
+from collections import Counter
 from collections.abc import Generator
 from pathlib import Path
 
@@ -40,6 +41,19 @@ def mark(items: list[pytest.Item]) -> None:
             item.add_marker("slow")
         if item.nodeid in listed and not item.get_closest_marker("quick"):
             item.add_marker("slow")
+
+
+def longest_first(items: list[pytest.Item]) -> None:
+    """Where all are slow, the longest file comes first: with ``--dist loadfile`` no worker ends alone with one."""
+    seconds: Counter[str] = Counter()
+    for test, of_test in read_list().items():
+        seconds[_file_of(test)] += of_test
+    if all(item.get_closest_marker("slow") for item in items):
+        items.sort(key=lambda item: -seconds[_file_of(item.nodeid)])
+
+
+def _file_of(test: str) -> str:
+    return test.partition("::")[0]
 
 
 class Measure:
