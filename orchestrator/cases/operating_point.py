@@ -40,7 +40,6 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     note_contradictions(draft, units)
     if draft.found.problems:
         return None
-    intact = slack
     if draft.dispatch is not None:
         slack = _reference(draft, units, slack, table.grid)
     undecided = list(undecided_units(draft, units, slack))
@@ -56,7 +55,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         return None
     question(draft, undecided)
     draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
-    draft.found.questions += _leftover(draft, flow) if slack == intact else []  # else what it fed before is shared
+    draft.found.questions += _leftover(draft, flow) if draft.dispatch is None else []  # else a column's
     return flow
 
 

@@ -96,8 +96,7 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
     plan, request, verdict = design.plan, design.plan.request, design.verdict
     limiting = verdict.limiting
     return {
-        "case": plan.case.name,
-        "scenario": plan.prepared.name,
+        **plan.prepared.about,
         "verdict": verdict_sentence(verdict),
         "met": verdict.met,
         "stable": verdict.stable,
@@ -116,7 +115,6 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
         "astray": [_where(point) | {"difference": point.astray} for point in verdict.astray],
         "unforeseen": [_where(point) for point in verdict.unforeseen],
         "warnings": remarks(verdict),
-        "questions": [*map(str, plan.prepared.questions)],
         "settings": [
             {
                 "controller": group.controller, "components": list(group.components), "K": setting.gain,

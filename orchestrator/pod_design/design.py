@@ -23,7 +23,7 @@ from orchestrator.errors import AnalysisError, InputError
 from orchestrator.pod_design import lead_lag as leads
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting, figures_of
 from orchestrator.pod_design.guard import Naming, Surroundings, breach, surroundings
-from orchestrator.pod_design.margins import Margins, compute_margins
+from orchestrator.pod_design.margins import LARGER_GAIN, Margins, compute_margins
 from orchestrator.pod_design.refinement import Judgement, Refinement, refine, sweep
 from orchestrator.pod_design.target import (
     CRITICAL,
@@ -173,6 +173,13 @@ class PodDesign:
     @property
     def damping_met(self) -> bool:
         return self.achieved_damping >= self.required_damping - _MET
+
+    @property
+    def thin_margin(self) -> float | None:
+        """The target's damping ratio with a gain that is larger by `VARIATION`, where the requirement is met and that
+        is too little; None where it holds there, or that is not known."""
+        there = self.margins.variations.get(LARGER_GAIN) if self.margins else None
+        return there if self.met and there is not None and there < self.required_damping - _MET else None
 
     @property
     def achieved(self) -> complex:

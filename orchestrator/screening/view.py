@@ -243,9 +243,7 @@ def remarks(summary: Summary) -> list[str]:
 def as_json(summary: Summary) -> dict[str, Any]:
     result = summary.result
     return {
-        "case": result.plan.case.name,
-        "scenario": result.plan.prepared.name,
-        "questions": [*map(str, result.plan.prepared.questions)],
+        **result.plan.prepared.about,
         "points": len(result.plan.points),
         "outages": len(result.plan.outages) - 1,
         "items": len(result.items),

@@ -150,6 +150,7 @@ def _attributes(samples: Samples) -> dict[str, Any]:
     low, high = result.plan.frequency_range
     return {k: v for k, v in origin.items() if k not in ("scenario", "events")} | own | {
         "overrides": json.dumps(result.plan.overrides),
+        "models": result.plan.scenarios[0].models or "",
         "warned": json.dumps([*_asked(samples), *warned(samples)]),
         "frequency_range_hz": [low, high],
     }  # fmt: skip

@@ -6,6 +6,7 @@ from html import escape
 import numpy as np
 import xarray as xr
 
+from orchestrator.errors import counted
 from orchestrator.report.html.charts import ChartCurve, Mark, bar_chart, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
@@ -167,7 +168,8 @@ def operating_point(results: Results) -> str:
                 for kind in found
             ]
             details.append(
-                f"<details><summary>{escape(s['title'])}: {len(found['machines'])} units, {len(buses)} buses</summary>"
+                f"<details><summary>{escape(s['title'])}: {counted(len(found['machines']), 'unit')}, "
+                f"{counted(len(buses), 'bus')}</summary>"
                 f"{''.join(shown)}</details>"
             )
         residual = f"{flow['residual']:.1e}" if flow else "–"
