@@ -40,6 +40,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     note_contradictions(draft, units)
     if draft.found.problems:
         return None
+    intact = slack
     if draft.dispatch is not None:
         slack = _reference(draft, units, slack, table.grid)
     undecided = list(undecided_units(draft, units, slack))
@@ -55,7 +56,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
         return None
     question(draft, undecided)
     draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
-    draft.found.questions += _leftover(draft, flow) if draft.dispatch is None else []  # else a column's
+    draft.found.questions += _leftover(draft, flow) if slack == intact else []  # else what it fed before is shared
     return flow
 
 

@@ -66,6 +66,12 @@ class PodSetting:
     gain: float
     filters: LeadLag
 
+    def parameters(self, keys: Sequence[str], controller: str, stages: int) -> dict[str, bool | float | str]:
+        """By ``component.variable``, with eight significant digits: far more precise than any controller's setting."""
+        found = {"enabled": self.gain > 0, "K": float(f"{self.gain:.8g}"), "T_S1": float(f"{self.filters.T_S1:.8g}"),
+                 "T_S2": float(f"{self.filters.T_S2:.8g}"), "N_S": stages}  # fmt: skip
+        return {f"{component}.{controller}.{key}": value for component in keys for key, value in found.items()}
+
 
 @dataclass(frozen=True)
 class Placed:

@@ -306,6 +306,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         return judged[placed.setting]
 
     def settings() -> Sequence[tuple[str, PodSetting]]:
+        report("refinement: a search and a grid of settings on the linear model")
         return start.search(start.prepared.case, request, start.target, start.mode_name, loop, initial.imag)
 
     report("sensitivity of the mode")
@@ -323,9 +324,8 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     short = damping_ratio(after.counting(designed.eigenvalue)) < required - _MET
     broken = breach(before, after, request.least_damping)
     if request.refine or ((short or broken) and request.gain_bounds is None):
-        report("refinement")
         bounds, evenly = request.bounds(search=True), request.mode is None
-        refinement = refine(loop, off, filters, required, bounds, judge, settings, evenly=evenly)
+        refinement = refine(loop, off, filters, required, bounds, judge, settings, evenly=evenly, report=report)
         final = refinement.chosen or designed
         after = around(final)
         broken = breach(before, after, request.least_damping)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -149,14 +148,7 @@ def design_json(d: PodDesign) -> dict[str, Any]:
 
 
 def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
-    setting, values = d.final.setting, {}
-    for component in d.target.key:
-        own: Mapping[str, bool | float | str] = {
-            "enabled": setting.gain > 0, "K": _rounded(setting.gain), "T_S1": _rounded(setting.filters.T_S1),
-            "T_S2": _rounded(setting.filters.T_S2), "N_S": d.target.stages,
-        }  # fmt: skip
-        values.update({f"{component}.{d.request.controller}.{key}": value for key, value in own.items()})
-    return values
+    return d.final.setting.parameters(d.target.key, d.request.controller, d.target.stages)
 
 
 def provenance(d: PodDesign, command: str) -> list[str]:
@@ -168,11 +160,6 @@ def provenance(d: PodDesign, command: str) -> list[str]:
         f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",
         "K in pu of the converter's rating, T_S1 and T_S2 in s",
     ]
-
-
-def _rounded(value: float) -> float:
-    """A number with eight significant digits: legible, and far more precise than any controller's setting."""
-    return float(f"{value:.8g}")
 
 
 def _complex(value: complex) -> dict[str, float]:
@@ -202,11 +189,8 @@ def _margins_json(m: Margins) -> dict[str, Any]:
 
 
 def _refinement_json(d: PodDesign) -> dict[str, Any]:
-    def placed(p: Placed) -> dict[str, Any]:
-        return {"K": p.setting.gain, "mode": _complex(p.eigenvalue), "damping_ratio": p.damping_ratio}
-
-    def with_least(p: Placed, least: float | None) -> dict[str, Any]:
-        return placed(p) | {"least_damping_ratio": least}
+    def placed(p: Placed, **least: float | None) -> dict[str, Any]:
+        return {"K": p.setting.gain, "mode": _complex(p.eigenvalue), "damping_ratio": p.damping_ratio, **least}
 
     def filters(f: LeadLag) -> dict[str, float]:
         return {"T_S1": f.T_S1, "T_S2": f.T_S2}
@@ -217,8 +201,8 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
         "designed": filters(d.filters) | placed(d.designed),
         "sweeps": [{
             "lead_lag": s.why, **filters(s.filters),
-            "points": [with_least(p, least) for p, least in zip_longest(s.points, s.least)],
-            "chosen": with_least(s.chosen, s.chosen_least), "unstable_gains": list(s.unstable),
+            "points": [placed(p, least_damping_ratio=least) for p, least in zip_longest(s.points, s.least)],
+            "chosen": placed(s.chosen, least_damping_ratio=s.chosen_least), "unstable_gains": list(s.unstable),
         } for s in refinement.sweeps],
         "notes": refinement.notes,
     }  # fmt: skip

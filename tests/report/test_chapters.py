@@ -241,7 +241,7 @@ def test_results_of_two_versions_of_a_file_are_not_one_study(tmp_path):
     assert "one study" not in written([first, again], tmp_path)
     with pytest.warns(ResultsWarning, match=r"own\.raw differs between .*old.*again.*and .*new.*not comparable"):
         text = written([first, again, edited], tmp_path, short=True)
-    assert 'class="bad">NO: own.raw differs between' in text
+    assert 'class="bad">own.raw differs between' in text
     kept = json.loads(text[text.index('id="answers">') + 13 :].partition("</script>")[0])
     assert kept[0]["answer"].startswith("NO: own.raw differs")
     assert kept[1]["given"] == "gfor scr own.toml --set models=emt --parameters p.toml"

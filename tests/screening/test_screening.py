@@ -190,6 +190,11 @@ def test_a_power_of_the_slacks_unit_is_asked_about(two_area, tmp_path, column):
     assert (
         f"cannot act on {', '.join(elements.balancing)}: {elements.slack} is the slack and feeds what is left" in found
     )
+    point, _ = read_points(path, prepared, elements)
+    assert not {f"{unit}.P_0" for unit in elements.balancing} & {*point.values}, (
+        "asked once, and not at each point again"
+    )
+    assert "sg1.P_0" in point.values
     path.write_text("name,sg2.P_mw,generation\na,,0.9\n")
     assert not [*questions_about(path, prepared, elements)], "an empty column gives no power"
     (point,) = read_points(path, prepared, elements)

@@ -15,7 +15,7 @@ from orchestrator.errors import InputError, few
 from orchestrator.report.html import sections, studies
 from orchestrator.report.html.chapters import Chapter, chapters_of, of_run, of_sweep
 from orchestrator.report.html.chapters import sections as sections_of
-from orchestrator.report.html.elements import Figures, document, held_data, table
+from orchestrator.report.html.elements import Figures, document, held_data, paragraphs, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, ResultsWarning
@@ -46,7 +46,9 @@ def write_report(
 
 def page(places: Sequence[Path], against: Path | None = None, title: str | None = None, *, short: bool = False) -> str:
     told, runs = _told(places, Figures())
-    chapters = [*_of_one_study(told), *(chapter for chapter, _ in told)]
+    chapters = [chapter for chapter, _ in told]
+    if differ := _of_several_studies(list(dict.fromkeys(chapter.source for chapter in chapters))):
+        warnings.warn(differ, ResultsWarning, stacklevel=2)
     headings = [heading for _, content in told for heading, _ in content]
     content = [
         (heading if headings.count(heading) == 1 else f"{heading} ({_name(chapter.source)})", text)
@@ -64,8 +66,10 @@ def page(places: Sequence[Path], against: Path | None = None, title: str | None 
     title = title or (case.table.title or case.name if case else f"Report on {', '.join(map(_name, places))}")
     kind = "Small-signal and time-domain study by co-simulation of FMUs"
     found = "".join(map(sections.findings, runs))
-    answers = held_data("answers", _answers(chapters))  # for `changes` of a later page
-    return document(title, kind, first_page(chapters) + picture + found + answers, content)
+    of_all = {"question": "Are these results of one study?", "source": "", "answer": f"NO: {differ}"}
+    answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])  # for `changes` of a later page
+    first_screen = (paragraphs(False, [differ]) if differ else "") + first_page(chapters)
+    return document(title, kind, first_screen + picture + found + answers, content)
 
 
 def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter, Sections]], list[Results]]:
@@ -107,20 +111,16 @@ def _parts(place: Path, depth: int = 2) -> Iterator[Path]:
                 yield from _parts(inner, depth - 1)
 
 
-def _of_one_study(told: Sequence[tuple[Chapter, Sections]]) -> Iterator[Chapter]:
-    """An answer of its own where two results were made from a file of one name with different content."""
+def _of_several_studies(sources: Sequence[Path]) -> str:
+    """Which results were made from a file of one name with different content; "" where none were."""
     seen: dict[str, dict[str, list[str]]] = {}
-    for source in dict.fromkeys(chapter.source for chapter, _ in told):
+    for source in sources:
         for name, content in _origin(source).get("inputs", {}).items():
             shown = name if Path(name).suffix in _RECORDS else Path(name).name
             seen.setdefault(shown, {}).setdefault(str(content), []).append(str(source))
     differ = {name: [few(places, 2) for places in by.values()] for name, by in seen.items() if len(by) > 1}
-    if differ:
-        said = "; ".join(f"{name} differs between {' and '.join(places)}" for name, places in differ.items())
-        answer = f"NO: {said}; figures are not comparable as one study"
-        warnings.warn(answer.removeprefix("NO: "), ResultsWarning, stacklevel=2)
-        sure = "SHA-256 of the files that each command read"
-        yield Chapter(told[0][0].source, "Are these results of one study?", answer, False, sure)
+    said = "; ".join(f"{name} differs between {' and '.join(places)}" for name, places in differ.items())
+    return said and f"{said}; figures are not comparable as one study"
 
 
 def _name(place: Path) -> str:
