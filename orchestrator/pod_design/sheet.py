@@ -98,7 +98,7 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
 
 
 def _refinement(r: Refinement, required: float) -> Table:
-    columns = ("Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gain [pu]: least damping of all modes [%]",
+    columns = ("Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gain [pu] → least damping of all modes [%]",
                f"Best, or first with {percent(required)}: the target", "the least of all")  # fmt: skip
     return _table("Refinement on the closed loop", *columns, rows=map(_swept, r.sweeps))
 
@@ -107,7 +107,7 @@ def _swept(s: GainSweep) -> tuple[str, ...]:
     gains = [p.setting.gain for p in s.points]
     marks = [_MARK * (gain in s.unstable) for gain in gains]
     each = zip(gains, s.least, marks, strict=False)
-    dampings = ", ".join(f"{gain:.4g}: {100 * least:.1f}{mark}" for gain, least, mark in each)
+    dampings = ", ".join(f"{gain:.4g}→{100 * least:.1f}{mark}" for gain, least, mark in each)
     chosen = f"{s.chosen.setting.gain:.1f}{_MARK * (s.chosen.setting.gain in s.unstable)}"
     return (
         s.why, f"{s.filters.T_S1:.4f}", f"{s.filters.T_S2:.4f}",
