@@ -185,7 +185,8 @@ def test_powers_that_look_like_pu_are_asked_about(two_area, tmp_path):
 def test_a_power_of_the_slacks_unit_is_asked_about(two_area, tmp_path, column):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
-    path.write_text(f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,700,900,1\nb,,,1\n")
+    power = 0.7 if column.endswith("P_0") else 700
+    path.write_text(f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,{power},900,1\nb,,,1\n")
     (found,) = [str(one) for one in questions_about(path, prepared, elements)]
     assert (
         f"cannot act on {', '.join(elements.balancing)}: {elements.slack} is the slack and feeds what is left" in found
