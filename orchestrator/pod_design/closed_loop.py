@@ -68,8 +68,9 @@ class PodSetting:
 
     def parameters(self, keys: Sequence[str], controller: str, stages: int) -> dict[str, bool | float | str]:
         """By ``component.variable``, with eight significant digits: far more precise than any controller's setting."""
-        found = {"enabled": self.gain > 0, "K": float(f"{self.gain:.8g}"), "T_S1": float(f"{self.filters.T_S1:.8g}"),
-                 "T_S2": float(f"{self.filters.T_S2:.8g}"), "N_S": stages}  # fmt: skip
+        numbers = {"K": self.gain, "T_S1": self.filters.T_S1, "T_S2": self.filters.T_S2}
+        found: dict[str, bool | float | str] = {"enabled": self.gain > 0}
+        found |= {key: float(f"{number:.8g}") for key, number in numbers.items()} | {"N_S": stages}
         return {f"{component}.{controller}.{key}": value for component in keys for key, value in found.items()}
 
 

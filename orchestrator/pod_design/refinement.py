@@ -90,8 +90,7 @@ def refine(
     even = -1.0
     near = ((why, candidate, None) for why, candidate in _candidates(loop, result, filters))
     for why, candidate, gain in chain(near, _searched(result, search)):
-        best = f", the best so far {100 * result.score:.2f} %" if result.chosen else ""
-        report(f"refinement, lead/lag {why}: {len(result.sweeps)} swept before{best}")
+        report(f"refinement, lead/lag {why}: {len(result.sweeps)} swept before")
         try:
             found = sweep(loop, off, candidate, required, bounds, why, gain)
         except AnalysisError as error:

@@ -227,7 +227,7 @@ def test_the_answer_of_a_search_for_a_limit_is_on_the_page(tmp_path):
 def made(folder, name, content, run="r", **inputs):
     folder.mkdir(exist_ok=True)
     (folder / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
-    command = f"gfor {name} own.toml --set models=emt --parameters p.toml --out {folder}"
+    command = f"gfor {name} --json own.toml --set models=emt --html=p.html --parameters p.toml --out {folder}"
     origin.said.append(lambda: {"command": command, "inputs": inputs})
     write_manifest(folder, run, [f"{name}.json"])
     origin.said.pop()
@@ -239,6 +239,10 @@ def test_results_of_two_versions_of_a_file_are_not_one_study(tmp_path):
     again = made(tmp_path / "again", "scr", SCR, **{"net/own.raw": "1a", "again/ring.csv": "6"})
     edited = made(tmp_path / "new", "scr", SCR, **{"own.raw": "2b"})
     assert "one study" not in written([first, again], tmp_path)
+    for code in ("nts", "ercot"):  # each certificate keeps files of the same names
+        sealed = CERTIFICATE | {"made": "2026-01-01", "files": {"converter.fmu": code}}
+        made(tmp_path / code, "certificate", sealed)
+    assert "one study" not in written([tmp_path / "nts", tmp_path / "ercot"], tmp_path)
     with pytest.warns(ResultsWarning, match=r"own\.raw differs between .*old.*again.*and .*new.*not comparable"):
         text = written([first, again, edited], tmp_path, short=True)
     assert 'class="bad">own.raw differs between' in text

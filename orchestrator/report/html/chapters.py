@@ -134,7 +134,6 @@ def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
 
 
 def _with_models(chapter: Chapter, content: Any) -> Chapter:
-    """The chapter with the kind of models, and what was asked and warned of."""
     records = [one for one in (content if isinstance(content, list) else [content]) if isinstance(one, dict)]
     told = (one.get(key) for one in records for key in ("warnings", "questions"))
     more = chain(*(texts for texts in told if isinstance(texts, list)))

@@ -68,8 +68,8 @@ def page(places: Sequence[Path], against: Path | None = None, title: str | None 
     found = "".join(map(sections.findings, runs))
     of_all = {"question": "Are these results of one study?", "source": "", "answer": f"NO: {differ}"}
     answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])  # for `changes` of a later page
-    first_screen = (paragraphs(False, [differ]) if differ else "") + first_page(chapters)
-    return document(title, kind, first_screen + picture + found + answers, content)
+    above = paragraphs(False, [differ]) if differ else ""
+    return document(title, kind, above + first_page(chapters) + picture + found + answers, content)
 
 
 def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter, Sections]], list[Results]]:
@@ -149,14 +149,14 @@ def first_page(chapters: Sequence[Chapter]) -> str:
     rows = []
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
-        open_ = (
-            "<br>".join(escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN]) or "nothing that is known of"
-        )
+        open_ = "<br>".join(escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN])
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
         given = "".join(f"<br>{escape(text)}" for text in (str(one.source), _given(one.source)) if text)
         asked = f'{escape(one.question)}<span class="soft">{given}</span>'
-        rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), open_ + more])
+        rows.append(
+            [asked, answer, escape(short(one.sure, 2 * _LONGEST)), (open_ or "nothing that is known of") + more]
+        )
     return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
 
 
@@ -176,7 +176,7 @@ def _origin(source: Path) -> dict[str, Any]:
             return said
         case str(date):  # a certificate's
             made_by = own.get("environment", {})
-            return {"date": date, "made_by": made_by, "inputs": own.get("files", {}),
+            return {"date": date, "made_by": made_by, "sealed": own.get("files", {}),
                     "code": made_by.get("Commit", ""), "command": f"gfor verify {folder}"}  # fmt: skip
     content = _tables(folder / MANIFEST)
     listed = content.get("files", {}).get(source.name)
@@ -186,14 +186,16 @@ def _origin(source: Path) -> dict[str, Any]:
 def _given(source: Path) -> str:
     """What a command was given: case, scenario, values, files; without where its results went."""
     words = shlex.split(_origin(source).get("command", ""))
-    kept = (word for before, word in pairwise(words) if not {before, word} & {*_OUTPUTS, "--json"})
+    shown = (word for before, word in pairwise(words) if before not in _OUTPUTS)
+    kept = (word for word in shown if word.partition("=")[0] not in {*_OUTPUTS, "--json"})
     return shlex.join(["gfor", *kept]) if words else ""
 
 
 def _made(source: Path) -> list[str]:
     content = _origin(source)
+    listed = content.get("inputs", content.get("sealed", {}))
     versions = content.get("made_by", {}).get("gfor-cosim")
-    inputs = ", ".join(f"{name} {str(of)[:8]}" for name, of in content.get("inputs", {}).items() if of)
+    inputs = ", ".join(f"{name} {str(of)[:8]}" for name, of in listed.items() if of)
     date = content.get("date") or f"{datetime.fromtimestamp(source.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"
     figures = f"gfor-cosim {versions}" if versions else "", str(content.get("code", ""))[:12], inputs
     return [str(source), date, *(text or "not recorded" for text in (*figures, content.get("command")))]
