@@ -149,14 +149,12 @@ def first_page(chapters: Sequence[Chapter]) -> str:
     rows = []
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
-        open_ = "<br>".join(escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN])
+        lost = [escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN]] or ["nothing that is known of"]
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
         given = "".join(f"<br>{escape(text)}" for text in (str(one.source), _given(one.source)) if text)
         asked = f'{escape(one.question)}<span class="soft">{given}</span>'
-        rows.append(
-            [asked, answer, escape(short(one.sure, 2 * _LONGEST)), (open_ or "nothing that is known of") + more]
-        )
+        rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), "<br>".join(lost) + more])
     return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
 
 
