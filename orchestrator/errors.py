@@ -21,6 +21,11 @@ def few(texts: Iterable[str], most: int, between: str = ", ") -> str:
     return between.join(texts[:most]) + more
 
 
+def counted(number: int, what: str) -> str:
+    """``3 points``."""
+    return f"{number} {what}" if number == 1 else f"{number} {what}{'es' if what.endswith('s') else 's'}"
+
+
 class ErrorKind(StrEnum):
     """What is wrong. Programs decide by the kind; the text is for people."""
 

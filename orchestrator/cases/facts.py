@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.prepare import PreparedScenario
+from orchestrator.errors import counted
 
 SOURCES = ("raw", "matpower", "pandapower", "cgmes")  # keys of ``[network]`` that name another program's data
 _NAMES = {zip_: name for name, zip_ in LAWS.items()}
@@ -25,11 +26,11 @@ class Facts:
     voltages_pu: tuple[float, float]  # least and largest magnitude
 
     def sentence(self) -> str:
-        units = [_counted(n, what) for n, what in ((self.machines, "machine"), (self.converters, "converter")) if n]
+        units = [counted(n, what) for n, what in ((self.machines, "machine"), (self.converters, "converter")) if n]
         slack = ", ".join(f"{n} at {p:.4g} MW ({100 * p / S_n:.0f} %)" for n, p, S_n in self.slack)
         parts = [
             "phasor models" if self.phasors else "EMT models",
-            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []), _counted(self.buses, "bus"), *units,
+            *([f"{self.frequency_hz:g} Hz"] if self.frequency_hz else []), counted(self.buses, "bus"), *units,
             *(["no governor"] if self.machines and not self.governed else []),
             f"{self.load_mw:.5g} MW of load ({self.load_model})", *([f"slack {slack}"] if slack else []),
             "voltages {:.3g} to {:.3g} pu".format(*self.voltages_pu),
@@ -69,10 +70,6 @@ def rated_frequency(prepared: PreparedScenario) -> float | None:
     """Of all components, which have one in common [Hz]; None where none has one."""
     plans = prepared.system.components.values()
     return next((plan.number("f_n") for plan in plans if "f_n" in plan.description.variables), None)
-
-
-def _counted(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}{'es' if what.endswith('s') else 's'}"
 
 
 def _model(loads: list[Load]) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from fmus.grid.network import Network
 from fmus.toolchain.catalogue import model_names, network_of, parts_of
@@ -80,6 +81,19 @@ class PreparedScenario:
     def subject(self) -> str:
         """The title, with what parameter files and the caller set."""
         return ", with ".join(filter(None, (self.title, self.changed)))
+
+    @property
+    def models(self) -> str | None:
+        """``emt`` or ``phasor``; None where no component's model is of the catalogue."""
+        named = [table.model for table in self.case.table.components.values() if table.model]
+        of_names = "phasor" if any("phasor" in name for name in named) else "emt"
+        return self.case.table.models or (of_names if named else None)
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What the JSON of every study says of its scenario."""
+        return {"case": self.case.name, "scenario": self.name, "subject": self.subject, "models": self.models,
+                "questions": [*map(str, self.questions)]}  # fmt: skip
 
     @property
     def grid(self) -> str:

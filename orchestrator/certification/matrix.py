@@ -17,7 +17,7 @@ from orchestrator.certification.files import HTML, JSON
 from orchestrator.certification.margins import CriterionMargin, margin_text, narrowest
 from orchestrator.certification.texts import TEXTS
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, NOT_TRUSTED, PASSES, exit_code
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, counted
 from orchestrator.fmi.values import as_text
 from orchestrator.points.failure import Failure
 from orchestrator.report.html.elements import document, table
@@ -89,10 +89,10 @@ class CertificateMatrix:
     def sentence(self) -> str:
         verdicts = [cell.verdict for cell in self.cells.values() if cell.figures is None]
         said = {PASSES: "passed", FAILS: "failed", INCOMPLETE: INCOMPLETE, NOT_TESTED: NOT_TESTED}
-        counted = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key)))
+        judged = ", ".join(f"{n} {word}" for key, word in said.items() if (n := verdicts.count(key)))
         alone = list(dict.fromkeys(cell.code for cell in self.cells.values() if cell.figures is not None))
         refused = [name for name in self.devices if any(self.cells[name, code].refused for code in self.codes)]
-        text = f"Of {len(verdicts)} certificates: {counted}." if verdicts else "No certificate was asked for."
+        text = f"Of {counted(len(verdicts), 'certificate')}: {judged}." if verdicts else "No certificate was asked for."
         if alone:
             text += f" Figures without a verdict: {', '.join(alone)}."
         if self.left_out:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from io import TextIOWrapper
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +112,8 @@ def _origin(words: Sequence[str]) -> dict[str, Any]:
     from orchestrator.points.key import files_named, sha256_of  # noqa: PLC0415 - likewise
 
     inputs = {}
-    for path in (Path(word) for word in words if len(word) < _LONGEST_PATH and Path(word).is_file()):
+    given = (word for before, word in pairwise(["", *words]) if before not in ("--out", "--html"))
+    for path in (Path(word) for word in given if len(word) < _LONGEST_PATH and Path(word).is_file()):
         inputs[str(path)] = sha256_of(path)
         if path.suffix == ".toml":
             inputs |= files_named(path.read_text(encoding="utf-8", errors="replace"), path.parent)

@@ -24,7 +24,9 @@ def run(options: argparse.Namespace) -> int:
     convention, console = CONVENTION.format(options.converter_current), make_console()
     found = {s: weakest_first(s.strengths(options.converter_current, options.rating)) for s in chosen(options)}
     told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]
-    content = {"case": next(iter(found)).prepared.case.name, "convention": convention, "scenarios": told}
+    about = next(iter(found)).prepared.about
+    content = {"case": about["case"], "models": about["models"], "questions": about["questions"],
+               "convention": convention, "scenarios": told}  # fmt: skip
     keep_json(content, options.out, "scr")
     if options.json:
         print_json(content)

@@ -161,8 +161,8 @@ class RatedPoint:
         """Places of the named modes; None where one of the names is not borne here, so that all modes count."""
         if self._aim.naming is None:
             return None
-        names = self.loops.all_names(len(values))
-        places = [k for k in np.flatnonzero(oscillations(values)).tolist() if band_of(values[k]) == _SWINGING]
+        names, own = self.loops.all_names(len(left)), values[: len(left)]  # without those that a reduction left out
+        places = [k for k in np.flatnonzero(oscillations(own)).tolist() if band_of(values[k]) == _SWINGING]
         modes = {}
         for k in places:
             sides = self.loops.whole(left[:, k], left=True), self.loops.whole(right[:, k])

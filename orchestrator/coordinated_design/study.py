@@ -20,7 +20,7 @@ from orchestrator.coordinated_design.open_loops import PodPlace
 from orchestrator.coordinated_design.point import PointModes, PointsTask, compute_points
 from orchestrator.coordinated_design.search import RankedConverter, SettingSearch, Tried, best_first, ranked
 from orchestrator.coordinated_design.settings import PodGroup, SettingSpace
-from orchestrator.coordinated_design.verdict import JudgedPoint, PointsVerdict, judged, least_of
+from orchestrator.coordinated_design.verdict import MORE, JudgedPoint, PointsVerdict, judged, least_of
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.operating_points.plan import OperatingPoints, read_operating_points
 from orchestrator.pod_design.closed_loop import PodSetting, check_tunable
@@ -168,11 +168,8 @@ def _candidates(
     own = [place for group in groups for place in group.places]
     plan = case.components_of(scenario, request.overrides, request.files)
     for controller in request.controllers if request.ranked else ():
-        own += [
-            PodPlace(name, controller)
-            for name in with_controller(plan, controller)
-            if not plan[name].value(f"{controller}.enabled")
-        ]
+        able = with_controller(plan, controller)
+        own += [PodPlace(name, controller) for name in able if not plan[name].value(f"{controller}.enabled")]
     return tuple(dict.fromkeys(own))
 
 
@@ -187,11 +184,12 @@ class PointsDesign:
     ranking: tuple[RankedConverter, ...]  # converters by what a controller there alone would give, the best first
     evaluations: int
     compared: int = 0  # number of settings of an exhaustive grid that were tried; 0 without one
+    thin: float | None = None  # as `PointsVerdict` has it
 
     @property
     def verdict(self) -> PointsVerdict:
         request = self.plan.request
-        return PointsVerdict(self.points, request.damping, request.gain_bounds[1], self.compared)
+        return PointsVerdict(self.points, request.damping, request.gain_bounds[1], self.compared, self.thin)
 
 
 def design_over_points(
@@ -215,8 +213,11 @@ def design_over_points(
         stage("grid of settings, as the search did not reach what is wanted")
         found, compared = search.over_grid(found)
     reached = wanted is not None and found.worth.allowed and found.worth.worst >= wanted + _SPARE
+    thin = None
     if wanted is not None and reached:
         found = search.with_least_gain(found, wanted + _SPARE)
+        more = search.tried(found.x * np.tile([1.0, 1.0, MORE], len(plan.groups))).worth
+        thin = None if more.worst >= wanted else more.worst
     settings = tuple(space.group_settings(found.x))
     stage("operating points with the controllers")
     then = replace(work, report=lambda n, of: work.report(of + n, 2 * of))
@@ -234,7 +235,7 @@ def design_over_points(
     predicted = {point.number: worth_of_all(point.loops, space.setting(found.x), plan.aim) for point in rated}
     where = [plan.read.of(item) for item in plan.read.items]
     points = tuple(judged(where, before, after, plan.aim, predicted))
-    return PointsDesign(plan, frequency, settings, found, points, ranking, search.evaluations, compared)
+    return PointsDesign(plan, frequency, settings, found, points, ranking, search.evaluations, compared, thin)
 
 
 def _confirmed(
@@ -246,19 +247,16 @@ def _confirmed(
         return one
     group = PodGroup(one.place.controller, (one.place.component,), (one.place.component,), one.stages)
     values = {**plan.off, **values_of([group], [one.setting])}
-    points = known or with_followed_names(
-        plan.aim.names, before, modes_at(plan, values, (), work), {one.place: one.setting}
-    )
+    made = {one.place: one.setting}
+    points = known or with_followed_names(plan.aim.names, before, modes_at(plan, values, (), work), made)
     return replace(one, worst=least_of(points, plan.aim))
 
 
 def _stages(plan: PointsDesignPlan) -> dict[PodPlace, int]:
     own = {place: group.stages for group in plan.groups for place in group.places}
     plans = plan.prepared.system.components
-    return {
-        place: own.get(place, int(plans[place.component].number(f"{place.controller}.N_S")))
-        for place in plan.candidates
-    }
+    return {place: own.get(place, int(plans[place.component].number(f"{place.controller}.N_S")))
+            for place in plan.candidates}  # fmt: skip
 
 
 def _frequency(points: Sequence[PointModes]) -> float:
@@ -272,15 +270,7 @@ def values_of(groups: Sequence[PodGroup], settings: Sequence[PodSetting]) -> dic
     """The settings by ``component.variable``, with eight significant digits, as a parameter file has them."""
     values: dict[str, Value] = {}
     for group, setting in zip(groups, settings, strict=True):
-        for component in group.key:
-            name = f"{component}.{group.controller}"
-            values |= {
-                f"{name}.enabled": setting.gain > 0,
-                f"{name}.K": float(f"{setting.gain:.8g}"),
-                f"{name}.T_S1": float(f"{setting.filters.T_S1:.8g}"),
-                f"{name}.T_S2": float(f"{setting.filters.T_S2:.8g}"),
-                f"{name}.N_S": group.stages,
-            }
+        values |= setting.parameters(group.key, group.controller, group.stages)
     return values
 
 

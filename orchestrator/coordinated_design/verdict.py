@@ -11,6 +11,7 @@ from orchestrator.coordinated_design.point import PointModes
 from orchestrator.operating_points.outages import Outage
 from orchestrator.operating_points.points_file import OperatingCase
 
+MORE = 1.2  # of all gains: a setting that is not good enough with them has no margin
 ASTRAY = 1e-3  # from this difference of damping ratios on, the search's models and the modes anew disagree
 
 
@@ -150,12 +151,15 @@ class PointsVerdict:
 
     ``wanted``: damping ratio that is wanted everywhere; None for the best that there is.
     ``largest``: the largest gain that the search was allowed [pu].
-    ``compared``: number of settings of an exhaustive grid none of which was better; 0 without one."""
+    ``compared``: number of settings of an exhaustive grid none of which was better; 0 without one.
+    ``thin``: the least damping ratio with `MORE` of the gains, where that is less than wanted; else None."""
 
     def __init__(
-        self, points: Sequence[JudgedPoint], wanted: float | None, largest: float = 0.0, compared: int = 0
-    ) -> None:
-        self.points, self.wanted, self.largest, self.compared = tuple(points), wanted, largest, compared
+        self, points: Sequence[JudgedPoint], wanted: float | None, largest: float = 0.0, compared: int = 0,
+        thin: float | None = None,
+    ) -> None:  # fmt: skip
+        self.points, self.wanted, self.largest = tuple(points), wanted, largest
+        self.compared, self.thin = compared, thin
         self.known = [point for point in points if point.computed]
         self.failed = [point for point in points if not point.computed]
         self.unstable = [point for point in self.known if point.grows]

@@ -84,11 +84,8 @@ class CoordinatedDesign:
         return f"<CoordinatedDesign for {self.result.plan.case.name}: {self.verdict}>"
 
     def _repr_html_(self) -> str:
-        lines = [
-            self.verdict,
-            what_it_rests_on(self.result),
-            ", ".join(f"{k} = {v}" for k, v in self.parameters.items()),
-        ]
+        settings = ", ".join(f"{k} = {v}" for k, v in self.parameters.items())
+        lines = [self.verdict, what_it_rests_on(self.result), settings]
         return page(f"Design over points of {self.result.plan.case.name}", lines, self.points())
 
 
@@ -96,27 +93,19 @@ def as_json(design: PointsDesign) -> dict[str, Any]:
     plan, request, verdict = design.plan, design.plan.request, design.verdict
     limiting = verdict.limiting
     return {
-        "case": plan.case.name,
-        "scenario": plan.prepared.name,
-        "verdict": verdict_sentence(verdict),
-        "met": verdict.met,
-        "stable": verdict.stable,
-        "wanted_damping_ratio": request.damping,
-        "modes": list(request.modes) or "all",
-        "least_damping_of_others": request.least_damping,
-        "gain_bounds": list(request.gain_bounds),
+        **plan.prepared.about,
+        "verdict": verdict_sentence(verdict), "met": verdict.met, "stable": verdict.stable,
+        "wanted_damping_ratio": request.damping, "modes": list(request.modes) or "all",
+        "least_damping_of_others": request.least_damping, "gain_bounds": list(request.gain_bounds),
         "worst_damping_ratio": {"before": verdict.worst_before, "after": verdict.worst},
+        "thin_margin_damping_ratio": verdict.thin,
         "limiting": None if limiting is None else _where(limiting) | {"mode": _mode(limiting.target)},
-        "points": len(plan.read.points),
-        "outages": len(plan.read.outages) - 1,
-        "items": len(verdict.points),
+        "points": len(plan.read.points), "outages": len(plan.read.outages) - 1, "items": len(verdict.points),
         "failed": [_where(point) | {"why": point.why_not} for point in verdict.failed],
         "unstable": [_where(point) for point in verdict.unstable],
         "harmed": [_where(point) | {"mode": _mode(point.other)} for point in verdict.harmed],
         "astray": [_where(point) | {"difference": point.astray} for point in verdict.astray],
-        "unforeseen": [_where(point) for point in verdict.unforeseen],
-        "warnings": remarks(verdict),
-        "questions": [*map(str, plan.prepared.questions)],
+        "unforeseen": [_where(point) for point in verdict.unforeseen], "warnings": remarks(verdict),
         "settings": [
             {
                 "controller": group.controller, "components": list(group.components), "K": setting.gain,

@@ -4,7 +4,7 @@ from collections import Counter
 
 from orchestrator.analysis.stability import zeros_in_words
 from orchestrator.coordinated_design.study import PointsDesign
-from orchestrator.coordinated_design.verdict import PointsVerdict
+from orchestrator.coordinated_design.verdict import MORE, PointsVerdict
 from orchestrator.report.tables import VerdictSentence, kinds_of
 
 _SHOWN = 4
@@ -26,7 +26,8 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
     aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
     if verdict.met:
         if wanted is not None:
-            return VerdictSentence(True, "REACHED", f"{aim}{tail}")
+            thin = f"; no margin: {100 * verdict.thin:.2f} % with gains of × {MORE:g}" if verdict.thin else ""
+            return VerdictSentence(True, "REACHED", f"{aim}{tail}{thin}")
         return VerdictSentence(True, "better", f"at all {total} points and outages{tail}")
     reasons = _reasons(verdict)
     if verdict.met is None:
@@ -100,11 +101,9 @@ def remarks(verdict: PointsVerdict) -> list[str]:
             f"the search was led astray: at {len(verdict.unforeseen)} of {total}, first at {place}, its linear models "
             "showed no harm to other modes, and there is; give a lower upper end of --gain-bounds, or fewer controllers"
         )
-    free = [point for point in verdict.known if point.after.zeros > 1]
-    if free:
+    if free := [point for point in verdict.known if point.after.zeros > 1]:
         texts.append(f"at {len(free)} of {total}, first at {free[0].where}: {zeros_in_words(free[0].after.zeros)}")
-    unnamed = [point for point in verdict.known if point.unnamed]
-    if unnamed:
+    if unnamed := [point for point in verdict.known if point.unnamed]:
         texts.append(
             f"at {len(unnamed)} of {total}, first at {unnamed[0].where}: a name that is asked for is borne by no mode, "
             "or its mode meets another one while the gains grow, so all modes from 0.1 to 2 Hz count there"

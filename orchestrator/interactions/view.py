@@ -222,7 +222,7 @@ def as_json(judgement: JudgedInteractions) -> dict[str, Any]:
     plan, worst, swap = judgement.result.plan, judgement.worst_pair, judgement.worst_assignment
     groups = plan.groups
     found: dict[str, Any] = {
-        "case": plan.case.name, "scenario": plan.prepared.name, "stand_in": plan.stand_in,
+        **plan.prepared.about, "stand_in": plan.stand_in,
         "threshold_percent": 100 * plan.request.threshold, "range_hz": list(plan.request.frequencies),
         "vendors": list(plan.vendors), "places": {name: place.vendor for name, place in plan.places.items()},
         "groups": groups, "as_in_the_case": _system(judgement.whole, groups),

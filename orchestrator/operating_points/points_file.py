@@ -162,7 +162,9 @@ def _point(
     for column, setting in settings.items():
         for key, power in setting.drawn.items():
             values.take(column, {key: _unscaled(column, power, scales[key.split(".")[-2]], place)})
-    return OperatingCase(name, _hours(row, place), values.found, out, place)
+    idle = {f"{unit}.P_0" for unit in elements.balancing}  # as `questions_about` says
+    acting = {key: value for key, value in values.found.items() if key not in idle}
+    return OperatingCase(name, _hours(row, place), acting, out, place)
 
 
 class _Values:

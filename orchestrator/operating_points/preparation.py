@@ -78,7 +78,9 @@ class ItemPreparation:
         values = {**item.values, **switched_off(item.out, remains, valued, self.elements.grid)}
         found = self._prepare(values, dispatch)
         if dispatch is not None:
-            text = lost_and_shared(units, loads, valued, self.elements.grid, dispatch, found)
+            assert found.power_flow is not None
+            plans, load = valued.system.components, load_of(loads, valued.system.components[self.elements.grid])
+            text = in_words(dispatch, found.power_flow.powers, plans, units, lost_load(load))
         return PreparedItem(without_units(found, remains.units), text)
 
     def live(self, item: Item) -> dict[str, Value]:
@@ -141,15 +143,6 @@ class ItemPreparation:
 def _power_of(units: Collection[str], before: PreparedScenario) -> float:
     flow, plans = before.power_flow, before.system.components
     return sum(flow.powers[name].real * plans[name].number("S_n") for name in units) if flow is not None else 0.0
-
-
-def lost_and_shared(
-    units: Collection[str], loads: Collection[str], before: PreparedScenario, grid: str, dispatch: Dispatch,
-    after: PreparedScenario,
-) -> str:  # fmt: skip
-    assert after.power_flow is not None
-    plans = before.system.components
-    return in_words(dispatch, after.power_flow.powers, plans, units, lost_load(load_of(loads, plans[grid])))
 
 
 def failure(error: Exception, item: Item) -> tuple[Status, str, bool]:

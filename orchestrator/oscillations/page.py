@@ -5,6 +5,7 @@ from html import escape
 
 import numpy as np
 
+from orchestrator.errors import counted
 from orchestrator.oscillations.detection import envelope, signals_of, spectra
 from orchestrator.oscillations.location import works
 from orchestrator.oscillations.measurements import Measurements
@@ -24,7 +25,7 @@ def source_page(measured: Measurements, found: list[Located]) -> str:
         for x in found
     )
     content = [(f"{x.found.frequency:.4f} Hz", "".join(_chapter(measured, x, found, figures))) for x in found]
-    return document(f"Oscillations in {measured.label}", f"{len(measured.places)} places",
+    return document(f"Oscillations in {measured.label}", counted(len(measured.places), "place"),
                     f'<div class="findings"><ul>{findings or "<li>No oscillation was found.</li>"}</ul></div>',
                     [*content, ("Spectrum", _spectrum(measured, found, figures))])  # fmt: skip
 

@@ -41,7 +41,7 @@ class Sources:
     ) -> None:
         self.label, self.remarks, self.oscillations = measured.label, measured.remarks, list(oscillations)
         self.places, self._measured = [place.name for place in measured.places], measured
-        self._questions = [*map(str, prepared.questions)] if prepared else []
+        self._about = prepared.about if prepared else {"questions": []}
 
     def __iter__(self) -> Iterator[Located]:
         return iter(self.oscillations)
@@ -52,8 +52,8 @@ class Sources:
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor signal source --json`` prints, as JSON's types."""
         found = [one.as_json() for one in self.oscillations]
-        said = {"remarks": list(self.remarks), "questions": self._questions}
-        return {"record": self.label, "places": self.places, **said, "oscillations": found}
+        said = {"record": self.label, "places": self.places, "remarks": list(self.remarks)}
+        return self._about | said | {"oscillations": found}
 
     def table(self) -> pd.DataFrame:
         """One row for each oscillation: frequency [Hz], kind, source, what drives, begin [s] and the reason."""

@@ -66,6 +66,13 @@ class PodSetting:
     gain: float
     filters: LeadLag
 
+    def parameters(self, keys: Sequence[str], controller: str, stages: int) -> dict[str, bool | float | str]:
+        """By ``component.variable``, with eight significant digits: far more precise than any controller's setting."""
+        numbers = {"K": self.gain, "T_S1": self.filters.T_S1, "T_S2": self.filters.T_S2}
+        found: dict[str, bool | float | str] = {"enabled": self.gain > 0}
+        found |= {key: float(f"{number:.8g}") for key, number in numbers.items()} | {"N_S": stages}
+        return {f"{component}.{controller}.{key}": value for component in keys for key, value in found.items()}
+
 
 @dataclass(frozen=True)
 class Placed:

@@ -23,7 +23,7 @@ from orchestrator.errors import AnalysisError, InputError
 from orchestrator.pod_design import lead_lag as leads
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting, figures_of
 from orchestrator.pod_design.guard import Naming, Surroundings, breach, surroundings
-from orchestrator.pod_design.margins import Margins, compute_margins
+from orchestrator.pod_design.margins import LARGER_GAIN, Margins, compute_margins
 from orchestrator.pod_design.refinement import Judgement, Refinement, refine, sweep
 from orchestrator.pod_design.target import (
     CRITICAL,
@@ -175,6 +175,13 @@ class PodDesign:
         return self.achieved_damping >= self.required_damping - _MET
 
     @property
+    def thin_margin(self) -> float | None:
+        """The target's damping ratio with a gain that is larger by `VARIATION`, where the requirement is met and that
+        is too little; None where it holds there, or that is not known."""
+        there = self.margins.variations.get(LARGER_GAIN) if self.margins else None
+        return there if self.met and there is not None and there < self.required_damping - _MET else None
+
+    @property
     def achieved(self) -> complex:
         """The mode [rad/s] that counts with the final setting; see `Surroundings.counting`."""
         return self.after.counting(self.final.eigenvalue)
@@ -299,6 +306,7 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         return judged[placed.setting]
 
     def settings() -> Sequence[tuple[str, PodSetting]]:
+        report("refinement: a search and a grid of settings on the linear model")
         return start.search(start.prepared.case, request, start.target, start.mode_name, loop, initial.imag)
 
     report("sensitivity of the mode")
@@ -316,9 +324,8 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
     short = damping_ratio(after.counting(designed.eigenvalue)) < required - _MET
     broken = breach(before, after, request.least_damping)
     if request.refine or ((short or broken) and request.gain_bounds is None):
-        report("refinement")
         bounds, evenly = request.bounds(search=True), request.mode is None
-        refinement = refine(loop, off, filters, required, bounds, judge, settings, evenly=evenly)
+        refinement = refine(loop, off, filters, required, bounds, judge, settings, evenly=evenly, report=report)
         final = refinement.chosen or designed
         after = around(final)
         broken = breach(before, after, request.least_damping)

@@ -105,6 +105,7 @@ _STRIDE = 2**0.5
 _REACH = 8.0  # gains from 1/8 to 8 times the designed one are tried, a factor √2 apart
 _HALVINGS = 4
 VARIATION = 0.2  # relative change of K, T_S1 and T_S2, one at a time
+LARGER_GAIN = f"K {100 * VARIATION:+.0f} %"
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ class Refinement:
 
 def refine(
     loop: PodLoop, off: Placed, filters: leads.LeadLag, required: float, bounds: tuple[float, float], judge: Judge,
-    search: SearchSettings, *, evenly: bool = False,
+    search: SearchSettings, *, evenly: bool = False, report: Callable[[str], None] = lambda text: None,
 ) -> Refinement:  # fmt: skip
     """Search gain and lead/lag on the closed loop.
 
@@ -90,6 +90,7 @@ def refine(
     even = -1.0
     near = ((why, candidate, None) for why, candidate in _candidates(loop, result, filters))
     for why, candidate, gain in chain(near, _searched(result, search)):
+        report(f"refinement, lead/lag {why}: {len(result.sweeps)} swept before")
         try:
             found = sweep(loop, off, candidate, required, bounds, why, gain)
         except AnalysisError as error:

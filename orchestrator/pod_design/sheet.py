@@ -11,7 +11,7 @@ from orchestrator.analysis.stability import Stability
 from orchestrator.pod_design.closed_loop import Placed
 from orchestrator.pod_design.design import PodDesign
 from orchestrator.pod_design.lead_lag import LARGEST_STAGE_ANGLE, angle_deg, compensation_deg
-from orchestrator.pod_design.margins import Margins
+from orchestrator.pod_design.margins import LARGER_GAIN, Margins
 from orchestrator.pod_design.refinement import GainSweep, Refinement
 from orchestrator.report.tables import eigenvalue_text, make_table
 
@@ -98,7 +98,7 @@ def _steps(d: PodDesign) -> Iterable[tuple[str, str, str]]:
 
 
 def _refinement(r: Refinement, required: float) -> Table:
-    columns = ("Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gains swept [pu]", "Least damping of all modes over them [%]",
+    columns = ("Lead/lag", "T_S1 [s]", "T_S2 [s]", "Gain [pu] → least damping of all modes [%]",
                f"Best, or first with {percent(required)}: the target", "the least of all")  # fmt: skip
     return _table("Refinement on the closed loop", *columns, rows=map(_swept, r.sweeps))
 
@@ -106,11 +106,12 @@ def _refinement(r: Refinement, required: float) -> Table:
 def _swept(s: GainSweep) -> tuple[str, ...]:
     gains = [p.setting.gain for p in s.points]
     marks = [_MARK * (gain in s.unstable) for gain in gains]
-    dampings = [f"{100 * least:.1f}{mark}" for least, mark in zip(s.least, marks, strict=False)]
+    each = zip(gains, s.least, marks, strict=False)
+    dampings = ", ".join(f"{gain:.4g}→{100 * least:.1f}{mark}" for gain, least, mark in each)
     chosen = f"{s.chosen.setting.gain:.1f}{_MARK * (s.chosen.setting.gain in s.unstable)}"
     return (
-        s.why, f"{s.filters.T_S1:.4f}", f"{s.filters.T_S2:.4f}", f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})",
-        " ".join(dampings) or "–", f"K = {chosen}: {percent(s.chosen.damping_ratio)}",
+        s.why, f"{s.filters.T_S1:.4f}", f"{s.filters.T_S2:.4f}",
+        dampings or f"{gains[0]:g}…{gains[-1]:g} ({len(gains)})", f"K = {chosen}: {percent(s.chosen.damping_ratio)}",
         "–" if s.chosen_least is None else percent(s.chosen_least),
     )  # fmt: skip
 
@@ -166,6 +167,11 @@ def verdict(d: PodDesign) -> str:
     if d.broken:
         text += f"; but {d.broken}"
     if d.damping_met:
+        if d.thin_margin is not None:
+            text += (
+                f"; no margin: {percent(d.achieved_damping)} at K = {d.final.setting.gain:.4g} pu, and "
+                f"{percent(d.thin_margin)} at {LARGER_GAIN}"
+            )
         if not d.refinement and d.active_bound == "lower":
             text += (
                 f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "

@@ -46,7 +46,11 @@ def find_target(
     names = [scenario] if scenario is not None else list(case.scenarios)
     plans = {name: case.components_of(name, overrides, parameters) for name in names}
     if scenario is None:
-        fitting = [name for name, plan in plans.items() if with_controller(plan, controller) and _all_off(plan)]
+        on = {
+            name for name, plan in plans.items() for each in DAMPING_CONTROLLERS
+            for unit in with_controller(plan, each) if plan[unit].value(f"{each}.enabled")
+        }  # fmt: skip
+        fitting = [name for name, plan in plans.items() if with_controller(plan, controller) and name not in on]
         fitting = [name for name in fitting if case.scenarios[name].events is None] or fitting  # no fault's, say
         if len(fitting) != 1:
             what = "no scenario" if not fitting else f"more than one scenario ({', '.join(fitting)})"
@@ -100,14 +104,6 @@ def check_range(
 def with_controller(plan: Mapping[str, ComponentPlan], controller: str) -> list[str]:
     wanted = [f"{controller}.{v}" for v in ("enabled", "K", "T_S1", "T_S2", "N_S")]
     return [name for name, c in plan.items() if all(v in c.description.variables for v in wanted)]
-
-
-def _all_off(plan: Mapping[str, ComponentPlan]) -> bool:
-    return not any(
-        plan[name].value(f"{controller}.enabled")
-        for controller in DAMPING_CONTROLLERS
-        for name in with_controller(plan, controller)
-    )
 
 
 def mode_name(case: Case, wanted: str | None) -> str:

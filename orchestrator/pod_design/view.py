@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -133,30 +132,23 @@ def design_json(d: PodDesign) -> dict[str, Any]:
             "gain_bounds": list(d.request.bounds(search=d.refinement is not None)), "delta_gain": d.request.delta_gain,
             "least_damping_of_others": d.request.least_damping,
         },
-        "met": d.met, "verdict": verdict(d), "target_damping_ratio": damping_ratio(d.initial),
+        "met": d.met, "verdict": verdict(d), "thin_margin_damping_ratio": d.thin_margin,
+        "target_damping_ratio": damping_ratio(d.initial),
         "achieved_damping_ratio": d.achieved_damping, "followed_mode": _complex(d.final.eigenvalue),
         "compensated_sensitivity": _polar(S.compensated), "K_non_compensated": d.gain_non_compensated,
         "K_compensated": d.gain_compensated, "active_bound": d.active_bound,
         "worst_other_mode": {"before": _other_json(d.before.worst), "after": _other_json(d.worst_other)},
         "stable": after.stable, "largest_growth_rate": after.largest_growth_rate,
         "stability": {"before": before.as_json(), "after": after.as_json()}, "warnings": list(d.warnings),
-        "questions": [*map(str, d.prepared.questions)],
         "largest_real_part": {"before": before.largest_growth_rate, "after": after.largest_growth_rate},
         "margins": _margins_json(d.margins) if d.margins else None,
-        "refinement": _refinement_json(d) if d.refinement else None, "case": d.case, "scenario": d.target.scenario,
+        "refinement": _refinement_json(d) if d.refinement else None, **d.prepared.about,
         "mode": d.mode_name, "components": list(d.target.components),
     }  # fmt: skip
 
 
 def parameters_of(d: PodDesign) -> dict[str, bool | float | str]:
-    setting, values = d.final.setting, {}
-    for component in d.target.key:
-        own: Mapping[str, bool | float | str] = {
-            "enabled": setting.gain > 0, "K": _rounded(setting.gain), "T_S1": _rounded(setting.filters.T_S1),
-            "T_S2": _rounded(setting.filters.T_S2), "N_S": d.target.stages,
-        }  # fmt: skip
-        values.update({f"{component}.{d.request.controller}.{key}": value for key, value in own.items()})
-    return values
+    return d.final.setting.parameters(d.target.key, d.request.controller, d.target.stages)
 
 
 def provenance(d: PodDesign, command: str) -> list[str]:
@@ -168,11 +160,6 @@ def provenance(d: PodDesign, command: str) -> list[str]:
         f"with it: {mode_text(d.achieved)}; required: {percent(d.required_damping)} ({'met' if d.met else 'not met'})",
         "K in pu of the converter's rating, T_S1 and T_S2 in s",
     ]
-
-
-def _rounded(value: float) -> float:
-    """A number with eight significant digits: legible, and far more precise than any controller's setting."""
-    return float(f"{value:.8g}")
 
 
 def _complex(value: complex) -> dict[str, float]:
@@ -202,11 +189,8 @@ def _margins_json(m: Margins) -> dict[str, Any]:
 
 
 def _refinement_json(d: PodDesign) -> dict[str, Any]:
-    def placed(p: Placed) -> dict[str, Any]:
-        return {"K": p.setting.gain, "mode": _complex(p.eigenvalue), "damping_ratio": p.damping_ratio}
-
-    def with_least(p: Placed, least: float | None) -> dict[str, Any]:
-        return placed(p) | {"least_damping_ratio": least}
+    def placed(p: Placed, **least: float | None) -> dict[str, Any]:
+        return {"K": p.setting.gain, "mode": _complex(p.eigenvalue), "damping_ratio": p.damping_ratio, **least}
 
     def filters(f: LeadLag) -> dict[str, float]:
         return {"T_S1": f.T_S1, "T_S2": f.T_S2}
@@ -217,8 +201,8 @@ def _refinement_json(d: PodDesign) -> dict[str, Any]:
         "designed": filters(d.filters) | placed(d.designed),
         "sweeps": [{
             "lead_lag": s.why, **filters(s.filters),
-            "points": [with_least(p, least) for p, least in zip_longest(s.points, s.least)],
-            "chosen": with_least(s.chosen, s.chosen_least), "unstable_gains": list(s.unstable),
+            "points": [placed(p, least_damping_ratio=least) for p, least in zip_longest(s.points, s.least)],
+            "chosen": placed(s.chosen, least_damping_ratio=s.chosen_least), "unstable_gains": list(s.unstable),
         } for s in refinement.sweeps],
         "notes": refinement.notes,
     }  # fmt: skip

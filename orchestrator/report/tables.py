@@ -80,11 +80,6 @@ def kinds_of(said: Iterable[tuple[Told, Iterable[str]]]) -> list[tuple[str, list
     return sorted(found.values(), key=lambda kind: -len(kind[1]))
 
 
-def counted(number: int, what: str) -> str:
-    """``3 points``."""
-    return f"{number} {what}" + ("s" if number != 1 else "")
-
-
 def short(text: str, longest: int) -> str:
     """A remark, cut at a word where it has more characters."""
     return text if len(text) <= longest else f"{text[: longest - 1].rsplit(' ', 1)[0]} …"

@@ -128,13 +128,11 @@ def _cells(summary: Summary) -> Cells:
 
     return Cells(
         f"Least damping of {plan.case.table.title or plan.case.name}: outages, worst first, by operating points",
-        plan.case,
-        plan.prepared.name, (plan.wanted.lowest_hz, plan.wanted.highest_hz),
+        plan.case, plan.prepared.name, (plan.wanted.lowest_hz, plan.wanted.highest_hz),
         [CellLine(name, out=taken[name]) for name in outages],
         [CellLine(one.name, one.values, out=one.out) for one in plan.points],
         [[cell(of.get((name, point.name))) for point in plan.points] for name in outages],
-        joined_values(plan.layers),
-        plan.tasks[0].study.step_size, plan.tasks[0].sharing,
+        joined_values(plan.layers), plan.tasks[0].study.step_size, plan.tasks[0].sharing,
     )  # fmt: skip
 
 
@@ -243,16 +241,10 @@ def remarks(summary: Summary) -> list[str]:
 def as_json(summary: Summary) -> dict[str, Any]:
     result = summary.result
     return {
-        "case": result.plan.case.name,
-        "scenario": result.plan.prepared.name,
-        "questions": [*map(str, result.plan.prepared.questions)],
-        "points": len(result.plan.points),
-        "outages": len(result.plan.outages) - 1,
-        "items": len(result.items),
-        "complete": result.complete,
-        "stable": summary.stable,
-        "counted_at_all_frequencies": summary.counted,
-        "slowest_growth_counted": summary.slowest,
+        **result.plan.prepared.about,
+        "points": len(result.plan.points), "outages": len(result.plan.outages) - 1, "items": len(result.items),
+        "complete": result.complete, "stable": summary.stable,
+        "counted_at_all_frequencies": summary.counted, "slowest_growth_counted": summary.slowest,
         "nothing_restores": [_where(item) | {"zero_eigenvalues": item.record.zeros} for item in summary.free],
         "counts": {str(status): number for status, number in summary.counts.items()},
         "beyond_rating": summary.beyond or None,
@@ -263,13 +255,9 @@ def as_json(summary: Summary) -> dict[str, Any]:
             {
                 "name": mode.name,
                 "worst": _where(mode.worst.item) | eigenvalue_json(mode.worst.value, mode.worst.damping),
-                "participation": dict(mode.worst.participation()),
-                "converters": [
-                    {"component": name, "residue_p": abs(p), "residue_q": abs(q)}
-                    for name, p, q in mode.worst.ranking()
-                ],
-                "items": len(mode.at),
-                "hours": mode.hours,
+                "participation": dict(mode.worst.participation()), "items": len(mode.at), "hours": mode.hours,
+                "converters": [{"component": name, "residue_p": abs(p), "residue_q": abs(q)}
+                               for name, p, q in mode.worst.ranking()],
             }
             for mode in summary.modes
         ],
@@ -367,11 +355,8 @@ def _ranking(summary: Summary) -> str:
         Column("through P [rad/s]", lambda row: abs(row[1]), ".4f"),
         Column("through Q [rad/s]", lambda row: abs(row[2]), ".4f"),
     )
-    parts += [
-        ColumnTable(
-            f"{mode.name}, at {mode.worst.item.point.name}, {mode.worst.item.outage.name}", columns, found
-        ).html()
-        for mode in summary.modes[:_CURVES]
-        if (found := mode.worst.ranking())
-    ]
+    for mode in summary.modes[:_CURVES]:
+        where = f"at {mode.worst.item.point.name}, {mode.worst.item.outage.name}"
+        if found := mode.worst.ranking():
+            parts.append(ColumnTable(f"{mode.name}, {where}", columns, found).html())
     return "".join(parts) if len(parts) > 1 else "<p>No converter of this scenario can be ranked.</p>"

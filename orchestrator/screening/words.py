@@ -9,10 +9,11 @@ import numpy as np
 from orchestrator.analysis.critical_modes import DENSE
 from orchestrator.analysis.shifted_equations import GROWING
 from orchestrator.analysis.stability import zeros_in_words
+from orchestrator.errors import counted
 from orchestrator.operating_points.columns import Elements
 from orchestrator.operating_points.item import Status
 from orchestrator.operating_points.points_file import OperatingCase
-from orchestrator.report.tables import VerdictSentence, counted
+from orchestrator.report.tables import VerdictSentence
 from orchestrator.screening.modes import UNSTABLE
 from orchestrator.screening.record import ItemRecord
 from orchestrator.screening.study import ScreenedItem, ScreeningPlan

@@ -101,8 +101,7 @@ def _part(value: complex | None, part: str) -> float | None:
 def as_json(result: SensitivityResult) -> dict[str, Any]:
     modes, mode = result.modes, result.mode
     return {
-        "case": modes.prepared.case.name, "scenario": modes.prepared.name, "stable": modes.stability.stable,
-        "stability": modes.stability.as_json(),
+        **modes.prepared.about, "stable": modes.stability.stable, "stability": modes.stability.as_json(),
         "mode": {**eigenvalue_json(mode.eigenvalue, mode.damping_percent), "name": modes.name_of(mode)},
         "derivative": "partial" if result.held else "total", "warnings": [*modes.warnings, *result.warnings],
         "sensitivities": rows_of(result),

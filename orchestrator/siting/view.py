@@ -171,7 +171,7 @@ def remarks(result: SiteResult) -> list[str]:
 def as_json(result: SiteResult) -> dict[str, Any]:
     here = result.intact.name
     return {
-        "case": result.case.name, "scenario": result.prepared.name, "device": result.request.device,
+        **result.prepared.about, "device": result.request.device,
         "units": {
             "damping_points": unit(result),
             "real, imag": "eigenvalue's shift [rad/s] by 1 MW/Hz or 1 Mvar/Hz in phase with the bus's frequency, P "

@@ -33,20 +33,15 @@ _BEGINNINGS = "start followed refined entered broken"
 Curve = list[tuple[GridPlace, dict[str, Any]]]  # A trajectory's figures by place
 
 
-def swing_states(sweep: ScenarioSweep, patterns: list[str]) -> list[str]:
-    names = dict.fromkeys(n for record in sweep.points.values() if record.modes for n in record.modes.names)
-    return [name for name in names if any(fnmatch.fnmatchcase(name, p) for p in patterns)]
-
-
 class Samples:
     def __init__(self, result: SweepResult) -> None:
         self.result = result
         self._curves: dict[int, Curve] = {}
         self.axes = result.plan.axes
-        patterns = result.plan.case.table.analysis.swing
-        self.states = [*dict.fromkeys(s for sweep in result.scenarios for s in swing_states(sweep, patterns))]
-        everything = (r.modes.names for s in result.scenarios for r in s.points.values() if r.modes)
-        self.components = [*dict.fromkeys(name.partition(".")[0] for names in everything for name in names)]
+        records = (r.modes for s in result.scenarios for r in s.points.values() if r.modes)
+        every, patterns = dict.fromkeys(n for r in records for n in r.names), result.plan.case.table.analysis.swing
+        self.states = [name for name in every if any(fnmatch.fnmatchcase(name, p) for p in patterns)]
+        self.components = [*dict.fromkeys(name.partition(".")[0] for name in every)]
 
     def of(self, sweep: ScenarioSweep, trajectory: Trajectory) -> Curve:
         if id(trajectory) not in self._curves:
@@ -150,6 +145,7 @@ def _attributes(samples: Samples) -> dict[str, Any]:
     low, high = result.plan.frequency_range
     return {k: v for k, v in origin.items() if k not in ("scenario", "events")} | own | {
         "overrides": json.dumps(result.plan.overrides),
+        "models": result.plan.scenarios[0].models or "",
         "warned": json.dumps([*_asked(samples), *warned(samples)]),
         "frequency_range_hz": [low, high],
     }  # fmt: skip

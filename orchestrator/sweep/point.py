@@ -27,10 +27,6 @@ class PointRecord(Kept):
     because: str = ""
     overloads: dict[str, float] = field(default_factory=dict)  # units beyond their rating [pu of it]
 
-    @property
-    def is_unstable(self) -> bool:
-        return self.stability.get("stable") is False
-
 
 @dataclass(frozen=True)
 class SweepPointTask(Task):

@@ -81,7 +81,7 @@ class ScenarioSweep:
 
     def unstable(self, axes: Sequence[Axis]) -> list[GridPlace]:
         """Places of the grid where a mode grows at any frequency, the fastest first."""
-        found = [place for place in grid_places(axes) if self.points[place].is_unstable]
+        found = [place for place in grid_places(axes) if self.points[place].stability.get("stable") is False]
         return sorted(found, key=lambda place: -self.points[place].stability["largest_growth_rate"])
 
     def counts(self, axes: Sequence[Axis]) -> Counter[bool | None]:

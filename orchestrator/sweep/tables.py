@@ -5,7 +5,8 @@ import math
 from rich.markup import escape
 from rich.table import Table
 
-from orchestrator.report.tables import counted, make_table
+from orchestrator.errors import counted
+from orchestrator.report.tables import make_table
 from orchestrator.sweep.axes import grid_places
 from orchestrator.sweep.dataset import Samples, warned
 from orchestrator.sweep.limit import Ending

@@ -45,7 +45,7 @@ def test_the_worst_certificate_decides_the_exit_code(cells, code):
 def test_the_sentence_counts_every_kind():
     said = matrix(PASSES, FAILS, INCOMPLETE, REFUSED).sentence()
     assert said == "Of 4 certificates: 2 passed, 1 failed, 1 incomplete. Acceptance tests failed: a."
-    assert matrix(LOST).sentence() == "Of 1 certificates: 1 not tested."
+    assert matrix(LOST).sentence() == "Of 1 certificate: 1 not tested."
 
 
 def margin(value, accepted=None, criterion="settles"):

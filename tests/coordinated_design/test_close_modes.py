@@ -117,3 +117,22 @@ def test_a_signal_that_acts_on_itself_closes_as_the_algebra_says():
     closed = known.eigenvalues({PLACE: PodSetting(gain, NO_COMPENSATION)})
     expected = np.linalg.eigvals(loops.A + gain / (1 - gain * direct) * loops.U @ loops.V)
     assert np.sort_complex(closed) == pytest.approx(np.sort_complex(expected.astype(complex)))
+
+
+def test_a_reduced_system_names_its_modes(monkeypatch):
+    """The eigenvalues that a reduction left out have no eigenvectors, and stand behind the others."""
+    monkeypatch.setattr(open_loops, "REDUCED", 5)
+    loops = close_modes(0)
+    assert len(loops.rest)
+    seen = []
+
+    def naming(names, modes):
+        seen.append(len(names))
+        return {"swing": min(modes, key=lambda mode: mode.damping_ratio)}
+
+    point = RatedPoint(0, loops, Aim(("swing",), 0.05, naming), {PLACE: LARGEST})
+    plain = RatedPoint(0, loops, Aim((), 0.05), {PLACE: LARGEST})
+    assert point.worth({}).worst == pytest.approx(plain.worth({}).worst)
+    setting = {PLACE: PodSetting(50.0, lead_lag_turning(40.0, 6.0, 2))}
+    assert 0 < point.worth(setting).worst < 1
+    assert set(seen) == {10, 12}, "the states of the whole system, and two stages"

@@ -53,3 +53,11 @@ def test_a_mode_that_gained_two_points_of_damping_was_moved(after, unmoved):
     found = verdict([(0.942, 0.0719)], [after], 0.09)
     assert found.limiting.unmoved is unmoved
     assert ("which these controllers hardly move" in verdict_sentence(found)) is unmoved
+
+
+@pytest.mark.parametrize("thin", [None, 0.0957])
+def test_a_setting_that_more_gain_spoils_has_no_margin(thin):
+    points = list(judged(WHERE, [modes((1.0, 0.05))], [modes((1.0, 0.1001))], Aim((), 0.05), {}))
+    said = verdict_sentence(PointsVerdict(points, 0.1, thin=thin))
+    assert said.startswith("REACHED: 10 %")
+    assert ("; no margin: 9.57 % with gains of × 1.2" in said) is (thin is not None)

@@ -1,7 +1,10 @@
 """Margins of a setting's gain, on a plant whose modes are lost at gains that a formula gives."""
 
+from types import SimpleNamespace
+
 import pytest
 
+from orchestrator.pod_design.design import PodDesign
 from orchestrator.pod_design.margins import compute_margins
 from tests.pod_design.plant import Plant, gain_for
 
@@ -45,3 +48,13 @@ def test_errors_of_the_gain_move_the_target():
         "K +20 %": pytest.approx(0.64 / abs(-0.64 + 4j)),
         "K -20 %": pytest.approx(0.56 / abs(-0.56 + 4j)),
     }
+
+
+@pytest.mark.parametrize(("required", "met", "thin"), [(0.155, True, False), (0.17, True, True), (0.17, False, False)])
+def test_a_requirement_that_a_larger_gain_loses_has_no_margin(required, met, thin):
+    """With 20 % more gain the target has 16 % of damping."""
+    found = margins(Plant(), 20.0, 0.03)
+    design = SimpleNamespace(margins=found, met=met, required_damping=required)
+    there = PodDesign.thin_margin.fget(design)
+    assert there == (pytest.approx(found.variations["K +20 %"]) if thin else None)
+    assert PodDesign.thin_margin.fget(SimpleNamespace(margins=None, met=True, required_damping=0.5)) is None

@@ -10,6 +10,8 @@ import xarray as xr
 from orchestrator.errors import InputError
 from orchestrator.report.html.chapters import chapters_of, of_sweep
 from orchestrator.report.html.page import write_report
+from orchestrator.results import origin
+from orchestrator.results.manifest import ResultsWarning, read_manifest, write_manifest
 from orchestrator.sweep.limit import Ending, ParameterLimit, Until
 
 SHEET = {
@@ -101,7 +103,7 @@ def test_the_first_page_answers_every_study(folders, tmp_path):
     ):  # fmt: skip
         assert said in first
     assert 'class="bad">not as required' in first
-    assert 'class="bad">UNSTABLE as in the case; 1 modes that vendors share; A and B agree' in first
+    assert 'class="bad">UNSTABLE as in the case; 1 mode that vendors share; A and B agree' in first
     assert first.count("<svg") == 1
     assert 'class="good">It passes' in first
     assert "<b>20 %</b>" not in text  # a verdict is text
@@ -220,3 +222,62 @@ def test_the_answer_of_a_search_for_a_limit_is_on_the_page(tmp_path):
     assert of_sweep(tmp_path, swept).answer == chapter.answer
     assert (chapter.question, chapter.answer) == ("How far may grid.scr go?", f"base: {limit.sentence}")
     assert "6.87" in chapter.answer
+
+
+def made(folder, name, content, run="r", **inputs):
+    folder.mkdir(exist_ok=True)
+    (folder / f"{name}.json").write_text(json.dumps(content), encoding="utf-8")
+    command = f"gfor {name} --json own.toml --set models=emt --html=p.html --parameters p.toml --out {folder}"
+    origin.said.append(lambda: {"command": command, "inputs": inputs})
+    write_manifest(folder, run, [f"{name}.json"])
+    origin.said.pop()
+    return folder
+
+
+def test_results_of_two_versions_of_a_file_are_not_one_study(tmp_path):
+    first = made(tmp_path / "old", "scr", SCR, **{"own.raw": "1a", "old/ring.csv": "5"})
+    again = made(tmp_path / "again", "scr", SCR, **{"net/own.raw": "1a", "again/ring.csv": "6"})
+    edited = made(tmp_path / "new", "scr", SCR, **{"own.raw": "2b"})
+    assert "one study" not in written([first, again], tmp_path)
+    for code in ("nts", "ercot"):  # each certificate keeps files of the same names
+        sealed = CERTIFICATE | {"made": "2026-01-01", "files": {"converter.fmu": code}}
+        made(tmp_path / code, "certificate", sealed)
+    assert "one study" not in written([tmp_path / "nts", tmp_path / "ercot"], tmp_path)
+    with pytest.warns(ResultsWarning, match=r"own\.raw differs between .*old.*again.*and .*new.*not comparable"):
+        text = written([first, again, edited], tmp_path, short=True)
+    assert 'class="bad">own.raw differs between' in text
+    kept = json.loads(text[text.index('id="answers">') + 13 :].partition("</script>")[0])
+    assert kept[0]["answer"].startswith("NO: own.raw differs")
+    assert kept[1]["given"] == "gfor scr own.toml --set models=emt --parameters p.toml"
+
+
+def test_every_row_says_what_was_given_and_of_which_models(tmp_path):
+    kinds = {"design": SHEET, "screening": SCREENING, "sensitivities": SENSITIVITIES, "scr": SCR, "source": SOURCE}
+    places = []
+    for name, content in kinds.items():
+        parts = content if isinstance(content, list) else [content]
+        parts = [one | {"models": "emt", "questions": [f"is {name} meant?"]} for one in parts]
+        places.append(made(tmp_path / name, name, parts if isinstance(content, list) else parts[0]))
+    text = written(places, tmp_path, short=True)
+    for name in kinds:
+        assert f"gfor {name} own.toml --set models=emt --parameters p.toml</span>" in text
+        assert f"is {name} meant?" in text
+    assert text.count("emt models; ") == len(kinds)
+    assert "--out" not in text[: text.index("<section")]
+
+
+def test_a_result_is_not_told_with_the_command_of_a_later_one(tmp_path):
+    place = made(tmp_path / "both", "scr", SCR)
+    origin.said.append(lambda: {"command": "gfor later"})
+    write_manifest(place, "later", [], before=read_manifest(place))
+    origin.said.pop()
+    text = written([place], tmp_path)
+    assert "gfor later" not in text
+    assert "own.toml" not in text
+
+
+def test_a_design_at_the_edge_says_that_there_is_no_margin(tmp_path):
+    thin = SHEET | {"met": True, "thin_margin_damping_ratio": 0.0957}
+    text = written([made(tmp_path / "thin", "design", thin)], tmp_path)
+    assert "20.00 % wanted; no margin: 9.57 % with 20 % more gain" in text
+    assert "no margin" not in written([made(tmp_path / "wide", "design", SHEET | {"met": True})], tmp_path)

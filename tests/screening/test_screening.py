@@ -213,11 +213,17 @@ def test_powers_that_look_like_pu_are_asked_about(two_area, tmp_path):
 def test_a_power_of_the_slacks_unit_is_asked_about(two_area, tmp_path, column):
     _, prepared, elements = two_area
     path = tmp_path / "points.csv"
-    path.write_text(f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,0.7,900,1\nb,,,1\n")
+    power = 0.7 if column.endswith("P_0") else 700
+    path.write_text(f"name,{column.format(slack=elements.slack)},sg1.P_mw,load\na,{power},900,1\nb,,,1\n")
     (found,) = questions(path, prepared, elements)
     assert (
         f"cannot act on {', '.join(elements.balancing)}: {elements.slack} is the slack and feeds what is left" in found
     )
+    point, _ = read_points(path, prepared, elements)
+    assert not {f"{unit}.P_0" for unit in elements.balancing} & {*point.values}, (
+        "asked once, and not at each point again"
+    )
+    assert "sg1.P_0" in point.values
     path.write_text("name,sg2.P_mw,generation\na,,0.9\n")
     assert not questions(path, prepared, elements), "an empty column gives no power"
     (point,) = read_points(path, prepared, elements)

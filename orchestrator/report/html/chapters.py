@@ -14,7 +14,7 @@ from typing import Any
 
 import xarray as xr
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, counted
 from orchestrator.report.html import studies
 from orchestrator.report.html.charts import Mark, bar_chart, complex_plane, legend
 from orchestrator.report.html.elements import colour, damping, table
@@ -64,7 +64,7 @@ def chapters_of(place: Path) -> list[Chapter]:
             if wanted <= keys:
                 each = content if isinstance(content, list) and make is _sensitivities else [content]
                 try:
-                    found += [_warned(make(file, one), one) for one in each]
+                    found += [_with_models(make(file, one), one) for one in each]
                 except (KeyError, TypeError, IndexError, AttributeError, ValueError) as error:
                     raise InputError(
                         f"{file}: it is not as its study writes it ({error!r}); run the study again"
@@ -98,13 +98,12 @@ def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", beside
     verdicts = [stable for stable, _ in said]
     good = False if False in verdicts else None if None in verdicts else True
     kinds = ", ".join(dict.fromkeys(s["models"] for s in scenarios if s.get("models")))
-    basis = f"{kinds} models; " if kinds else ""
-    basis += "modes of the FMUs that were simulated; " if any("step_size_s" in s for s in scenarios) else ""
+    basis = "modes of the FMUs that were simulated" if any("step_size_s" in s for s in scenarios) else (
+        "linear model of the FMUs at the operating point; nothing was run")  # fmt: skip
     return Chapter(
         folder, "Is the network stable, and which swing is damped least?",
         "; ".join([*(text for _, text in said), *beside]), good,
-        (basis + "; ".join(sure)).strip("; ") or "linear model of the FMUs at the operating point; nothing was run",
-        open_, content,
+        "; ".join([*([f"{kinds} models"] if kinds else []), basis, *sure]), open_, content,
     )  # fmt: skip
 
 
@@ -134,26 +133,30 @@ def _map(name: str, groups: Mapping[str, Sequence[Content]]) -> str:
     return legend(shades.items()) + complex_plane(name, marks) if marks else ""
 
 
-def _warned(chapter: Chapter, content: Any) -> Chapter:
+def _with_models(chapter: Chapter, content: Any) -> Chapter:
     records = [one for one in (content if isinstance(content, list) else [content]) if isinstance(one, dict)]
     told = (one.get(key) for one in records for key in ("warnings", "questions"))
     more = chain(*(texts for texts in told if isinstance(texts, list)))
-    return replace(chapter, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])))
+    kinds = dict.fromkeys(f"{one['models']} models" for one in records if one.get("models"))
+    sure = "; ".join(filter(None, (*kinds, chapter.sure)))
+    return replace(chapter, sure=sure, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])))
 
 
 def _screening(file: Path, c: Content) -> Chapter:
     where = "somewhere" if c["stable"] is False else "everywhere"
-    answer = f"{_STABLE[c['stable']]} {where}: {c['points']} operating points, {c['outages']} outages"
+    answer = (
+        f"{_STABLE[c['stable']]} {where}: {counted(c['points'], 'operating point')}, {counted(c['outages'], 'outage')}"
+    )
     if worst := min((m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None):
         answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
                    f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}")  # fmt: skip
     lost = [c["beyond_rating"]] if c.get("beyond_rating") else []
     lost += [f"{f['point']}, {f['outage']}: {f['status']}: {f['why']}" for f in c["failures"]]
-    counted = "growth was counted at all frequencies" if c["counted_at_all_frequencies"] else (
+    growth = "growth was counted at all frequencies" if c["counted_at_all_frequencies"] else (
         "growth outside of the range was counted at some points only")  # fmt: skip
     return Chapter(
         file, "Which operating point and which outage is worst?", answer, c["stable"],
-        f"{c['items']} cases computed, {counted}", lost, page="screening.html",
+        f"{counted(c['items'], 'case')} computed, {growth}", lost, page="screening.html",
     )  # fmt: skip
 
 
@@ -171,6 +174,8 @@ def _design(file: Path, c: Content) -> Chapter:
         f"{'yes' if c['met'] else 'not as required'}: with K = {c['K']:.4g} the mode has {after:.2f} % of damping, "
         f"{before:.2f} % before, {wanted:.2f} % wanted"
     )
+    if thin := c.get("thin_margin_damping_ratio"):
+        answer += f"; no margin: {100 * thin:.2f} % with 20 % more gain"
     sure = f"closed loop of the coupled FMUs: {c['verdict']}"
     modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
     content = _map("The mode that was designed for", modes) + studies.design(dict(c))
@@ -193,7 +198,7 @@ def _certificate(file: Path, c: Content) -> Chapter:
     open_ += dict.fromkeys([*chain(*warned), *_unjudged(check.get("checks", []))])
     trusted = check.get("trusted") is not False
     good = {"passes": trusted, "fails": False}.get(c["verdict"])
-    sure = f"judged: {c['judged']}" if c.get("judged") else f"{len(c['rows'])} tests" if "rows" in c else ""
+    sure = f"judged: {c['judged']}" if c.get("judged") else counted(len(c["rows"]), "test") if "rows" in c else ""
     question = f"Does the converter pass the tests of {c['code'].upper() if 'code' in c else 'the grid code'}?"
     return Chapter(file, question, c["sentence"], good, sure, open_, page="certificate.html")
 
@@ -202,7 +207,7 @@ def _matrix(file: Path, c: Content) -> Chapter:
     open_ = ((x, x["failure"] or (x["missing"] and f"{x['missing']} not tested")) for x in c["cells"])
     lost = [f"{x['device']}, {x['code']}: {text}" for x, text in open_ if text]
     return Chapter(file, "Which converter passes which grid code?", c["sentence"], c["exit_code"] == 0,
-                   f"{len(c['cells'])} pairs of a device and a code", lost, page="matrix.html")  # fmt: skip
+                   f"{counted(len(c['cells']), 'pair')} of a device and a code", lost, page="matrix.html")  # fmt: skip
 
 
 def _unjudged(checks: Sequence[Content]) -> list[str]:
@@ -220,7 +225,8 @@ def _check(file: Path, c: Content) -> Chapter:
     good = True if c["trusted"] else False if bad else None
     return Chapter(
         file, "Can this FMU be trusted in a co-simulation?", answer, good,
-        f"{len(c['checks'])} checks, {remarks} with a remark", [*c["not_supported"], *_unjudged(c["checks"])],
+        f"{counted(len(c['checks']), 'check')}, {remarks} with a remark",
+        [*c["not_supported"], *_unjudged(c["checks"])],
         table("Checks", ["Question", "Verdict", "Evidence", "Remedy"], rows, left=4),
     )  # fmt: skip
 
@@ -237,7 +243,7 @@ def _comparison(file: Path, signals: Any) -> Chapter:
     first = signals[0]
     answer = f"{first['expression']} differs most, by {first['largest']:.4g} {first['unit']} at {first['at']:.3f} s"
     columns = ["Signal", "Unit", "Largest difference", "at [s]", "RMS"]
-    return Chapter(file, "How do two runs differ?", answer, None, f"{len(signals)} signals", (),
+    return Chapter(file, "How do two runs differ?", answer, None, counted(len(signals), "signal"), (),
                    table("Differences", columns, rows, left=2))  # fmt: skip
 
 
@@ -246,7 +252,7 @@ def _identified(file: Path, modes: Any) -> Chapter:
              escape("; ".join(m["doubts"]))] for m in modes]  # fmt: skip
     swing = next((m for m in modes if m["frequency_hz"]), None)
     figures = f"{swing['frequency_hz']:.3f} Hz, {swing['damping_percent']:.2f} %" if swing else "no oscillation"
-    sure = f"{sum(not m['doubts'] for m in modes)} of {len(modes)} modes without a doubt"
+    sure = f"{sum(not m['doubts'] for m in modes)} of {counted(len(modes), 'mode')} without a doubt"
     doubts = [f"{m['frequency_hz']:.3f} Hz: {text}" for m in modes for text in m["doubts"]]
     return Chapter(file, "With which modes does a record ring?", f"strongest: {figures}", None, sure, doubts,
                    _map("Modes", {"record": modes})
@@ -258,7 +264,7 @@ def _interactions(file: Path, c: Content) -> Chapter:
     whole = c["as_in_the_case"]["stable"]
     verdicts = [whole, *(one["stable"] for one in (*c["pairs"], *c.get("assignments", [])))]
     good = False if False in verdicts else None if None in verdicts else True
-    answer = f"{_STABLE[whole]} as in the case; {len(c['interaction_modes'])} modes that vendors share"
+    answer = f"{_STABLE[whole]} as in the case; {counted(len(c['interaction_modes']), 'mode')} that vendors share"
     answer += f"; {worst['sentence']}" if worst else ""
     sure = f"each of {len(c['vendors'])} vendors alone and each pair, the others as {c['stand_in']}"
     lost = [f"pair {' and '.join(pair)}" for pair in c["unknown_pairs"]]
@@ -280,7 +286,7 @@ def _sensitivities(file: Path, c: Content) -> Chapter:
     columns = ["Parameter", "Value", "Points by 1 %", "Hz by 1 %", "Doubts"]
     return Chapter(
         file, f"What moves the {mode['name'] or 'critical'} mode of {c['scenario']}?", answer, None,
-        f"{c['derivative']} derivatives by {len(found)} parameters",
+        f"{c['derivative']} derivatives by {counted(len(found), 'parameter')}",
         [f"{r['parameter']}: {r['reason']}" for r in c["sensitivities"] if r["reason"]],
         bars + table("By the size of their effect", columns, rows),
     )  # fmt: skip
@@ -375,18 +381,21 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     stable = sweep.get("stable")
     lost = 0 if stable is None else int((stable == 0).sum())
     unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
-    open_ = [f"stability at {unknown} points"] if unknown else []
+    open_ = [f"stability at {counted(unknown, 'point')}"] if unknown else []
     open_ += json.loads(sweep.attrs.get("warned", "[]"))
+    models = f"{kind} models; " if (kind := sweep.attrs.get("models")) else ""
     if limits := limits_of(place):
         said = "; ".join(f"{one['scenario']}: {one['sentence']}" for one in limits)
         holds = all(one["ends_with"] == "holds" for one in limits)
         return Chapter(
             place, f"How far may {limits[0]['parameter']} go?", said, holds or None,
-            "coarse values, then bisection; each is of the coupled FMUs at an operating point of its own",
+            f"{models}coarse values, then bisection; each is of the coupled FMUs at an operating point of its own",
             [*open_, "narrow pieces between the values that were tried"],
         )  # fmt: skip
-    answer = f"least damping {float(least.min()):.2f} % at {where}" + (f"; UNSTABLE at {lost} points" if lost else "")
+    answer = f"least damping {float(least.min()):.2f} % at {where}" + (
+        f"; UNSTABLE at {counted(lost, 'point')}" if lost else ""
+    )
     return Chapter(
         place, f"How do the modes move along {studies.axis_of(sweep)}?", answer, False if lost else None,
-        "each point is a linear model of the coupled FMUs there", open_,
+        f"{models}each point is a linear model of the coupled FMUs there", open_,
     )  # fmt: skip

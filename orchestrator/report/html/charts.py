@@ -74,13 +74,11 @@ class Frame:
             f"{escape(self.y_label)}</text>"
         )
         clip = f"clip-{abs(hash((name, self.y_label))) % 10**9}"
-        window = (
-            f'<clipPath id="{clip}"><rect x="{_LEFT}" y="{_TOP}" width="{right - _LEFT}" height="{bottom - _TOP}"/>'
-            "</clipPath>"
-        )
+        window = f'<rect x="{_LEFT}" y="{_TOP}" width="{right - _LEFT}" height="{bottom - _TOP}"/>'
         return (
             f'<svg class="chart" viewBox="0 0 {_WIDTH} {self.height}" role="img" aria-label="{escape(name)}"{extra}>'
-            f'{window}{"".join(grid)}<g clip-path="url(#{clip})">{"".join(self.parts)}</g>{labels}</svg>'
+            f'<clipPath id="{clip}">{window}</clipPath>{"".join(grid)}'
+            f'<g clip-path="url(#{clip})">{"".join(self.parts)}</g>{labels}</svg>'
         )
 
 
@@ -99,10 +97,9 @@ def line_chart(name: str, x_label: str, y_label: str, curves: Sequence[ChartCurv
             f'data-label="{escape(curve.label)}" data-x="{abscissa}" data-y="{values}"/>'
         )
     x0, x1 = frame.x_range
-    scale = (
-        f' data-kind="lines" data-x0="{x0:.8g}" data-x1="{x1:.8g}" data-left="{_LEFT}" data-right="{_WIDTH - _RIGHT}"'
-    )
-    return frame.svg(name, scale + f' data-top="{_TOP}" data-bottom="{height - _BOTTOM}"')
+    across = f' data-kind="lines" data-x0="{x0:.8g}" data-x1="{x1:.8g}" data-left="{_LEFT}"'
+    bounds = f' data-right="{_WIDTH - _RIGHT}" data-top="{_TOP}" data-bottom="{height - _BOTTOM}"'
+    return frame.svg(name, across + bounds)
 
 
 def complex_plane(

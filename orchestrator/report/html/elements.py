@@ -42,10 +42,8 @@ class Figures:
         self.count += 1
         name = f"Figure {self.count}"
         below = f"<figcaption><b>{name}.</b> {escape(caption)}</figcaption>"
-        return (
-            f'<figure id="figure-{self.count}">{content}{below}</figure>',
-            f'<a href="#figure-{self.count}">{name}</a>',
-        )
+        link = f'<a href="#figure-{self.count}">{name}</a>'
+        return f'<figure id="figure-{self.count}">{content}{below}</figure>', link
 
 
 def held_data(name: str, data: Any) -> str:

@@ -2,18 +2,20 @@
 
 import json
 import re
+import shlex
 import warnings
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from html import escape
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 from orchestrator.report.html import sections, studies
 from orchestrator.report.html.chapters import Chapter, chapters_of, of_run, of_sweep
 from orchestrator.report.html.chapters import sections as sections_of
-from orchestrator.report.html.elements import Figures, document, held_data, table
+from orchestrator.report.html.elements import Figures, document, held_data, paragraphs, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, ResultsWarning
@@ -45,6 +47,8 @@ def write_report(
 def page(places: Sequence[Path], against: Path | None = None, title: str | None = None, *, short: bool = False) -> str:
     told, runs = _told(places, Figures())
     chapters = [chapter for chapter, _ in told]
+    if differ := _of_several_studies(list(dict.fromkeys(chapter.source for chapter in chapters))):
+        warnings.warn(differ, ResultsWarning, stacklevel=2)
     headings = [heading for _, content in told for heading, _ in content]
     content = [
         (heading if headings.count(heading) == 1 else f"{heading} ({_name(chapter.source)})", text)
@@ -62,8 +66,10 @@ def page(places: Sequence[Path], against: Path | None = None, title: str | None 
     title = title or (case.table.title or case.name if case else f"Report on {', '.join(map(_name, places))}")
     kind = "Small-signal and time-domain study by co-simulation of FMUs"
     found = "".join(map(sections.findings, runs))
-    answers = held_data("answers", _answers(chapters))  # for `changes` of a later page
-    return document(title, kind, first_page(chapters) + picture + found + answers, content)
+    of_all = {"question": "Are these results of one study?", "source": "", "answer": f"NO: {differ}"}
+    answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])  # for `changes` of a later page
+    above = paragraphs(False, [differ]) if differ else ""
+    return document(title, kind, above + first_page(chapters) + picture + found + answers, content)
 
 
 def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter, Sections]], list[Results]]:
@@ -105,6 +111,18 @@ def _parts(place: Path, depth: int = 2) -> Iterator[Path]:
                 yield from _parts(inner, depth - 1)
 
 
+def _of_several_studies(sources: Sequence[Path]) -> str:
+    """Which results were made from a file of one name with different content; "" where none were."""
+    seen: dict[str, dict[str, list[str]]] = {}
+    for source in sources:
+        for name, content in _origin(source).get("inputs", {}).items():
+            shown = name if Path(name).suffix in _RECORDS else Path(name).name
+            seen.setdefault(shown, {}).setdefault(str(content), []).append(str(source))
+    differ = {name: [few(places, 2) for places in by.values()] for name, by in seen.items() if len(by) > 1}
+    said = "; ".join(f"{name} differs between {' and '.join(places)}" for name, places in differ.items())
+    return said and f"{said}; figures are not comparable as one study"
+
+
 def _name(place: Path) -> str:
     return (place if place.is_dir() else place.parent).resolve().name
 
@@ -122,6 +140,8 @@ def _of_run(run: Results, figures: Figures) -> Sections:
     return content
 
 
+_RECORDS = {".nc", ".csv", ".cfg", ".dat"}  # of which each folder has one of the same name
+_OUTPUTS = {"--out", "--html"}
 _OPEN, _LONGEST = 4, 240  # what was not judged on the first page, and the characters of each
 
 
@@ -129,13 +149,12 @@ def first_page(chapters: Sequence[Chapter]) -> str:
     rows = []
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
-        open_ = (
-            "<br>".join(escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN]) or "nothing that is known of"
-        )
+        lost = [escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN]] or ["nothing that is known of"]
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
-        asked = f'{escape(one.question)}<br><span class="soft">{escape(str(one.source))}</span>'
-        rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), open_ + more])
+        given = "".join(f"<br>{escape(text)}" for text in (str(one.source), _given(one.source)) if text)
+        asked = f'{escape(one.question)}<span class="soft">{given}</span>'
+        rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), "<br>".join(lost) + more])
     return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
 
 
@@ -146,18 +165,35 @@ def origins(chapters: Sequence[Chapter]) -> str:
     return table("Where every chapter comes from", columns, rows, left=6)
 
 
-def _made(source: Path) -> list[str]:
+def _origin(source: Path) -> dict[str, Any]:
+    """What a result says of itself; empty where that was of another run into the same folder."""
     folder = source if source.is_dir() else source.parent
     own = _tables(source) if source.suffix == ".json" else {}
-    content: dict[str, Any] = _tables(folder / MANIFEST)
     match own.get("made"):
         case dict(said):
-            content = said
+            return said
         case str(date):  # a certificate's
-            content = {"date": date, "made_by": own.get("environment", {}), "inputs": own.get("files", {})}
-            content |= {"code": content["made_by"].get("Commit", ""), "command": f"gfor verify {folder}"}
+            made_by = own.get("environment", {})
+            return {"date": date, "made_by": made_by, "sealed": own.get("files", {}),
+                    "code": made_by.get("Commit", ""), "command": f"gfor verify {folder}"}  # fmt: skip
+    content = _tables(folder / MANIFEST)
+    listed = content.get("files", {}).get(source.name)
+    return {} if listed and listed["run"] != content["run"] else content
+
+
+def _given(source: Path) -> str:
+    """What a command was given: case, scenario, values, files; without where its results went."""
+    words = shlex.split(_origin(source).get("command", ""))
+    shown = (word for before, word in pairwise(words) if before not in _OUTPUTS)
+    kept = (word for word in shown if word.partition("=")[0] not in {*_OUTPUTS, "--json"})
+    return shlex.join(["gfor", *kept]) if words else ""
+
+
+def _made(source: Path) -> list[str]:
+    content = _origin(source)
+    listed = content.get("inputs", content.get("sealed", {}))
     versions = content.get("made_by", {}).get("gfor-cosim")
-    inputs = ", ".join(f"{name} {str(of)[:8]}" for name, of in content.get("inputs", {}).items() if of)
+    inputs = ", ".join(f"{name} {str(of)[:8]}" for name, of in listed.items() if of)
     date = content.get("date") or f"{datetime.fromtimestamp(source.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"
     figures = f"gfor-cosim {versions}" if versions else "", str(content.get("code", ""))[:12], inputs
     return [str(source), date, *(text or "not recorded" for text in (*figures, content.get("command")))]
@@ -212,6 +248,7 @@ def _answers(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
     return [
         {"question": one.question, "source": "" if one.source.is_dir() else one.source.name,
          "answer": one.answer + "".join(f"; not judged: {text}" for text in one.not_judged),
+         "given": _given(one.source),
          "folder": (one.source if one.source.is_dir() else one.source.absolute().parent).name}
         for one in chapters
     ]  # fmt: skip

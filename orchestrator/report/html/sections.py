@@ -4,8 +4,8 @@ import json
 from html import escape
 
 import numpy as np
-import xarray as xr
 
+from orchestrator.errors import counted
 from orchestrator.report.html.charts import ChartCurve, Mark, bar_chart, complex_plane, legend, line_chart
 from orchestrator.report.html.elements import Figures, colour, damping, eigenvalue, number, table
 from orchestrator.report.html.folder import Results
@@ -158,16 +158,13 @@ def operating_point(results: Results) -> str:
             buses = [{"name": bus, "v_pu": v, "angle_deg": angle} for bus, (v, angle) in flow["buses"].items()]
             found = {"machines": flow.get("machines", []), "buses": buses, "branches": flow.get("branches", [])}
             shown = [
-                table(
-                    "Units" if kind == "machines" else kind.capitalize(),
-                    list(COLUMNS[kind].values()),
-                    [[escape(cell) for cell in row] for row in cells(found[kind], kind)],
-                    left=TEXTS[kind],
-                )
+                table("Units" if kind == "machines" else kind.capitalize(), list(COLUMNS[kind].values()),
+                      [[escape(cell) for cell in row] for row in cells(found[kind], kind)], left=TEXTS[kind])
                 for kind in found
-            ]
+            ]  # fmt: skip
             details.append(
-                f"<details><summary>{escape(s['title'])}: {len(found['machines'])} units, {len(buses)} buses</summary>"
+                f"<details><summary>{escape(s['title'])}: {counted(len(found['machines']), 'unit')}, "
+                f"{counted(len(buses), 'bus')}</summary>"
                 f"{''.join(shown)}</details>"
             )
         residual = f"{flow['residual']:.1e}" if flow else "–"
@@ -187,15 +184,9 @@ def modes(results: Results, figures: Figures) -> str:
         for s in results.scenarios:
             mode, theirs = s["modes"].get(name), s["references"].get(name)
             row = [escape(name), escape(s["title"])]
-            row += (
-                [
-                    eigenvalue(mode["real"], mode["imag"]),
-                    f"{mode['frequency_hz']:.3f}",
-                    damping(mode["damping_percent"]),
-                ]
-                if mode
-                else ["none in range", "", ""]
-            )
+            row += ["none in range", "", ""] if not mode else [
+                eigenvalue(mode["real"], mode["imag"]), f"{mode['frequency_hz']:.3f}", damping(mode["damping_percent"])
+            ]  # fmt: skip
             if compared:
                 row += [f"{theirs['frequency_hz']:.2f}", number(theirs["damping_percent"], 2)] if theirs else ["", ""]
             rows.append(row)
@@ -233,9 +224,8 @@ def _marks(results: Results) -> list[Mark]:
         for name, theirs in s["references"].items():
             ratio = theirs["damping_percent"] / 100
             default = -ratio / np.sqrt(1 - ratio**2) * 2 * np.pi * theirs["frequency_hz"]
-            text = (
-                f"{name}, {s['title']}: reference\n{theirs['frequency_hz']:.2f} Hz, {theirs['damping_percent']:.2f} %"
-            )
+            at = f"{theirs['frequency_hz']:.2f} Hz, {theirs['damping_percent']:.2f} %"
+            text = f"{name}, {s['title']}: reference\n{at}"
             marks.append(Mark(theirs.get("real", default), theirs["frequency_hz"], colour(k), text, "circle"))
     return marks
 
@@ -316,27 +306,21 @@ def _curves(
     """One signal in every scenario, and how far it goes; ``place`` is its place among several of one panel."""
     curves, deviations = [], {}
     for k, s in enumerate(results.scenarios):
-        seen = _signal(results.trajectories.get(s["name"]), expression)
-        if seen is None:
+        recorded, linear = results.trajectories.get(s["name"]), results.linear.get(s["name"])
+        if recorded is None or (seen := signal(recorded, expression)) is None:
             continue
         x, y = seen["time"].values, scale * seen.values
         alone = place is not None and len(results.scenarios) == 1
         name = s["title"] if place is None else expression if alone else f"{s['title']}: {expression}"
         curves.append(ChartCurve(name, colour(place if alone and place is not None else k), x, y))
         text = f"{np.abs(y - y[0]).max():.3g}"
-        linear = _signal(results.linear.get(s["name"]), expression)
-        if linear is not None:
-            curves.append(
-                ChartCurve(f"{s['title']}, linear", "#000", linear["time"].values, scale * linear.values, True)
-            )
-            share = relative_difference(seen, linear)
+        if linear is not None and (answer := signal(linear, expression)) is not None:
+            times, values = answer["time"].values, scale * answer.values
+            curves.append(ChartCurve(f"{s['title']}, linear", "#000", times, values, True))
+            share = relative_difference(seen, answer)
             text += f" ({100 * share:.2g} %)" if np.isfinite(share) else ""
         deviations[s["name"]] = text
     return curves, deviations
-
-
-def _signal(dataset: xr.Dataset | None, expression: str) -> xr.DataArray | None:
-    return None if dataset is None else signal(dataset, expression)
 
 
 def _ring_downs(results: Results) -> str:
