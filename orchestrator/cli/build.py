@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
     kind = "native" if options.native else "Python-backed"
     with said_stages() as report:
         for number, model in enumerate(models, start=1):
-            report(f"{model.name}: compiling, {kind} ({number} of {len(models)}); minutes where it was never compiled")
+            report(f"{model.name}: building, {kind} ({number} of {len(models)})")
             built = build(
                 model, options.dest, native=options.native, fmi=options.fmi, platforms=options.platform, extra=extra,
                 reference=options.reference, sources=options.sources,

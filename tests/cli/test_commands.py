@@ -238,7 +238,7 @@ def test_square_brackets_of_the_user_are_shown_as_they_are(refused):
 def test_build_writes_an_fmu_that_info_reads(gfor, tmp_path):
     code, out, err = gfor("fmu", "build", "gfor", "--dest", tmp_path / "new")
     assert code == 0
-    assert err.startswith("gfor: compiling, Python-backed (1 of 1)")
+    assert err.startswith("gfor: building, Python-backed (1 of 1)")
     assert out == f"{tmp_path / 'new' / 'gfor.fmu'}\n"
     description = read_description(tmp_path / "new" / "gfor.fmu")
 

@@ -61,7 +61,7 @@ def test_a_model_that_breaks_a_rule_is_one_error_of_one_line(monkeypatch, tmp_pa
 def test_a_build_says_what_it_is_at(tmp_path, capsys):
     assert main(["fmu", "build", "infinite_bus", "--dest", str(tmp_path)]) == 0
     printed = capsys.readouterr()
-    assert "infinite_bus: compiling, Python-backed (1 of 1)" in printed.err
+    assert "infinite_bus: building, Python-backed (1 of 1)" in printed.err
     assert printed.out.strip().endswith("infinite_bus.fmu")
 
 
