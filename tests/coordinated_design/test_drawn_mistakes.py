@@ -14,6 +14,8 @@ from orchestrator.coordinated_design.settings import PodGroup
 from orchestrator.coordinated_design.study import values_of
 from orchestrator.coordinated_design.verdict import least_of
 from orchestrator.operating_points.item import Status
+from orchestrator.pod_design.closed_loop import PodSetting
+from orchestrator.pod_design.lead_lag import LeadLag
 
 
 @pytest.mark.parametrize("place", range(len(BANDS_HZ)))
@@ -41,7 +43,7 @@ def test_a_residue_is_what_a_small_gain_moves():
 
 @pytest.mark.parametrize(("gain", "enabled"), [(0.0, False), (123.456789012, True)])
 def test_a_controller_without_gain_is_switched_off(gain, enabled):
-    setting = SimpleNamespace(gain=gain, filters=SimpleNamespace(T_S1=0.2, T_S2=0.05))
+    setting = PodSetting(gain, LeadLag(T_S1=0.2, T_S2=0.05, N_S=2))
     values = values_of([PodGroup("pod_p", ("gfor1", "gfor2"), ("gfor*",), 2)], [setting])
     assert values["gfor*.pod_p.enabled"] is enabled
     assert values["gfor*.pod_p.K"] == pytest.approx(gain, rel=1e-7)
