@@ -21,7 +21,7 @@ from orchestrator.certification.margins import CriterionMargin
 from orchestrator.certification.point import CONVERTER
 from orchestrator.certification.request import REACTANCES, CertificationRequest, same_reactance
 from orchestrator.certification.verdict import FAILS, INCOMPLETE, PASSES, incomplete_because, verdict_of
-from orchestrator.errors import CaseError, Problem, counted
+from orchestrator.errors import CaseError, Problem
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.values import as_text
 
@@ -90,8 +90,7 @@ def rows_in_words(c: Certificate) -> str:
         names = "; ".join(f"{v.name}: {', '.join(f.criterion for f in v.failed)}" for v in bad)
         return f"{subject} {FAILS} {title}: {rows} Not accepted: {names}."
     if c.verdict == INCOMPLETE:
-        number = counted(len(c.missing), "part")
-        untested = f"{number} of {title} {'was' if len(c.missing) == 1 else 'were'} not tested."
+        untested = f"{len(c.missing)} parts of {title} were not tested."  # as issued ones say, also of one part
         return f"The test is {INCOMPLETE}: {untested} {subject}: {rows}"
     return f"{subject} {PASSES} {title}: {rows}"
 

@@ -94,7 +94,7 @@ def without_jumps(fails):
     save_netcdf(rest, fails / RESPONSES)
     content = without(content, "jumps")
     content["missing"], rows = list(CODE.left_out), "The converter 'gfor': 3 of 3 judged rows are accepted."
-    content["sentence"] = f"The test is incomplete: 1 part of {CODE.title} was not tested. {rows}"
+    content["sentence"] = f"The test is incomplete: 1 parts of {CODE.title} were not tested. {rows}"
     return fails, content
 
 
