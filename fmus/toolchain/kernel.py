@@ -15,11 +15,12 @@ z = [p | c | u | x | y | ẋ]. A kernel is these functions on it:
 `tape` writes the same functions as data."""
 
 from collections.abc import Mapping
+from itertools import chain, islice
 from pathlib import Path
 
 from fmus.toolchain.elimination_plan import plan_elimination
 from fmus.toolchain.model import Model
-from fmus.toolchain.symbols import Function
+from fmus.toolchain.symbols import Expr, Function, jtimes, jtimes_transposed, symbols
 from fmus.toolchain.symbols.operations import C, Op
 
 
@@ -86,3 +87,35 @@ def kernel_functions(model: Model) -> dict[str, Function]:
         "derivatives": model.derivatives,
         "requirements": model.requirements,
     }
+
+
+def derivative_functions(model: Model) -> dict[str, Function]:
+    """Products of the exact Jacobians with a direction, and of their transposes with a seed.
+
+    ``direction`` and ``adjoint`` are of (ẋ, y) by (x, u, p, c); ``start_direction`` and ``start_adjoint`` of the
+    initialisation (c, x) by p."""
+    x, u, p, c = (
+        symbols(name, len(group))
+        for name, group in (("x", model.states), ("u", model.inputs), ("p", model.parameters), ("c", model.calculated))
+    )
+    known = [x, u, p, c]
+    follows = [*model.derivatives.of(*known), *model.outputs_function.of(*known)]
+    start = model.initialise.of(p)
+    return {
+        "direction": _direction("direction", known, follows),
+        "adjoint": _adjoint("adjoint", known, follows),
+        "start_direction": _direction("start_direction", [p], start),
+        "start_adjoint": _adjoint("start_adjoint", [p], start),
+    }
+
+
+def _direction(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
+    directions = [symbols("d", len(vector)) for vector in known]
+    point, along = list(chain(*known)), list(chain(*directions))
+    return Function(name, [*known, *directions], [jtimes(values, point, along) for values in follows])
+
+
+def _adjoint(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
+    seeds = [symbols("a", len(vector)) for vector in follows]
+    total = iter(jtimes_transposed(list(chain(*follows)), list(chain(*known)), list(chain(*seeds))))
+    return Function(name, [*known, *seeds], [list(islice(total, len(vector))) for vector in known])

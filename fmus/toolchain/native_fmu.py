@@ -10,7 +10,6 @@ import struct
 import zlib
 from array import array
 from importlib.metadata import version as version_of
-from itertools import chain, islice
 from math import inf
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -22,9 +21,8 @@ from fmus.toolchain.compiler import ENDINGS, TARGETS, compile_library, joined_so
 from fmus.toolchain.description import model_description, with_guid
 from fmus.toolchain.exporter import this_machine
 from fmus.toolchain.extras import installed_version
-from fmus.toolchain.kernel import c_source
+from fmus.toolchain.kernel import c_source, derivative_functions
 from fmus.toolchain.model import FmiVersion, Model
-from fmus.toolchain.symbols import Expr, Function, jtimes, jtimes_transposed, symbols
 from fmus.toolchain.tape import VERSION, tape_of
 
 _TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}  # FMI 2.0's name of a type → FMI 3.0's
@@ -117,38 +115,6 @@ def native_source(model: Model, version: FmiVersion) -> str:
         (_C / f"fmi{version[0]}.c").read_text(encoding="utf-8"),
     ]
     return "\n".join(parts)
-
-
-def derivative_functions(model: Model) -> dict[str, Function]:
-    """Products of the exact Jacobians with a direction, and of their transposes with a seed.
-
-    ``direction`` and ``adjoint`` are of (ẋ, y) by (x, u, p, c); ``start_direction`` and ``start_adjoint`` of the
-    initialisation (c, x) by p."""
-    x, u, p, c = (
-        symbols(name, len(group))
-        for name, group in (("x", model.states), ("u", model.inputs), ("p", model.parameters), ("c", model.calculated))
-    )
-    known = [x, u, p, c]
-    follows = [*model.derivatives.of(*known), *model.outputs_function.of(*known)]
-    start = model.initialise.of(p)
-    return {
-        "direction": _direction("direction", known, follows),
-        "adjoint": _adjoint("adjoint", known, follows),
-        "start_direction": _direction("start_direction", [p], start),
-        "start_adjoint": _adjoint("start_adjoint", [p], start),
-    }
-
-
-def _direction(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
-    directions = [symbols("d", len(vector)) for vector in known]
-    point, along = list(chain(*known)), list(chain(*directions))
-    return Function(name, [*known, *directions], [jtimes(values, point, along) for values in follows])
-
-
-def _adjoint(name: str, known: list[list[Expr]], follows: list[list[Expr]]) -> Function:
-    seeds = [symbols("a", len(vector)) for vector in follows]
-    total = iter(jtimes_transposed(list(chain(*follows)), list(chain(*known)), list(chain(*seeds))))
-    return Function(name, [*known, *seeds], [list(islice(total, len(vector))) for vector in known])
 
 
 LIBRARIES = {version: (_C / "native.c", _C / f"fmi{version[0]}.c") for version in ("2.0", "3.0")}

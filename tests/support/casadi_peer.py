@@ -87,8 +87,7 @@ def made():
 def functions(model):
     """All functions of a model from which code is written, by name."""
     from fmus.toolchain.elimination_plan import plan_elimination
-    from fmus.toolchain.kernel import kernel_functions
-    from fmus.toolchain.native_fmu import derivative_functions
+    from fmus.toolchain.kernel import derivative_functions, kernel_functions
 
     found = kernel_functions(model) | derivative_functions(model)
     return found | ({"iteration": plan_elimination(model).values} if model.integrator == "sdirk" else {})
