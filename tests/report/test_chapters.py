@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -249,6 +250,23 @@ def test_results_of_two_versions_of_a_file_are_not_one_study(tmp_path):
     kept = json.loads(text[text.index('id="answers">') + 13 :].partition("</script>")[0])
     assert kept[0]["answer"].startswith("NO: own.raw differs")
     assert kept[1]["given"] == "gfor scr own.toml --set models=emt --parameters p.toml"
+
+
+def test_what_is_found_in_a_runs_record_is_of_the_runs_inputs(gfor, tmp_path):
+    t = np.arange(0, 10, 0.02)
+    folders = {run: made(tmp_path / run, "scr", SCR, **{"own.raw": of}) for run, of in (("old", "1a"), ("new", "2b"))}
+    for run, folder in folders.items():
+        rows = "".join(f"{x},{np.exp(-0.2 * x) * np.sin(5 * x)}\n" for x in t)
+        (folder / "trajectory.csv").write_text(f"time,sg.w\n{rows}", encoding="utf-8")
+        origin.said.append(lambda of={"old": "1a", "new": "2b"}[run]: {"inputs": {"own.raw": of}})
+        write_manifest(folder, "r", ["scr.json", "trajectory.csv"])
+        origin.said.pop()
+        assert gfor("signal", "identify", folder / "trajectory.csv", "sg.w", "--out", tmp_path / f"of_{run}")[0] == 0
+    assert "one study" not in written([folders["old"], tmp_path / "of_old"], tmp_path)
+    with pytest.warns(ResultsWarning, match=r"own\.raw differs between .*old.* and .*of_new"):
+        written([folders["old"], tmp_path / "of_new"], tmp_path)
+    both = made(tmp_path / "both", "scr", SCR, **{"old/own.raw": "1a", "new/own.raw": "2b"})
+    assert "one study" not in written([folders["old"], both], tmp_path)
 
 
 def test_every_row_says_what_was_given_and_of_which_models(tmp_path):

@@ -115,9 +115,13 @@ def _of_several_studies(sources: Sequence[Path]) -> str:
     """Which results were made from a file of one name with different content; "" where none were."""
     seen: dict[str, dict[str, list[str]]] = {}
     for source in sources:
+        own: dict[str, set[str]] = {}
         for name, content in _origin(source).get("inputs", {}).items():
             shown = name if Path(name).suffix in _RECORDS else Path(name).name
-            seen.setdefault(shown, {}).setdefault(str(content), []).append(str(source))
+            own.setdefault(shown, set()).add(str(content))
+        for shown, (content, *others) in own.items():
+            if not others:  # else it compares the two
+                seen.setdefault(shown, {}).setdefault(content, []).append(str(source))
     differ = {name: [few(places, 2) for places in by.values()] for name, by in seen.items() if len(by) > 1}
     said = "; ".join(f"{name} differs between {' and '.join(places)}" for name, places in differ.items())
     return said and f"{said}; figures are not comparable as one study"
