@@ -103,16 +103,17 @@ def questions_about(
             unit = "MW" if column.endswith(ACTIVE) else "Mvar"
             text = f"at most {most:g} {unit}, where the case itself has {own:.4g} {unit}; are these values in pu?"
             yield Problem(place, text)
-    own = {u: own_power(f"{u}.{ACTIVE}", elements, prepared) or 0.0 for u in elements.units}
-    others = {unit: power for unit, power in own.items() if unit not in elements.balancing}
-    left = {point.name: _left(point, prepared, elements, others) for row, point in zip(rows, points, strict=True)
-            if (row.get("generation") or "").strip() not in _MEANT}  # fmt: skip
-    if worst := max(left, key=lambda name: abs(left[name]), default=None):
-        who, more = ", ".join(elements.balancing) or elements.slack, left[worst]
+    feeding = [unit for unit in elements.units if unit not in elements.balancing]
+    others = {unit: own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in feeding}
+    leaves = {point.name: _left(point, prepared, elements, others) for row, point in zip(rows, points, strict=True)
+              if (row.get("generation") or "").strip() not in _MEANT}  # fmt: skip
+    worst = max(leaves, key=lambda name: abs(leaves[name]), default="")
+    more, load = leaves.get(worst, 0.0), load_of(elements.loads, prepared.system.components[elements.grid])
+    if abs(more) > _LEFT * abs(load):
+        who = ", ".join(elements.balancing) or elements.slack
         text = f"at {worst} the slack ({who}) feeds {abs(more):.4g} MW {'more' if more > 0 else 'less'}, as the other"
         remedy = "add UNIT.P_mw or a factor 'generation', 1 where the slack is meant"
-        if abs(more) > _LEFT * abs(load_of(elements.loads, prepared.system.components[elements.grid])):
-            yield Problem(str(path), f"{text} units' powers do not follow the load there: {remedy}")
+        yield Problem(str(path), f"{text} units' powers do not follow the load there: {remedy}")
 
 
 def _left(point: OperatingCase, prepared: PreparedScenario, elements: Elements, others: Mapping[str, float]) -> float:
