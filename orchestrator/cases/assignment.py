@@ -11,7 +11,7 @@ from typing import Any
 
 from orchestrator.cases.draft import Draft
 from orchestrator.cases.imperfection_tables import sets_imperfection
-from orchestrator.cases.names import SERVICE, close_names, whose
+from orchestrator.cases.names import SERVICE, STATES, close_names, whose
 from orchestrator.cases.schema import ConventionsTable, Value
 from orchestrator.cases.values import TWICE, check_system_base, convert, flatten, given_twice
 from orchestrator.fmi.description import VariableInfo
@@ -131,13 +131,16 @@ def _switch(draft: Draft, key: str, value: Value) -> str:
     owner, _, word = key.rpartition(".")
     element, grid = owner.rpartition(".")[2], draft.grid or ""
     homes = ((element, "connected"), (grid, f"{element}.connected"), (grid, f"{element}.scale"))
-    found = [(name, variable) for name, variable in homes if _has(draft, name, variable)]
+    fitting = {name: fnmatch.filter(draft.system.components, name) for name, _ in homes}
+    found = [(name, own) for name, own in homes if any(_has(draft, one, own) for one in fitting[name])]
     if word not in SERVICE or not found or _has(draft, key.partition(".")[0], key.partition(".")[2]):
         return ""
-    (name, variable), off = found[0], str(value).lower() in ("0", "0.0", "false", "no", "off", "out", "open")
-    off = off != (word in ("out", "off"))
-    state = str(int(not off)) if variable.endswith("scale") else str(not off).lower()
-    return f"{element} is switched {'off' if off else 'on'} by {name}.{variable}={state}; write that"
+    (name, variable), state = found[0], STATES.get(str(value).lower())
+    if state is None:
+        return f"{word} = {value!r}; it must be true or false; {element} is switched by {name}.{variable}"
+    on = state != (word in ("out", "off"))
+    text = str(int(on)) if variable.endswith("scale") else str(on).lower()
+    return f"{element} is switched {'on' if on else 'off'} by {name}.{variable}={text}; write that"
 
 
 def _has(draft: Draft, name: str, variable: str) -> bool:

@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass
 
-from fmus.grid.element_data import LAWS, Load, Zip
+from orchestrator.cases.load_models import in_words
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import counted
 
 SOURCES = ("raw", "matpower", "pandapower", "cgmes")  # keys of ``[network]`` that name another program's data
-_NAMES = {zip_: name for name, zip_ in LAWS.items()}
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ def facts_of(prepared: PreparedScenario) -> Facts | None:
         (*sources, *dyr), any(name.endswith(".y_re") for name in grid.description.inputs), rated_frequency(prepared),
         len(network.buses), len(machines), len(feeding) - len(machines),
         any(v.startswith("governor.T_") for n in machines for v in plans[n].description.variables),
-        sum(p for _, p in loads if p > 0), _model([load for load, p in loads if p > 0]),
+        sum(p for _, p in loads if p > 0), in_words([load for load, p in loads if p > 0]),
         tuple((n, flow.powers[n].real * plans[n].number("S_n"), plans[n].number("S_n")) for n in at_slack),
         (min(magnitudes), max(magnitudes)),
     )  # fmt: skip
@@ -70,15 +69,3 @@ def rated_frequency(prepared: PreparedScenario) -> float | None:
     """Of all components, which have one in common [Hz]; None where none has one."""
     plans = prepared.system.components.values()
     return next((plan.number("f_n") for plan in plans if "f_n" in plan.description.variables), None)
-
-
-def _model(loads: list[Load]) -> str:
-    active, reactive = {x.active for x in loads}, {x.reactive for x in loads if x.q_mvar}
-    if len(active) > 1 or len(reactive) > 1:
-        return "several models"
-    (p,), q = active or {LAWS["impedance"]}, next(iter(reactive), None)
-    return f"constant {_named(p)}" if q in (None, p) else f"P constant {_named(p)}, Q constant {_named(q)}"
-
-
-def _named(law: Zip | None) -> str:
-    return "power" if law is None else _NAMES.get(law, f"{law.z:.3g} impedance, {law.i:.3g} current, {law.p:.3g} power")

@@ -8,6 +8,7 @@ from fmus.grid.element_data import LAWS, Load, Zip
 from orchestrator.cases.schema import LoadLaw, LoadModelTable, NetworkTable
 from orchestrator.errors import InputError, Problem
 
+_NAMES = {zip_: name for name, zip_ in LAWS.items()}
 _LARGEST_SHARE = 100.0  # of a part by the whole: above, the parts cancel, and the whole is none to take shares of
 
 _OPEN = (
@@ -27,6 +28,18 @@ def is_open(table: NetworkTable | None) -> bool:
 def as_powers(table: NetworkTable) -> NetworkTable:
     """The network with loads of constant power, where their model is open."""
     return table.model_copy(update={"load_model": LoadModelTable(active="power", reactive="power")})
+
+
+def in_words(loads: list[Load]) -> str:
+    active, reactive = {x.active for x in loads}, {x.reactive for x in loads if x.q_mvar}
+    if len(active) > 1 or len(reactive) > 1:
+        return "several models"
+    (p,), q = active or {LAWS["impedance"]}, next(iter(reactive), None)
+    return f"constant {_named(p)}" if q in (None, p) else f"P constant {_named(p)}, Q constant {_named(q)}"
+
+
+def _named(law: Zip | None) -> str:
+    return "power" if law is None else _NAMES.get(law, f"{law.z:.3g} impedance, {law.i:.3g} current, {law.p:.3g} power")
 
 
 def open_question(table: NetworkTable | None, loads: Sequence[Load], place: str) -> list[Problem]:

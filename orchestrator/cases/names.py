@@ -12,6 +12,8 @@ TWINS = {"current_limit": "current_demand", "current_demand": "current_limit"}
 """Outputs of one meaning in EMT and phasor models."""
 
 SERVICE = ("in_service", "status", "closed", "connected", "enabled", "out", "off")
+STATES = dict.fromkeys(("1", "1.0", "true", "yes", "on", "in", "closed"), True)
+STATES |= dict.fromkeys(("0", "0.0", "false", "no", "off", "out", "open"), False)
 """What others call the switch of an element."""
 
 _RESERVED = re.compile(r"(?:con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)

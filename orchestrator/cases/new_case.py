@@ -35,6 +35,7 @@ _FILES = {".raw": "raw", ".m": "matpower", ".mat": "matpower", ".json": "pandapo
 _TEMPLATE = Path(__file__).with_suffix(".txt").read_text(encoding="utf-8")
 _EMT_STEP = 1e-4
 _MOST_CURVES = 12
+_EMF = """emf w·e''; [conventions] like = "psse" takes PSS/E's e'', which moves dampings by tenths of a point"""
 _CONVERTER, _INJECTION = "gfor", "injection"
 
 
@@ -298,6 +299,8 @@ class _Text:
             lines.append(f"converter: {what}; at {p.bus} it holds the {p.v_pu:g} pu of the base; {dispatch}")
         if "dyr" not in self._sources:
             lines.append("machines: no dynamics data, so all are a steam turbine's with exciter ST1: typical data")
+        elif self._wanted.kind == "phasor":
+            lines.append(f"machines: {_EMF}")
         if "units" in self._sources:
             lines[-1] += f"; slack {self._wanted.slack}, {self._wanted.frequency} (--slack, --frequency)"
         asked = "impedance until [network] load_model says otherwise; `gfor modes` tells what power would change"
@@ -326,8 +329,9 @@ class _Text:
         rest = f"\n[{other}]                       # what --set models={other} takes instead\n"
         rest += f'step_size = "{steps[other]}"\n'
         kept = "\nkeep_load_parts = true      # IP, IQ stay constant currents, YP, YQ constant impedances"
+        own = f"    # {_EMF}" if kind == "phasor" else ""
         dyr = "generator_parameters = { transformer.X_t = 0.0, transformer.R_t = 0.0 }    # the network has it"
-        dyr = f"dyr = {self._path(self._sources['dyr'])}" if "dyr" in self._sources else dyr
+        dyr = f"dyr = {self._path(self._sources['dyr'])}{own}" if "dyr" in self._sources else dyr
         dyr = f"file = {self._path(self._sources['units'])}\n{dyr}" if "units" in self._sources else dyr
         lines = self._network is not None and any(x.name.startswith("line_") for x in self._network.lines)
         return _TEMPLATE.format(

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from fmus.grid.network import Network
@@ -10,7 +11,7 @@ from fmus.toolchain.extras import installed_version
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases import component_forms
 from orchestrator.cases.areas import in_two_areas
-from orchestrator.cases.assignment import assign_values
+from orchestrator.cases.assignment import EMF, TORQUE, assign_values
 from orchestrator.cases.build_choices import MODELS, PARTS, STAND_IN
 from orchestrator.cases.case_network import check_network_is_used, find_network, read_network, takes_network
 from orchestrator.cases.catalogue_fmus import PlannedFmu, build_fmu, plan_fmu
@@ -21,7 +22,7 @@ from orchestrator.cases.event_tables import scenario_events
 from orchestrator.cases.idle_values import Idle, idle_values
 from orchestrator.cases.imperfection_tables import disturb_connections
 from orchestrator.cases.layers import value_layers
-from orchestrator.cases.load_models import open_question
+from orchestrator.cases.load_models import in_words, open_question
 from orchestrator.cases.names import close_names
 from orchestrator.cases.operating_point import power_flow_of
 from orchestrator.cases.parameter_files import ParameterFile
@@ -36,7 +37,7 @@ from orchestrator.cases.wiring import check_inputs, connect
 from orchestrator.coupling.events import Event
 from orchestrator.coupling.schedule import SECOND_ORDER, Schedule, ScheduleName, check_tolerance
 from orchestrator.coupling.step_awareness import STEP_PARAMETER, tell_step
-from orchestrator.coupling.system import System
+from orchestrator.coupling.system import ComponentPlan, System
 from orchestrator.errors import InputError, Problem
 from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.instance import is_ours
@@ -93,7 +94,17 @@ class PreparedScenario:
     def about(self) -> dict[str, Any]:
         """What the JSON of every study says of its scenario."""
         return {"case": self.case.name, "scenario": self.name, "subject": self.subject, "models": self.models,
-                "questions": [*map(str, self.questions)]}  # fmt: skip
+                "basis": self.basis, "questions": [*map(str, self.questions)]}  # fmt: skip
+
+    @property
+    def basis(self) -> dict[str, Any]:
+        """What results have to have in common to be compared: network, model of its loads, and each machine's model."""
+        table = self.case.table.network
+        file = table and (table.raw or table.matpower or table.pandapower or table.cgmes or table.lines_file)
+        loads = [load for load in (self.network.loads if self.network else ()) if load.p_mw > 0]
+        machines = {name: _machine(plan) for name, plan in self.system.components.items() if plan.kind == "machine"}
+        network = Path(file).name if file else self.case.name
+        return {"network": network, "loads": in_words(loads) if loads else "", "machines": machines}
 
     @property
     def grid(self) -> str:
@@ -111,6 +122,14 @@ class PreparedScenario:
         check_tolerance(tolerance)
         ready = self if self.schedule.is_second_order else self.rescheduled("newton")
         return replace(ready, schedule=replace(ready.schedule, tolerance=tolerance))
+
+
+def _machine(plan: ComponentPlan) -> str:
+    """The model of a machine, and what it assumes of itself; EMT and phasor models of one machine are one."""
+    known = plan.description.variables
+    other = ["emf e''"] if EMF in known and not plan.value(EMF) else []
+    other += ["the governor gives the torque"] if TORQUE in known and plan.value(TORQUE) else []
+    return ", ".join([plan.description.model_name.removesuffix("_phasor"), *other])
 
 
 class Preparer:

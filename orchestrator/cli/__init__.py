@@ -110,13 +110,17 @@ def _command_in(words: Sequence[str]) -> str | None:
 def _origin(words: Sequence[str]) -> dict[str, Any]:
     from orchestrator.points.code import code_hash  # noqa: PLC0415 - only where results are written
     from orchestrator.points.key import files_named, sha256_of  # noqa: PLC0415 - likewise
+    from orchestrator.results.manifest import inputs_behind  # noqa: PLC0415 - likewise
 
-    inputs = {}
+    inputs = dict[str, str]()
     given = (word for before, word in pairwise(["", *words]) if before not in ("--out", "--html"))
-    for path in (Path(word) for word in given if len(word) < _LONGEST_PATH and Path(word).is_file()):
-        inputs[str(path)] = sha256_of(path)
+    for path in (Path(word) for word in given if len(word) < _LONGEST_PATH and Path(word).exists()):
+        if path.is_file():
+            inputs[str(path)] = sha256_of(path)
         if path.suffix == ".toml":
             inputs |= files_named(path.read_text(encoding="utf-8", errors="replace"), path.parent)
+        else:
+            inputs |= {f"{path}/{name}": of for name, of in inputs_behind(path).items()}
     return {"command": shlex.join(["gfor", *words]), "code": code_hash(), "inputs": inputs}
 
 

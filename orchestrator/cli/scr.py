@@ -25,8 +25,8 @@ def run(options: argparse.Namespace) -> int:
     found = {s: weakest_first(s.strengths(options.converter_current, options.rating)) for s in chosen(options)}
     told = [{"name": s.name, "buses": [bus.as_json() for bus in buses]} for s, buses in found.items()]
     about = next(iter(found)).prepared.about
-    content = {"case": about["case"], "models": about["models"], "questions": about["questions"],
-               "convention": convention, "scenarios": told}  # fmt: skip
+    kept = {key: about[key] for key in ("case", "models", "basis", "questions")}
+    content = kept | {"convention": convention, "scenarios": told}
     keep_json(content, options.out, "scr")
     if options.json:
         print_json(content)

@@ -55,6 +55,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _print(found: list[Sources], *, details: bool) -> None:
     console = make_console()
+    print_parts(console, (escape(f"{one.label}: {remark}") for one in found for remark in one.remarks))
     console.print(sources_table(found))
     for one in found:
         for x in one:
@@ -64,4 +65,3 @@ def _print(found: list[Sources], *, details: bool) -> None:
                 text = ", ".join(f"{name} {value:.3g}" for name, value in list(x.found.amplitudes.items())[:_SHOWN])
                 said += [opinions_table(head, x), escape(f"Amplitudes, the clearest first: {text}")]
             print_parts(console, said)
-        print_parts(console, (escape(f"{one.label}: {remark}") for remark in one.remarks))

@@ -130,7 +130,8 @@ class CutResult:
         """Verdict and figures as JSON's types."""
         j = self.judgement
         points = {s: {p: vars(v) for p, v in scan.points.items()} for s, scan in self.scans.items() if scan.points}
-        return {
+        of = self.request.network
+        return ({"models": of.models, "basis": of.basis} if isinstance(of, PreparedScenario) else {}) | {
             "verdict": str(self.verdict),
             "reasons": list(j.reasons),
             "sentence": f"{self.verdict}: {self.because}",

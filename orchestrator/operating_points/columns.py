@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from orchestrator.cases.names import SERVICE, close_names
+from orchestrator.cases.names import SERVICE, STATES, close_names
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
 from orchestrator.cases.values import convert
@@ -14,7 +14,6 @@ from orchestrator.errors import InputError, few
 from orchestrator.units import read_value
 
 IN_SERVICE, ACTIVE, REACTIVE = "in_service", "P_mw", "Q_mvar"
-_SWITCHES = {"1": True, "1.0": True, "true": True, "yes": True, "0": False, "0.0": False, "false": False, "no": False}
 
 
 @dataclass(frozen=True)
@@ -122,7 +121,7 @@ def _service(column: str, name: str, elements: Elements, prepared: PreparedScena
         raise InputError(f"there is no unit, line, load or shunt {name!r}; {hint}")
 
     def read(text: str) -> Setting:
-        state = _SWITCHES.get(text.lower())
+        state = STATES.get(text.lower())
         if state is None:
             raise ValueError(f"{column} = {text!r}; it must be 1 or 0, true or false")
         return Setting(_closing(column, name, elements, prepared)) if state else Setting(out=(name,))

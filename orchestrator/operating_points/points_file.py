@@ -17,6 +17,7 @@ from orchestrator.units import read_value
 _LABELS = ("time", "name")
 _ANOTHER_UNIT = 25.0  # times smaller than the case's own is a whole column of powers that is asked about
 _LEFT = 0.05  # part of the case's load that is asked about where points leave it to the slack
+_MEANT = ("1", "1.0")  # factors of generation that leave it to the slack by intention
 
 
 @dataclass(frozen=True)
@@ -102,18 +103,33 @@ def questions_about(
             unit = "MW" if column.endswith(ACTIVE) else "Mvar"
             text = f"at most {most:g} {unit}, where the case itself has {own:.4g} {unit}; are these values in pu?"
             yield Problem(place, text)
-    others = [unit for unit in elements.units if unit not in elements.balancing]
-    if not others or any(f"{unit}.P_0" in point.values for point in points for unit in others):
-        return
+    feeding = [unit for unit in elements.units if unit not in elements.balancing]
+    others = {unit: own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in feeding}
+    leaves = {point.name: _left(point, prepared, elements, others) for row, point in zip(rows, points, strict=True)
+              if (row.get("generation") or "").strip() not in _MEANT}  # fmt: skip
+    worst = max(leaves, key=lambda name: abs(leaves[name]), default="")
+    more, load = leaves.get(worst, 0.0), load_of(elements.loads, prepared.system.components[elements.grid])
+    if abs(more) > _LEFT * abs(load):
+        who = ", ".join(elements.balancing) or elements.slack
+        text = f"at {worst} the slack ({who}) feeds {abs(more):.4g} MW {'more' if more > 0 else 'less'}, as the other"
+        remedy = "add UNIT.P_mw or a factor 'generation', 1 where the slack is meant"
+        yield Problem(str(path), f"{text} units' powers do not follow the load there: {remedy}")
+
+
+def _left(point: OperatingCase, prepared: PreparedScenario, elements: Elements, others: Mapping[str, float]) -> float:
+    """What a point leaves to the slack [MW] of what the loads draw more and units out of service fed; 0 where that is
+    nearer to the slack's own share than to all of it. ``others``: units beside the slack's, and what each feeds."""
     load = load_of(elements.loads, prepared.system.components[elements.grid])
-    more = {point.name: _drawn(point, prepared, elements) - load for point in points}
-    for name, out in ((point.name, point.out) for point in points):
-        more[name] += sum(own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in others if unit in out)
-    worst = max(more, key=lambda name: abs(more[name]))
-    if abs(more[worst]) > _LEFT * abs(load):
-        who, which = ", ".join(elements.balancing) or elements.slack, "more" if more[worst] > 0 else "less"
-        text = f"at {worst} the slack ({who}) feeds {abs(more[worst]):.4g} MW {which}, as no column gives other units"
-        yield Problem(str(path), f"{text} a power: add UNIT.P_mw or a factor 'generation', 1 where the slack is meant")
+    wanted, given = _drawn(point, prepared, elements) - load, 0.0
+    for unit, power in others.items():
+        if unit in point.out:
+            wanted += power
+        elif f"{unit}.P_0" in point.values or f"{unit}.S_n" in point.values:
+            rating = prepared.system.components[unit].number("S_n")
+            per_unit = point.values.get(f"{unit}.P_0", power / rating)
+            given += float(per_unit) * float(point.values.get(f"{unit}.S_n", rating)) - power
+    share = min(max(1 - sum(others.values()) / load, 0.0), 1.0) if load else 0.0
+    return wanted - given if others and wanted and (wanted - given) / wanted > (1 + share) / 2 else 0.0
 
 
 def _drawn(point: OperatingCase, prepared: PreparedScenario, elements: Elements) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -88,6 +89,11 @@ def sources_of(
         except CosimError as error:
             remark = f"the record is compared with no models of the units: {error}"
             measured = replace(measured, remarks=(*measured.remarks, remark))
+    if prepared is None and "case_file" in dataset.attrs:
+        case = next(iter(json.loads(dataset.attrs.get("inputs", "{}"))), f"{dataset.attrs['case']}.toml")
+        given = f"--case {case} --scenario {dataset.attrs['scenario']}"
+        remark = f"without its own case the run is judged by its signals alone; the units' models decide: give {given}"
+        measured = replace(measured, remarks=(remark, *measured.remarks))
     if models and prepared and (recorded := dataset.attrs.get("scenario", prepared.name)) != prepared.name:
         remark = f"it is a record of the scenario {recorded!r}, and judged with the models of {prepared.name!r}"
         measured = replace(measured, remarks=(*measured.remarks, remark))

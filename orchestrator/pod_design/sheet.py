@@ -166,6 +166,8 @@ def verdict(d: PodDesign) -> str:
         )
     if d.broken:
         text += f"; but {d.broken}"
+    elif d.met and (other := d.worst_other) and other.damping_ratio < d.required_damping:
+        text += f"; least damped of all then {percent(other.damping_ratio)} at {other.frequency_hz:.3f} Hz"
     if d.damping_met:
         if d.thin_margin is not None:
             text += (

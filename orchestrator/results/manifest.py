@@ -104,6 +104,17 @@ def read_manifest(folder: Path) -> Manifest | None:
         raise InputError(f"{path}: it cannot be read as the list of a run's files: {error}; {_AGAIN}") from error
 
 
+def inputs_behind(result: Path) -> dict[str, str]:
+    """Hashes of what a run's folder, or a file in it, was made from; empty where no manifest says so of it."""
+    try:
+        place = result if result.is_dir() else result.parent
+        content = json.loads((place / MANIFEST).read_text(encoding="utf-8"))
+        known = result.is_dir() or content["files"][result.name]["run"] == content["run"]
+        return {str(name): str(of) for name, of in content["inputs"].items()} if known else {}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}  # somebody else's
+
+
 def checked(folder: Path, names: Collection[str]) -> Manifest | None:
     """The manifest of a folder in which these files are as they were written; warns where there is none."""
     manifest = read_manifest(folder)

@@ -156,7 +156,7 @@ def summary_of(result: RunResult) -> dict[str, Any]:
     seen, stats = result.ring_down, result.statistics
     return {
         "name": modes.prepared.name, "title": modes.prepared.title, "subject": modes.prepared.subject,
-        "models": modes.prepared.models,
+        "models": modes.prepared.models, "basis": modes.prepared.basis,
         "residual": None if math.isnan(modes.operating_point.residual) else modes.operating_point.residual,
         "states": modes.model.number_of_states, "stable": modes.stability.stable,
         "largest_growth_rate": modes.stability.largest_growth_rate, "stability": modes.stability.as_json(),

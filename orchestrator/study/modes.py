@@ -374,6 +374,7 @@ def _scenario_json(r: ModesResult) -> dict[str, Any]:
     named = {table.name: r.named.get(table.name) for table in r.prepared.case.table.analysis.modes}
     return {
         "name": r.prepared.name, "subject": r.prepared.subject, "models": r.prepared.models,
+        "basis": r.prepared.basis,
         "residual": r.operating_point.residual, "states": r.model.number_of_states,
         "stable": r.stability.stable, "largest_growth_rate": r.stability.largest_growth_rate,
         "stability": r.stability.as_json(), "outside_range": None if r.hidden is None else r.hidden.as_json(),

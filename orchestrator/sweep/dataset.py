@@ -146,6 +146,7 @@ def _attributes(samples: Samples) -> dict[str, Any]:
     return {k: v for k, v in origin.items() if k not in ("scenario", "events")} | own | {
         "overrides": json.dumps(result.plan.overrides),
         "models": result.plan.scenarios[0].models or "",
+        "basis": json.dumps(result.plan.scenarios[0].basis),
         "warned": json.dumps([*_asked(samples), *warned(samples)]),
         "frequency_range_hz": [low, high],
     }  # fmt: skip

@@ -107,9 +107,19 @@ def test_a_component_that_is_not_there_has_no_variable(monkeypatch):
         ("L.connected", False, "L is switched off by grid.L.connected=false"),
         ("sg1.out", True, "sg1 is switched off by sg1.connected=false"),
         ("load_2.closed", False, "load_2 is switched off by grid.load_2.scale=0"),
+        ("sg*.in_service", 0, "sg* is switched off by sg*.connected=false"),
+        ("sg1.status", "closed", "sg1 is switched on by sg1.connected=true"),
     ],
 )
 def test_an_outage_in_other_words_is_one_error_with_ours(key, value, words):
     with pytest.raises(CaseError) as caught:
         load_case("two_area").prepare(["base"], {key: value})
     assert [str(p) for p in caught.value.problems] == [f"--set {key}: {words}; write that"]
+
+
+@pytest.mark.parametrize("value", ["tripped", 2, ""])
+def test_a_word_that_is_no_state_is_refused(value):
+    with pytest.raises(CaseError) as caught:
+        load_case("two_area").prepare(["base"], {"sg1.status": value})
+    rule = "it must be true or false; sg1 is switched by sg1.connected"
+    assert [str(p) for p in caught.value.problems] == [f"--set sg1.status: status = {value!r}; {rule}"]

@@ -192,6 +192,7 @@ def test_questions_stand_at_the_lines_that_they_are_about(files):
 def test_without_a_converter(files):
     case, new = made(files, None)
     assert [prepared.name for prepared in new.scenarios] == ["base", "fault"]
+    assert "machines: emf w·e''; [conventions] like = \"psse\" takes PSS/E's" in "".join(new.assumed)
     (fault,) = case.prepare(["fault"])
     assert [event.time for event in fault.events] == [1.0, 1.1]
 
@@ -214,6 +215,7 @@ def test_a_converter_can_replace_a_machine(files):
 def test_without_dynamics_data_the_machines_are_typical_and_said(files):
     _, new = made(files[:1])
     assert "machines: no dynamics data" in "".join(new.assumed)
+    assert "conventions" not in "".join(new.assumed)
 
 
 @pytest.mark.parametrize(

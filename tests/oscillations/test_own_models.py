@@ -140,6 +140,10 @@ def test_a_run_is_compared_with_the_models_of_its_own_case(run, gfor, tmp_path):
     other = gfor_api.source(run.dataset, scenario=gfor_api.load("two_area_rms").scenario("pod_p"))
     assert "a record of the scenario 'gfor', and judged with the models of 'pod_p'" in other.remarks[-1]
     assert not any("judged with" in remark for remark in run.source().remarks)
+    assert not any("--case" in remark for remark in run.source().remarks)
+    foreign = run.dataset.assign_attrs(case_file="name = 'mine'", inputs='{"mine.toml": "1a"}')
+    first = gfor_api.source(foreign).remarks[0]
+    assert first.endswith("the units' models decide: give --case mine.toml --scenario gfor")
 
 
 def test_a_table_of_phasors_is_compared_with_a_case(run, gfor, tmp_path):

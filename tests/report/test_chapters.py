@@ -3,13 +3,16 @@
 import json
 import re
 import shutil
+import warnings
+from dataclasses import replace
 
+import numpy as np
 import pytest
 import xarray as xr
 
 from orchestrator.errors import InputError
-from orchestrator.report.html.chapters import chapters_of, of_sweep
-from orchestrator.report.html.page import write_report
+from orchestrator.report.html.chapters import chapters_of, of_run, of_sweep
+from orchestrator.report.html.page import first_page, write_report
 from orchestrator.results import origin
 from orchestrator.results.manifest import ResultsWarning, read_manifest, write_manifest
 from orchestrator.sweep.limit import Ending, ParameterLimit, Until
@@ -249,6 +252,79 @@ def test_results_of_two_versions_of_a_file_are_not_one_study(tmp_path):
     kept = json.loads(text[text.index('id="answers">') + 13 :].partition("</script>")[0])
     assert kept[0]["answer"].startswith("NO: own.raw differs")
     assert kept[1]["given"] == "gfor scr own.toml --set models=emt --parameters p.toml"
+
+
+def basis(machine="genrou", loads="constant power", network="own.raw"):
+    return {
+        "models": "emt",
+        "basis": {"network": network, "loads": loads, "machines": {"sg1": machine, "sg2": machine}},
+    }
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (basis(), ""),
+        ({}, ""),
+        (
+            basis("genrou, emf e''"),
+            "model of sg1 of own.raw and 1 more: genrou in .*one.* and genrou, emf e'' in .*two",
+        ),
+        (basis(loads="constant impedance"), "load model of own.raw: constant power in .*, and constant impedance in "),
+        (basis("gencls", network="new.raw"), "network: own.raw in .*one.* and new.raw in .*two.*; figures are not"),
+    ],
+)
+def test_rows_of_other_networks_or_models_are_told_above_them(tmp_path, other, said):
+    places = [made(tmp_path / "one", "design", SHEET | basis()), made(tmp_path / "two", "screening", SCREENING | other)]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        text = written(places, tmp_path, short=True)
+    found = [str(one.message) for one in caught]
+    assert len(found) == bool(said)
+    assert re.search(said, "".join(found))
+    assert ("one study" in text) == bool(said)
+    assert "emt models, loads constant power; " in text
+
+
+def test_a_fault_has_a_question_of_its_own(tmp_path):
+    calm = {"name": "base", "title": "Base", "stable": True, "warnings": ["not solved"]} | basis()
+    hit = calm | {
+        "name": "hit",
+        "title": "Hit",
+        "stable": False,
+        "events": ["t = 1 s: grid.b.fault.R = 0, grid.b.fault.on = 1"],
+    }
+    asked = {
+        s["name"]: of_run(tmp_path, [s]).question for s in (calm, hit, calm | {"events": ["t = 1 s: sg1.P_ref = 1"]})
+    }
+    assert asked == {"base": "Is the network stable, and which swing is damped least?",
+                     "hit": "Is the fault survived, and which swing is damped least?"}  # fmt: skip
+
+
+def test_what_several_rows_do_not_judge_is_told_once(tmp_path):
+    long = "the file is not solved"
+    rows = [replace(chapter, source=tmp_path, not_judged=texts) for chapter, texts in zip(
+        [of_run(tmp_path, [])] * 3, ([long, "own"], ["another"], [long]), strict=True)]  # fmt: skip
+    text = first_page(rows)
+    assert (text.count(long), text.count("note 1"), text.count("Note 1: "), text.count("note 2")) == (1, 2, 1, 0)
+    assert text.count(">own<") == text.count(">another<") == 1
+
+
+def test_what_is_found_in_a_runs_record_is_of_the_runs_inputs(gfor, tmp_path):
+    t = np.arange(0, 10, 0.02)
+    folders = {run: made(tmp_path / run, "scr", SCR, **{"own.raw": of}) for run, of in (("old", "1a"), ("new", "2b"))}
+    for run, folder in folders.items():
+        rows = "".join(f"{x},{np.exp(-0.2 * x) * np.sin(5 * x)}\n" for x in t)
+        (folder / "trajectory.csv").write_text(f"time,sg.w\n{rows}", encoding="utf-8")
+        origin.said.append(lambda of={"old": "1a", "new": "2b"}[run]: {"inputs": {"own.raw": of}})
+        write_manifest(folder, "r", ["scr.json", "trajectory.csv"])
+        origin.said.pop()
+        assert gfor("signal", "identify", folder / "trajectory.csv", "sg.w", "--out", tmp_path / f"of_{run}")[0] == 0
+    assert "one study" not in written([folders["old"], tmp_path / "of_old"], tmp_path)
+    with pytest.warns(ResultsWarning, match=r"own\.raw differs between .*old.* and .*of_new"):
+        written([folders["old"], tmp_path / "of_new"], tmp_path)
+    both = made(tmp_path / "both", "scr", SCR, **{"old/own.raw": "1a", "new/own.raw": "2b"})
+    assert "one study" not in written([folders["old"], both], tmp_path)
 
 
 def test_every_row_says_what_was_given_and_of_which_models(tmp_path):

@@ -184,6 +184,10 @@ def questions(path, prepared, elements):
         ("sg1.in_service", "0", "more"),
         ("load,generation", "0.9,1", ""),
         ("load,sg1.P_mw", "0.9,800", ""),
+        ("load,sg1.P_mw", "0.9,1350", "less"),
+        ("load,sg1.S_n", "0.9,1490", "less"),
+        ("load,generation", "0.9,0.9", ""),
+        ("load,generation", "0.9,1.1", "less"),
         ("load", "0.99", ""),
         ("sg1.P_mw", "600", ""),
     ],
@@ -196,7 +200,7 @@ def test_a_load_that_only_the_slack_follows_is_asked_about(two_area, tmp_path, c
     assert len(found) == bool(left)
     if left:
         assert f"at other the slack ({', '.join(elements.balancing)}) feeds " in found[0]
-        assert f" MW {left}, as no column gives other units a power" in found[0]
+        assert f" MW {left}, as the other units' powers do not follow" in found[0]
 
 
 def test_powers_that_look_like_pu_are_asked_about(two_area, tmp_path):

@@ -40,6 +40,7 @@ class Chapter:
     content: str = ""
     page: str = ""
     title: str = ""
+    bases: Sequence[Mapping[str, Any]] = ()  # what figures rest on: `PreparedScenario.basis`
 
 
 Content = Mapping[str, Any]
@@ -97,13 +98,13 @@ def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", beside
     open_ += dict.fromkeys(text for s in scenarios for text in s.get("warnings", []))
     verdicts = [stable for stable, _ in said]
     good = False if False in verdicts else None if None in verdicts else True
-    kinds = ", ".join(dict.fromkeys(s["models"] for s in scenarios if s.get("models")))
     basis = "modes of the FMUs that were simulated" if any("step_size_s" in s for s in scenarios) else (
         "linear model of the FMUs at the operating point; nothing was run")  # fmt: skip
+    asked = "Is the fault survived" if any(map(has_fault, scenarios)) else "Is the network stable"
     return Chapter(
-        folder, "Is the network stable, and which swing is damped least?",
+        folder, f"{asked}, and which swing is damped least?",
         "; ".join([*(text for _, text in said), *beside]), good,
-        "; ".join([*([f"{kinds} models"] if kinds else []), basis, *sure]), open_, content,
+        "; ".join([*_kinds(scenarios), basis, *sure]), open_, content, bases=_bases(scenarios),
     )  # fmt: skip
 
 
@@ -137,9 +138,24 @@ def _with_models(chapter: Chapter, content: Any) -> Chapter:
     records = [one for one in (content if isinstance(content, list) else [content]) if isinstance(one, dict)]
     told = (one.get(key) for one in records for key in ("warnings", "questions"))
     more = chain(*(texts for texts in told if isinstance(texts, list)))
-    kinds = dict.fromkeys(f"{one['models']} models" for one in records if one.get("models"))
-    sure = "; ".join(filter(None, (*kinds, chapter.sure)))
-    return replace(chapter, sure=sure, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])))
+    sure = "; ".join(filter(None, (*_kinds(records), chapter.sure)))
+    bases = [*chapter.bases, *_bases(records)]
+    return replace(chapter, sure=sure, not_judged=list(dict.fromkeys([*chapter.not_judged, *more])), bases=bases)
+
+
+def _bases(records: Sequence[Content]) -> list[Content]:
+    return [one["basis"] for one in records if one.get("basis")]
+
+
+def _kinds(records: Sequence[Content]) -> list[str]:
+    """Models of each kind, with what they take loads for."""
+    loads = (one.get("basis", {}).get("loads") for one in records)
+    return list(dict.fromkeys(f"{one['models']} models" + (f", loads {law}" if law else "")
+                              for one, law in zip(records, loads, strict=True) if one.get("models")))  # fmt: skip
+
+
+def has_fault(scenario: Content) -> bool:
+    return any(".fault.on = 1" in text for text in scenario.get("events", ()))
 
 
 def _screening(file: Path, c: Content) -> Chapter:
@@ -383,19 +399,20 @@ def of_sweep(place: Path, sweep: xr.Dataset) -> Chapter:
     unknown = 0 if stable is None else int((~stable.isin([0, 1])).sum())
     open_ = [f"stability at {counted(unknown, 'point')}"] if unknown else []
     open_ += json.loads(sweep.attrs.get("warned", "[]"))
-    models = f"{kind} models; " if (kind := sweep.attrs.get("models")) else ""
+    about = {"models": sweep.attrs.get("models"), "basis": json.loads(sweep.attrs.get("basis", "{}"))}
+    models, bases = "".join(f"{kind}; " for kind in _kinds([about])), _bases([about])
     if limits := limits_of(place):
         said = "; ".join(f"{one['scenario']}: {one['sentence']}" for one in limits)
         holds = all(one["ends_with"] == "holds" for one in limits)
         return Chapter(
             place, f"How far may {limits[0]['parameter']} go?", said, holds or None,
             f"{models}coarse values, then bisection; each is of the coupled FMUs at an operating point of its own",
-            [*open_, "narrow pieces between the values that were tried"],
+            [*open_, "narrow pieces between the values that were tried"], bases=bases,
         )  # fmt: skip
     answer = f"least damping {float(least.min()):.2f} % at {where}" + (
         f"; UNSTABLE at {counted(lost, 'point')}" if lost else ""
     )
     return Chapter(
         place, f"How do the modes move along {studies.axis_of(sweep)}?", answer, False if lost else None,
-        f"{models}each point is a linear model of the coupled FMUs there", open_,
+        f"{models}each point is a linear model of the coupled FMUs there", open_, bases=bases,
     )  # fmt: skip

@@ -4,7 +4,8 @@ import json
 import re
 import shlex
 import warnings
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
 from itertools import pairwise
@@ -13,7 +14,7 @@ from typing import Any
 
 from orchestrator.errors import InputError, few
 from orchestrator.report.html import sections, studies
-from orchestrator.report.html.chapters import Chapter, chapters_of, of_run, of_sweep
+from orchestrator.report.html.chapters import Chapter, chapters_of, has_fault, of_run, of_sweep
 from orchestrator.report.html.chapters import sections as sections_of
 from orchestrator.report.html.elements import Figures, document, held_data, paragraphs, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
@@ -47,7 +48,7 @@ def write_report(
 def page(places: Sequence[Path], against: Path | None = None, title: str | None = None, *, short: bool = False) -> str:
     told, runs = _told(places, Figures())
     chapters = [chapter for chapter, _ in told]
-    if differ := _of_several_studies(list(dict.fromkeys(chapter.source for chapter in chapters))):
+    if differ := _of_several_studies(chapters):
         warnings.warn(differ, ResultsWarning, stacklevel=2)
     headings = [heading for _, content in told for heading, _ in content]
     content = [
@@ -83,8 +84,9 @@ def _told(places: Sequence[Path], figures: Figures) -> tuple[list[tuple[Chapter,
         for part in within:
             count = len(told)
             if (run := runs.get(part)) is not None:
-                chapter = of_run(part, run.scenarios, beside=run.beside)
-                told.append((chapter, _of_run(run, figures)))
+                split = ([s for s in run.scenarios if has_fault(s) is faulted] for faulted in (False, True))
+                chapters = [of_run(part, some, beside=run.beside) for some in split if some]
+                told += zip(chapters, [_of_run(run, figures), *[[]] * len(chapters)], strict=False)
             for sweep in sweeps_of(part):
                 shown = studies.sweep(sweep, scenarios, figures)
                 told.append((of_sweep(part, sweep), [(f"Trajectories along {studies.axis_of(sweep)}", shown)]))
@@ -111,16 +113,36 @@ def _parts(place: Path, depth: int = 2) -> Iterator[Path]:
                 yield from _parts(inner, depth - 1)
 
 
-def _of_several_studies(sources: Sequence[Path]) -> str:
-    """Which results were made from a file of one name with different content; "" where none were."""
+def _of_several_studies(chapters: Sequence[Chapter]) -> str:
+    """Files of one name with different content that results were made from, and networks, load models and machines'
+    models that differ; "" where none do."""
+    files, models = dict[str, list[tuple[str, str]]](), dict[str, list[tuple[str, str]]]()
+    for one in chapters:
+        inputs = _origin(one.source).get("inputs", {})
+        shown = {name: name if Path(name).suffix in _RECORDS else Path(name).name for name in inputs}
+        files[str(one.source)] = [(shown[name], str(content)) for name, content in inputs.items()]
+        found = models.setdefault(str(one.source), [])
+        for basis in one.bases:
+            of = f" of {basis['network']}"
+            found += [("network", basis["network"]), *[(f"load model{of}", basis["loads"])] * bool(basis["loads"])]
+            found += [(f"model of {unit}{of}", kind) for unit, kind in basis["machines"].items()]
+    said = [f"{name} differs between {' and '.join(few(at, 2) for at in by.values())}" for name, by in _unlike(files)]
+    alike: dict[str, list[str]] = {}  # most machines differ in one way
+    for what, by in _unlike(models):
+        alike.setdefault(", and ".join(f"{kind} in {few(at, 2)}" for kind, at in by.items()), []).append(what)
+    said += [f"{few(names, 1)}: {text}" for text, names in alike.items()]
+    return f"{'; '.join(said)}; figures are not comparable as one study" if said else ""
+
+
+def _unlike(told: Mapping[str, Sequence[tuple[str, str]]]) -> Iterator[tuple[str, dict[str, list[str]]]]:
+    """Of what sources tell of one thing each, what differs: the thing, and the sources of every value."""
     seen: dict[str, dict[str, list[str]]] = {}
-    for source in sources:
-        for name, content in _origin(source).get("inputs", {}).items():
-            shown = name if Path(name).suffix in _RECORDS else Path(name).name
-            seen.setdefault(shown, {}).setdefault(str(content), []).append(str(source))
-    differ = {name: [few(places, 2) for places in by.values()] for name, by in seen.items() if len(by) > 1}
-    said = "; ".join(f"{name} differs between {' and '.join(places)}" for name, places in differ.items())
-    return said and f"{said}; figures are not comparable as one study"
+    for source, pairs in told.items():
+        for what in dict(pairs):
+            values = {value for name, value in pairs if name == what}
+            if len(values) == 1:  # else it compares them
+                seen.setdefault(what, {}).setdefault(values.pop(), []).append(source)
+    return ((what, by) for what, by in seen.items() if len(by) > 1)
 
 
 def _name(place: Path) -> str:
@@ -146,16 +168,22 @@ _OPEN, _LONGEST = 4, 240  # what was not judged on the first page, and the chara
 
 
 def first_page(chapters: Sequence[Chapter]) -> str:
-    rows = []
+    rows, open_ = [], Counter(text for one in chapters for text in dict.fromkeys(one.not_judged))
+    notes = {text: f"note {k}" for k, text in enumerate((t for t, n in open_.items() if n > 1), start=1)}
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
-        lost = [escape(short(text, _LONGEST)) for text in one.not_judged[:_OPEN]] or ["nothing that is known of"]
+        lost = [escape(notes.get(text) or short(text, _LONGEST)) for text in one.not_judged[:_OPEN]] or [
+            "nothing that is known of"
+        ]
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
         given = "".join(f"<br>{escape(text)}" for text in (str(one.source), _given(one.source)) if text)
         asked = f'{escape(one.question)}<span class="soft">{given}</span>'
         rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), "<br>".join(lost) + more])
-    return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4)
+    said = "".join(
+        f"<p>{name[0].upper()}{name[1:]}: {escape(short(text, _LONGEST))}</p>" for text, name in notes.items()
+    )
+    return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4) + said
 
 
 def origins(chapters: Sequence[Chapter]) -> str:

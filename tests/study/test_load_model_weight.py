@@ -1,0 +1,24 @@
+"""The open load model is weighed in one line, whatever the number of scenarios."""
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from orchestrator.study import load_model_weight
+
+
+@pytest.mark.parametrize(
+    ("weights", "said"),
+    [
+        ([(0.1, "little"), (1.6, "much"), (0.0, "")], ["scenario 'b', where it is most of 2: much"]),
+        ([(1.6, "the same"), (1.6, "the same"), (0.0, "")], ["the same"]),
+        ([(9.0, "much"), (0.1, "little"), (math.inf, "no modes")], ["scenario 'c', where it is most of 3: no modes"]),
+        ([(0.0, "")] * 3, []),
+    ],
+)
+def test_the_scenario_of_most_weight_is_told(monkeypatch, weights, said):
+    found = dict(zip("abc", weights, strict=True))
+    monkeypatch.setattr(load_model_weight, "_weight", lambda scenario, result, frequencies: found[scenario])
+    results = [SimpleNamespace(prepared=SimpleNamespace(name=name)) for name in "abc"]
+    assert load_model_weight.load_model_weights("abc", results, (0.1, 2.0)) == said
