@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from orchestrator.arrays import Numbers
+from orchestrator.watch.known_modes import NOTHING_KNOWN, KnownModes
 from orchestrator.watch.oscillation import Oscillation, strongest_oscillation, without_trend
 
 KEPT = 0.7  # A swing is decaying if its last third is smaller than this part of its middle third
@@ -38,6 +39,12 @@ those that seemed to grow in every part of the response had 4 at most."""
 
 SAME = 0.05  # largest relative difference of frequency between the judged part and the whole response
 AGREE = 2.0  # largest factor between the growth rates of the judged part and of the whole response
+_FAR = 2.0  # from the first to the last third, the factor by which an oscillation of modes that decay may grow
+_GROWN, _EVEN = 0.7, 1.6
+"""A fast oscillation of which no model knows grows by the first figure at least, as the logarithm of its size in the
+first and the last fifth, and from each fifth to the next by the same, up to the second figure as a factor: a beat of
+two oscillations that decay bends more."""
+
 FAR_ABOVE, RISING = 10.0, 1.3
 """A swing of any shape grows if it rises by the first factor from the first to the last quarter, and by the second one
 at least from each quarter to the next."""
@@ -63,12 +70,11 @@ def rises(signal: Numbers, *, extents: bool = False) -> bool:
     return sizes[3] > FAR_ABOVE * sizes[0] and all(late > RISING * early for early, late in pairwise(sizes))
 
 
-def doubt(swing: Swing, oscillation: Oscillation) -> str:
+def doubt(swing: Swing, oscillation: Oscillation, known: KnownModes = NOTHING_KNOWN) -> str:
     """Why an oscillation that seems to grow, or to last, may decay; empty where the whole response confirms it."""
     grows = change(swing, oscillation.rate) > STEADY
     if swing.turns_hz is not None:
-        first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
-        return "" if last > (1.0 if grows else KEPT) * first else "it was larger before"
+        return _fast_doubt(swing, oscillation, known)
     times, signal = (part[1:] for part in swing.response)  # the first look is that before the event
     if grows and rises(signal):
         return ""
@@ -90,6 +96,36 @@ def doubt(swing: Swing, oscillation: Oscillation) -> str:
     return ""
 
 
+def is_explained(swing: Swing, oscillation: Oscillation, known: KnownModes) -> bool:
+    """Whether modes that the model knows to decay make a fast oscillation that does not grow far meanwhile."""
+    lasts = float(swing.times[-1] - swing.response[0][0])
+    decays = known.rate(oscillation.frequency_hz) is not None and lasts < known.decays_until(oscillation.frequency_hz)
+    first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
+    return decays and last < _FAR * first
+
+
+def _fast_doubt(swing: Swing, oscillation: Oscillation, known: KnownModes) -> str:
+    grows = change(swing, oscillation.rate) > STEADY
+    first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
+    if last <= (1.0 if grows else KEPT) * first:
+        return "it was larger before"
+    rate = known.rate(oscillation.frequency_hz)
+    if (rate is not None and rate >= 0) or (grows and rises(swing.signal, extents=True)):
+        return ""
+    lasts = float(swing.times[-1] - swing.response[0][0])
+    if lasts < known.decays_until(oscillation.frequency_hz):
+        if rate is not None:
+            return f"the linear model's modes there decay, the slowest at {rate:+.3g} 1/s, and may beat"
+        return "no linear model holds here, and an offset in stators and lines, which decays slowly, swings like that"
+    if not grows:
+        return ""
+    sizes = [float(np.median(part)) for part in np.array_split(swing.response[1][1:], 5)]
+    rates = np.diff(np.log(sizes)) if min(sizes) > 0 else np.zeros(1)
+    if rates.sum() > _GROWN and rates.min() > 0 and rates.max() < _EVEN * rates.min():
+        return ""
+    return "no linear model holds here, and a beat of oscillations that decay may grow by as much for a while"
+
+
 def irregular_doubt(swing: Swing) -> str:
     """Why a swing of any shape, which seems to last, may decay; empty where its sizes do not fall."""
     sizes = np.array([rms(piece) for piece in np.array_split(swing.signal, _PIECES)])
@@ -105,11 +141,14 @@ def irregular_doubt(swing: Swing) -> str:
     return "it was larger before" if second < KEPT * first else ""
 
 
-def needed_end(swing: Swing, oscillation: Oscillation | None = None) -> float:
+def needed_end(swing: Swing, oscillation: Oscillation | None, known: KnownModes) -> float:
     """Time until which a run should go on for a clear answer [s]."""
     begin, end = float(swing.response[0][0]), float(swing.times[-1])
     longer = begin + 1.5 * (end - begin)
-    return max(longer, begin + 1.2 * PERIODS / oscillation.frequency_hz) if oscillation is not None else longer
+    if oscillation is None:
+        return longer
+    enough = 1.2 * PERIODS / oscillation.frequency_hz
+    return max(longer, begin + enough, begin + known.decays_until(oscillation.frequency_hz))
 
 
 def _same(one: Oscillation, other: Oscillation) -> bool:

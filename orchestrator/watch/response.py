@@ -10,8 +10,9 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch import oscillation as oscillations
 from orchestrator.watch import swing_findings
-from orchestrator.watch.confirmation import KEPT, STEADY, Swing, change, doubt, irregular_doubt, rms
+from orchestrator.watch.confirmation import KEPT, STEADY, Swing, change, doubt, irregular_doubt, is_explained, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
+from orchestrator.watch.known_modes import NOTHING_KNOWN, KnownModes
 from orchestrator.watch.limit import is_inner
 from orchestrator.watch.seen import Seen, is_derivative, unit
 from orchestrator.watch.stretches import Stretch
@@ -51,8 +52,9 @@ part."""
 
 
 def unsettled_response(
-    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], *, noisy: bool = False
-) -> list[Finding]:
+    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], known: KnownModes = NOTHING_KNOWN, *,
+    noisy: bool = False,
+) -> list[Finding]:  # fmt: skip
     """At most one growing and one sustained oscillation in a stretch, each in the signal where it is strongest.
 
     If an oscillation is faster than the looks, only such oscillations are reported, because the looks would show it as
@@ -73,13 +75,14 @@ def unsettled_response(
     others = [s for s in swings if s.turns_hz is None and not (quick and oscillations.too_fast(s.times, s.signal))]
     if noisy:
         grown = [s for s in swings if swing_findings.swing_rises(s)]
-        told = _told(grown[:_TRIED], system, stretch, irregular_as_well=not stretch.breaks)
+        told = _told(grown[:_TRIED], system, stretch, known, irregular_as_well=not stretch.breaks)
         smooth = sorted((s for s in swings if s.turns_hz is None), key=_roughness)[:_SMOOTHEST]
-        return told or _told(smooth, system, stretch, irregular_as_well=False, clean=True)
-    told = _told(quick[:_TRIED], system, stretch, irregular_as_well=False)
+        return told or _told(smooth, system, stretch, known, irregular_as_well=False, clean=True)
+    told = _told(quick[:_TRIED], system, stretch, known, irregular_as_well=False)
     if judgements(told):
         return told
-    return _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks) or told
+    irregular = not quick and not stretch.breaks
+    return _told(others[:_TRIED], system, stretch, known, irregular_as_well=irregular) or told
 
 
 def judgements(found: Sequence[Finding]) -> list[Finding]:
@@ -97,8 +100,9 @@ def _judged_from(stretch: Stretch) -> float:
 
 
 def _told(
-    swings: Sequence[Swing], system: System, stretch: Stretch, *, irregular_as_well: bool, clean: bool = False
-) -> list[Finding]:
+    swings: Sequence[Swing], system: System, stretch: Stretch, known: KnownModes, *, irregular_as_well: bool,
+    clean: bool = False,
+) -> list[Finding]:  # fmt: skip
     """The first finding of each kind; a swing without a frequency only where there is none with one, and a remark on a
     swing in doubt only where there is no finding."""
     told: dict[Kind, Finding] = {}
@@ -111,11 +115,13 @@ def _told(
             finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
             if finding is None or finding.kind in told or not _goes_on(swing, oscillation, stretch.breaks):
                 continue
-            why = "" if clean else doubt(swing, oscillation)
+            if swing.turns_hz is not None and is_explained(swing, oscillation, known):
+                continue
+            why = "" if clean else doubt(swing, oscillation, known)
             if not why:
                 told[finding.kind] = finding
             elif not doubtful:
-                doubtful.append(swing_findings.doubtful_swing(swing, oscillation, why, stretch))
+                doubtful.append(swing_findings.doubtful_swing(swing, oscillation, why, stretch, known))
         elif irregular_as_well and _is_irregular(swing):
             why = "" if swing_findings.swing_rises(swing) else irregular_doubt(swing)
             if not why:

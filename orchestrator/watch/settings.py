@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.coupling.events import Event, Fault
+from orchestrator.coupling.events import BusFault, Event, Fault, WireFault, WireRecovery
 from orchestrator.coupling.imperfections import Noise, Quantisation
 from orchestrator.coupling.system import System
 
@@ -15,12 +15,13 @@ class Settings:
 
     def __init__(self, system: System, events: Sequence[Event], times: Numbers) -> None:
         self._system, self._times = system, times
+        self._events = sorted(events, key=lambda e: e.time)
         self._faults = {event.time for event in events if isinstance(event, Fault)}
         if any(isinstance(i, Noise | Quantisation) for plan in system.wires.values() for i in plan.permanent.values()):
             self._faults.add(0.0)  # nothing stands still from the beginning
         self._changes = [
             (event.time, f"{name}.{variable}", float(value))
-            for event in sorted(events, key=lambda e: e.time)
+            for event in self._events
             for name, settings in event.changes().items()
             for variable, value in settings.items()
         ]
@@ -47,6 +48,36 @@ class Settings:
                 found.add(time)
             now[name] = value
         return sorted(found)
+
+    def as_at_start(self, time: float) -> bool:
+        """Whether all that was set until a time [s] has its start value again, as after a fault that opens nothing."""
+        if any(fault <= time for fault in self._faults):
+            return False
+        now = {name: value for when, name, value in self._changes if when <= time}
+        for name, value in now.items():
+            component, _, variable = name.partition(".")
+            plan, fault = self._system.components[component], f"{name.rpartition('.')[0]}.on"
+            of_an_ended_fault = name != fault and now.get(fault) == 0  # its R and X act no more
+            if not of_an_ended_fault and (plan.value(variable) is None or plan.number(variable) != value):
+                return False
+        return True
+
+    def during_fault(self, begin: float, end: float) -> bool:
+        """Whether two times [s] are inside of one fault, its begin and its end included."""
+        begun: dict[tuple[str, str], float] = {}
+        for event in self._events:
+            match event:
+                case BusFault(component=component, bus=where, on=on):
+                    key = (component, where)
+                case WireFault(connection=connection) | WireRecovery(connection=connection):
+                    key, on = (str(connection), ""), isinstance(event, WireFault)
+                case _:
+                    continue
+            if on:
+                begun.setdefault(key, event.time)
+            elif begun.pop(key, end) <= begin and end <= event.time:
+                return True
+        return False
 
     def connected(self, component: str) -> Numbers:
         """Whether a component is on the grid, from its own breaker and the grid's port for it: 1 or 0, shape (n,)."""
