@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.arrays import Numbers
 from orchestrator.watch.known_modes import NOTHING_KNOWN, KnownModes
-from orchestrator.watch.oscillation import Oscillation, strongest_oscillation, without_trend
+from orchestrator.watch.oscillation import Oscillation, crossings_hz, strongest_oscillation, too_fast, without_trend
 
 KEPT = 0.7  # A swing is decaying if its last third is smaller than this part of its middle third
 
@@ -28,6 +28,7 @@ class Swing:
     # half of the rate at which the signal turns [Hz], counted at every communication step; only for signals that were
     # followed between the looks
     turns_hz: float | None = None
+    known: KnownModes = NOTHING_KNOWN
 
 
 STEADY = 0.05  # the logarithm of a sustained oscillation's amplitude changes less over the judged part
@@ -41,9 +42,8 @@ SAME = 0.05  # largest relative difference of frequency between the judged part 
 AGREE = 2.0  # largest factor between the growth rates of the judged part and of the whole response
 _FAR = 2.0  # from the first to the last third, the factor by which an oscillation of modes that decay may grow
 _GROWN, _EVEN = 0.7, 1.6
-"""A fast oscillation of which no model knows grows by the first figure at least, as the logarithm of its size in the
-first and the last fifth, and from each fifth to the next by the same, up to the second figure as a factor: a beat of
-two oscillations that decay bends more."""
+"""A fast oscillation that grows in truth goes from the first to the last fifth by the first figure at least, as a
+logarithm, and from each fifth to the next by the same, up to the second figure as a factor: a beat bends more."""
 
 FAR_ABOVE, RISING = 10.0, 1.3
 """A swing of any shape grows if it rises by the first factor from the first to the last quarter, and by the second one
@@ -70,11 +70,11 @@ def rises(signal: Numbers, *, extents: bool = False) -> bool:
     return sizes[3] > FAR_ABOVE * sizes[0] and all(late > RISING * early for early, late in pairwise(sizes))
 
 
-def doubt(swing: Swing, oscillation: Oscillation, known: KnownModes = NOTHING_KNOWN) -> str:
+def doubt(swing: Swing, oscillation: Oscillation) -> str:
     """Why an oscillation that seems to grow, or to last, may decay; empty where the whole response confirms it."""
     grows = change(swing, oscillation.rate) > STEADY
     if swing.turns_hz is not None:
-        return _fast_doubt(swing, oscillation, known)
+        return _fast_doubt(swing, oscillation, grows=grows)
     times, signal = (part[1:] for part in swing.response)  # the first look is that before the event
     if grows and rises(signal):
         return ""
@@ -96,34 +96,43 @@ def doubt(swing: Swing, oscillation: Oscillation, known: KnownModes = NOTHING_KN
     return ""
 
 
-def is_explained(swing: Swing, oscillation: Oscillation, known: KnownModes) -> bool:
+def _growth(swing: Swing) -> float:
+    """Factor from the first third to the last one of a swing whose extents are known."""
+    first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
+    return last / first
+
+
+def _lasts(swing: Swing) -> float:
+    return float(swing.times[-1] - swing.response[0][0])
+
+
+def is_explained(swing: Swing, oscillation: Oscillation) -> bool:
     """Whether modes that the model knows to decay make a fast oscillation that does not grow far meanwhile."""
-    lasts = float(swing.times[-1] - swing.response[0][0])
-    decays = known.rate(oscillation.frequency_hz) is not None and lasts < known.decays_until(oscillation.frequency_hz)
-    first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
-    return decays and last < _FAR * first
+    rate = swing.known.rate(oscillation.frequency_hz)
+    decays = rate is not None and _lasts(swing) < swing.known.decays_until(oscillation.frequency_hz)
+    return decays and _growth(swing) < _FAR
 
 
-def _fast_doubt(swing: Swing, oscillation: Oscillation, known: KnownModes) -> str:
-    grows = change(swing, oscillation.rate) > STEADY
-    first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
-    if last <= (1.0 if grows else KEPT) * first:
+def is_known_to_decay(swing: Swing) -> bool:
+    """Whether the model's modes at the frequency of a swing that is too fast for the looks decay."""
+    rate = swing.known.rate(crossings_hz(swing.times, swing.signal)) if too_fast(swing.times, swing.signal) else None
+    return rate is not None and rate < 0
+
+
+def _fast_doubt(swing: Swing, oscillation: Oscillation, *, grows: bool) -> str:
+    if _growth(swing) <= (1.0 if grows else KEPT):
         return "it was larger before"
-    rate = known.rate(oscillation.frequency_hz)
-    if (rate is not None and rate >= 0) or (grows and rises(swing.signal, extents=True)):
+    rate = swing.known.rate(oscillation.frequency_hz)
+    sizes = np.array([np.median(part) for part in np.array_split(swing.response[1][1:], 5)])
+    rates = np.diff(np.log(sizes)) if (sizes > 0).all() else np.zeros(1)
+    even = rates.sum() > _GROWN and 0 < rates.max() < _EVEN * rates.min()
+    if (rate is not None and rate >= 0) or (grows and (even or rises(swing.signal, extents=True))):
         return ""
-    lasts = float(swing.times[-1] - swing.response[0][0])
-    if lasts < known.decays_until(oscillation.frequency_hz):
-        if rate is not None:
-            return f"the linear model's modes there decay, the slowest at {rate:+.3g} 1/s, and may beat"
-        return "no linear model holds here, and an offset in stators and lines, which decays slowly, swings like that"
-    if not grows:
+    if not grows and _lasts(swing) >= swing.known.decays_until(oscillation.frequency_hz):
         return ""
-    sizes = [float(np.median(part)) for part in np.array_split(swing.response[1][1:], 5)]
-    rates = np.diff(np.log(sizes)) if min(sizes) > 0 else np.zeros(1)
-    if rates.sum() > _GROWN and rates.min() > 0 and rates.max() < _EVEN * rates.min():
-        return ""
-    return "no linear model holds here, and a beat of oscillations that decay may grow by as much for a while"
+    if rate is not None:
+        return f"the linear model's modes there decay, the slowest at {rate:+.3g} 1/s, and may beat"
+    return "no linear model tells of modes there, and offsets that decay and beat swing like that for a while"
 
 
 def irregular_doubt(swing: Swing) -> str:
@@ -141,14 +150,14 @@ def irregular_doubt(swing: Swing) -> str:
     return "it was larger before" if second < KEPT * first else ""
 
 
-def needed_end(swing: Swing, oscillation: Oscillation | None, known: KnownModes) -> float:
+def needed_end(swing: Swing, oscillation: Oscillation | None = None) -> float:
     """Time until which a run should go on for a clear answer [s]."""
     begin, end = float(swing.response[0][0]), float(swing.times[-1])
     longer = begin + 1.5 * (end - begin)
     if oscillation is None:
         return longer
-    enough = 1.2 * PERIODS / oscillation.frequency_hz
-    return max(longer, begin + enough, begin + known.decays_until(oscillation.frequency_hz))
+    hertz = oscillation.frequency_hz
+    return begin + max(longer - begin, 1.2 * PERIODS / hertz, swing.known.decays_until(hertz))
 
 
 def _same(one: Oscillation, other: Oscillation) -> bool:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orchestrator.coupling.system import System
+
 _SAME = 0.05  # relative difference of frequency within which modes make an oscillation, or beat in it
 _GONE = 3.0  # time constants after which hardly anything is left of a mode, however it beats
 _OFFSET, _OFFSET_GONE = 0.02, 20.0
@@ -38,6 +40,11 @@ class KnownModes:
             return _GONE / -rate if rate < 0 else 0.0
         offset = any(abs(hertz - k * self.rated_hz) < _OFFSET * k * self.rated_hz for k in (1, 2))
         return _OFFSET_GONE if offset else 0.0
+
+
+def rated_hz(system: System) -> float:
+    plans = system.components.values()
+    return max((plan.number("f_n") for plan in plans if "f_n" in plan.description.variables), default=0.0)
 
 
 NOTHING_KNOWN = KnownModes()

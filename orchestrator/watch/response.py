@@ -1,6 +1,7 @@
 """The response after an event: an oscillation that grows, or one that neither grows nor decays."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -10,7 +11,17 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch import oscillation as oscillations
 from orchestrator.watch import swing_findings
-from orchestrator.watch.confirmation import KEPT, STEADY, Swing, change, doubt, irregular_doubt, is_explained, rms
+from orchestrator.watch.confirmation import (
+    KEPT,
+    STEADY,
+    Swing,
+    change,
+    doubt,
+    irregular_doubt,
+    is_explained,
+    is_known_to_decay,
+    rms,
+)
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.watch.known_modes import NOTHING_KNOWN, KnownModes
 from orchestrator.watch.limit import is_inner
@@ -68,21 +79,20 @@ def unsettled_response(
     times = seen.times[first:]
     slow = (_swing(name, y[first:], times, begin) for name, y in resting_signals(seen, system).items())
     fast = (_fast_swing(name, seen, first, begin) for name in seen.turns)
-    swings = [swing for swing in chain(slow, fast) if swing is not None]
+    swings = [replace(swing, known=known) for swing in chain(slow, fast) if swing is not None]
     swings.sort(key=lambda s: (s.name.partition(".")[0] not in units, -s.size))
     # An oscillation faster than the looks appears in the signals as a slower one, therefore it is searched first.
     quick = [s for s in swings if s.turns_hz is not None]
     others = [s for s in swings if s.turns_hz is None and not (quick and oscillations.too_fast(s.times, s.signal))]
     if noisy:
         grown = [s for s in swings if swing_findings.swing_rises(s)]
-        told = _told(grown[:_TRIED], system, stretch, known, irregular_as_well=not stretch.breaks)
+        told = _told(grown[:_TRIED], system, stretch, irregular_as_well=not stretch.breaks)
         smooth = sorted((s for s in swings if s.turns_hz is None), key=_roughness)[:_SMOOTHEST]
-        return told or _told(smooth, system, stretch, known, irregular_as_well=False, clean=True)
-    told = _told(quick[:_TRIED], system, stretch, known, irregular_as_well=False)
+        return told or _told(smooth, system, stretch, irregular_as_well=False, clean=True)
+    told = _told(quick[:_TRIED], system, stretch, irregular_as_well=False)
     if judgements(told):
         return told
-    irregular = not quick and not stretch.breaks
-    return _told(others[:_TRIED], system, stretch, known, irregular_as_well=irregular) or told
+    return _told(others[:_TRIED], system, stretch, irregular_as_well=not quick and not stretch.breaks) or told
 
 
 def judgements(found: Sequence[Finding]) -> list[Finding]:
@@ -100,9 +110,8 @@ def _judged_from(stretch: Stretch) -> float:
 
 
 def _told(
-    swings: Sequence[Swing], system: System, stretch: Stretch, known: KnownModes, *, irregular_as_well: bool,
-    clean: bool = False,
-) -> list[Finding]:  # fmt: skip
+    swings: Sequence[Swing], system: System, stretch: Stretch, *, irregular_as_well: bool, clean: bool = False
+) -> list[Finding]:
     """The first finding of each kind; a swing without a frequency only where there is none with one, and a remark on a
     swing in doubt only where there is no finding."""
     told: dict[Kind, Finding] = {}
@@ -115,18 +124,18 @@ def _told(
             finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
             if finding is None or finding.kind in told or not _goes_on(swing, oscillation, stretch.breaks):
                 continue
-            if swing.turns_hz is not None and is_explained(swing, oscillation, known):
+            if swing.turns_hz is not None and is_explained(swing, oscillation):
                 continue
-            why = "" if clean else doubt(swing, oscillation, known)
+            why = "" if clean else doubt(swing, oscillation)
             if not why:
                 told[finding.kind] = finding
             elif not doubtful:
-                doubtful.append(swing_findings.doubtful_swing(swing, oscillation, why, stretch, known))
+                doubtful.append(swing_findings.doubtful_swing(swing, oscillation, why, stretch))
         elif irregular_as_well and _is_irregular(swing):
             why = "" if swing_findings.swing_rises(swing) else irregular_doubt(swing)
             if not why:
                 irregular.append(swing_findings.irregular_swing(swing, unit(swing.name, system), stretch))
-            elif not doubtful:
+            elif not doubtful and not is_known_to_decay(swing):
                 doubtful.append(swing_findings.doubtful_irregular_swing(swing, why, unit(swing.name, system), stretch))
     return [*told.values()] or irregular[:1] or doubtful
 

@@ -5,9 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.coupling.events import BusFault, Event, Fault, WireFault, WireRecovery
+from orchestrator.coupling.events import Event, Fault
 from orchestrator.coupling.imperfections import Noise, Quantisation
 from orchestrator.coupling.system import System
+
+_FAULT = ".fault.on"  # the switch of a fault at a bus, whose values act only while it is on
 
 
 class Settings:
@@ -15,13 +17,12 @@ class Settings:
 
     def __init__(self, system: System, events: Sequence[Event], times: Numbers) -> None:
         self._system, self._times = system, times
-        self._events = sorted(events, key=lambda e: e.time)
         self._faults = {event.time for event in events if isinstance(event, Fault)}
         if any(isinstance(i, Noise | Quantisation) for plan in system.wires.values() for i in plan.permanent.values()):
             self._faults.add(0.0)  # nothing stands still from the beginning
         self._changes = [
             (event.time, f"{name}.{variable}", float(value))
-            for event in self._events
+            for event in sorted(events, key=lambda e: e.time)
             for name, settings in event.changes().items()
             for variable, value in settings.items()
         ]
@@ -40,44 +41,25 @@ class Settings:
         now: dict[str, float | None] = {}
         found = set(self._faults)
         for time, name, value in self._changes:
-            if name not in now:
-                component, _, variable = name.partition(".")
-                plan = self._system.components[component]
-                now[name] = None if plan.value(variable) is None else plan.number(variable)
-            if value != now[name]:
+            if value != now.get(name, self._start(name)):
                 found.add(time)
             now[name] = value
         return sorted(found)
 
+    def _start(self, name: str) -> float | None:
+        component, _, variable = name.partition(".")
+        plan = self._system.components[component]
+        return None if plan.value(variable) is None else plan.number(variable)
+
     def as_at_start(self, time: float) -> bool:
         """Whether all that was set until a time [s] has its start value again, as after a fault that opens nothing."""
-        if any(fault <= time for fault in self._faults):
-            return False
         now = {name: value for when, name, value in self._changes if when <= time}
-        for name, value in now.items():
-            component, _, variable = name.partition(".")
-            plan, fault = self._system.components[component], f"{name.rpartition('.')[0]}.on"
-            of_an_ended_fault = name != fault and now.get(fault) == 0  # its R and X act no more
-            if not of_an_ended_fault and (plan.value(variable) is None or plan.number(variable) != value):
-                return False
-        return True
+        over = tuple(name.removesuffix("on") for name, on in now.items() if name.endswith(_FAULT) and not on)
+        back = all(name.startswith(over) or value == self._start(name) for name, value in now.items())
+        return back and all(fault > time for fault in self._faults)
 
-    def during_fault(self, begin: float, end: float) -> bool:
-        """Whether two times [s] are inside of one fault, its begin and its end included."""
-        begun: dict[tuple[str, str], float] = {}
-        for event in self._events:
-            match event:
-                case BusFault(component=component, bus=where, on=on):
-                    key = (component, where)
-                case WireFault(connection=connection) | WireRecovery(connection=connection):
-                    key, on = (str(connection), ""), isinstance(event, WireFault)
-                case _:
-                    continue
-            if on:
-                begun.setdefault(key, event.time)
-            elif begun.pop(key, end) <= begin and end <= event.time:
-                return True
-        return False
+    def ends_fault(self, time: float) -> bool:
+        return any(when == time and name.endswith(_FAULT) and not on for when, name, on in self._changes)
 
     def connected(self, component: str) -> Numbers:
         """Whether a component is on the grid, from its own breaker and the grid's port for it: 1 or 0, shape (n,)."""

@@ -4,7 +4,6 @@ import numpy as np
 
 from orchestrator.watch.confirmation import KEPT, STEADY, Swing, change, needed_end, rises, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
-from orchestrator.watch.known_modes import NOTHING_KNOWN, KnownModes
 from orchestrator.watch.oscillation import Oscillation, too_fast
 from orchestrator.watch.seen import shown
 from orchestrator.watch.stretches import Stretch
@@ -49,7 +48,7 @@ def sustained(swing: Swing, oscillation: Oscillation, unit: str, stretch: Stretc
     return _finding("sustained_oscillation", since, swing, message, oscillation, stretch)
 
 
-def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: Stretch, known: KnownModes) -> Finding:
+def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: Stretch) -> Finding:
     """A remark on an oscillation that may decay, with the reason of the doubt.
 
     ``why``: the reason; see `confirmation.doubt`."""
@@ -57,13 +56,13 @@ def doubtful_swing(swing: Swing, oscillation: Oscillation, why: str, stretch: St
     message = (
         f"whether the response to t = {stretch.begin:.4g} s settles is not judged: {shown(swing.name)} swings at "
         f"{oscillation.frequency_hz:.4g} Hz and seems to {seems} ({oscillation.rate:+.3g} 1/s until {_end(stretch)}), "
-        f"but {why}; {_remedy(swing, oscillation, stretch, known)}"
+        f"but {why}; {_remedy(swing, oscillation, stretch)}"
     )
     return _finding(NOT_JUDGED, stretch.begin, swing, message, oscillation, stretch)
 
 
-def _remedy(swing: Swing, oscillation: Oscillation | None, stretch: Stretch, known: KnownModes = NOTHING_KNOWN) -> str:
-    end = needed_end(swing, oscillation, known)
+def _remedy(swing: Swing, oscillation: Oscillation | None, stretch: Stretch) -> str:
+    end = needed_end(swing, oscillation)
     return f"let the run go on to t = {end:.3g} s" if stretch.last else "give the events more distance"
 
 

@@ -17,7 +17,7 @@ from orchestrator.coupling.recorder import Recorder, RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
 from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind
-from orchestrator.watch.known_modes import KnownModes
+from orchestrator.watch.known_modes import KnownModes, rated_hz
 from orchestrator.watch.limits import above_declared, active_limits, limit_signals
 from orchestrator.watch.response import enough_looks, judgements, resting_signals, unsettled_response
 from orchestrator.watch.run_away import run_away, speed_signals, still_moving_away
@@ -166,9 +166,8 @@ def judged(
         parts = [part for part in parts if part.begin >= happened[0]]
     units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
     at_a_limit = any(finding.kind == "active_limit" and finding.until is None for finding in found)
-    responses = _Responses(
-        seen, system, units, disturbances(system, events, end), settings, () if at_a_limit else eigenvalues
-    )
+    known = KnownModes(() if at_a_limit else eigenvalues, rated_hz(system))
+    responses = _Responses(seen, system, units, disturbances(system, events, end), settings, known)
     told = _first_of_each(chain.from_iterable(responses.found(part) for part in parts))
     if happened and not enough_looks(seen, parts[-1]):
         responses.short.append(parts[-1])
@@ -182,12 +181,10 @@ def judged(
 class _Responses:
     def __init__(
         self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest], settings: Settings,
-        eigenvalues: Sequence[complex],
+        known: KnownModes,
     ) -> None:  # fmt: skip
         self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
-        self._settings, self._eigenvalues = settings, eigenvalues
-        self._rated_hz = max((plan.number("f_n") for plan in system.components.values()
-                              if "f_n" in plan.description.variables), default=0.0)  # fmt: skip
+        self._settings, self._known = settings, known
         self.masked: dict[Stretch, Sequence[Unrest]] = {}
         self.short: list[Stretch] = []
         self.clear: list[Stretch] = []
@@ -198,14 +195,13 @@ class _Responses:
         told = self._one(part, told=len(pieces) == 1)
         if part.breaks and not judgements(told):
             told = [f for piece in pieces for f in self._one(piece)] or told
-        passing = self._settings.during_fault(part.begin, part.end)
-        if not told and not passing and not among(self._disturbances, part):
+        if not told and not among(self._disturbances, part) and not self._settings.ends_fault(part.end):
             self.clear.append(part)
         return told
 
     def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
         acting = among(self._disturbances, part)
-        known = KnownModes(self._eigenvalues if self._settings.as_at_start(part.begin) else (), self._rated_hz)
+        known = self._known if self._settings.as_at_start(part.begin) else replace(self._known, eigenvalues=())
         found = unsettled_response(self._seen, self._system, part, self._units, known, noisy=bool(acting))
         found = [finding for finding in found if not any(one.explains(finding) for one in acting)]
         if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units, known):
@@ -213,7 +209,7 @@ class _Responses:
         if part.end - part.begin >= SETTLING * (1 - 1e-9):
             return found
         growing = [finding for finding in found if finding.kind == "growing_oscillation"]
-        if told and growing != found and not self._settings.during_fault(part.begin, part.end):
+        if told and growing != found and not self._settings.ends_fault(part.end):
             self.short.append(part)
         return growing
 
