@@ -4,16 +4,29 @@ Over a few periods two decaying oscillations that beat, or the harmonics that a 
 voltages and currents, look like one that grows. An eigenvalue belongs to the system: a true growth has one rate in
 every part of the response, while that of a beat changes from part to part."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.watch.known_modes import NOTHING_KNOWN, KnownModes
-from orchestrator.watch.oscillation import Oscillation, crossings_hz, strongest_oscillation, too_fast, without_trend
+from orchestrator.watch.oscillation import Oscillation, strongest_oscillation, too_fast, without_trend
 
 KEPT = 0.7  # A swing is decaying if its last third is smaller than this part of its middle third
+
+
+@dataclass(frozen=True)
+class Known:
+    """Eigenvalues of the linear model at the start [rad/s], and whether it is that of the stretch as well."""
+
+    modes: Sequence[complex] = ()
+    holds: bool = False
+
+    def rate(self, hertz: float) -> float | None:
+        """Largest real part [1/s] at a frequency or, as magnitudes show it, at half of it; None without modes there."""
+        sizes = [(z.real, z.imag / (2 * np.pi * hertz)) for z in self.modes]
+        return max((rate for rate, part in sizes if min(abs(part - 1), abs(2 * part - 1)) < SAME), default=None)
 
 
 @dataclass(frozen=True)
@@ -28,7 +41,7 @@ class Swing:
     # half of the rate at which the signal turns [Hz], counted at every communication step; only for signals that were
     # followed between the looks
     turns_hz: float | None = None
-    known: KnownModes = NOTHING_KNOWN
+    known: Known = Known()
 
 
 STEADY = 0.05  # the logarithm of a sustained oscillation's amplitude changes less over the judged part
@@ -40,10 +53,8 @@ those that seemed to grow in every part of the response had 4 at most."""
 
 SAME = 0.05  # largest relative difference of frequency between the judged part and the whole response
 AGREE = 2.0  # largest factor between the growth rates of the judged part and of the whole response
-_FAR = 2.0  # from the first to the last third, the factor by which an oscillation of modes that decay may grow
-_GROWN, _EVEN = 0.7, 1.6
-"""A fast oscillation that grows in truth goes from the first to the last fifth by the first figure at least, as a
-logarithm, and from each fifth to the next by the same, up to the second figure as a factor: a beat bends more."""
+_GONE, _FAR = 3.0, 2.0  # time constants of a mode until it is gone, and factor by which a beat grows between thirds
+_GROWN, _EVEN = 0.7, 1.3  # least true growth over fifths, as a logarithm, and its mean by its least: a beat bends more
 
 FAR_ABOVE, RISING = 10.0, 1.3
 """A swing of any shape grows if it rises by the first factor from the first to the last quarter, and by the second one
@@ -74,7 +85,7 @@ def doubt(swing: Swing, oscillation: Oscillation) -> str:
     """Why an oscillation that seems to grow, or to last, may decay; empty where the whole response confirms it."""
     grows = change(swing, oscillation.rate) > STEADY
     if swing.turns_hz is not None:
-        return _fast_doubt(swing, oscillation, grows=grows)
+        return _fast_doubt(swing, oscillation.frequency_hz, grows=grows)
     times, signal = (part[1:] for part in swing.response)  # the first look is that before the event
     if grows and rises(signal):
         return ""
@@ -96,43 +107,30 @@ def doubt(swing: Swing, oscillation: Oscillation) -> str:
     return ""
 
 
-def _growth(swing: Swing) -> float:
-    """Factor from the first third to the last one of a swing whose extents are known."""
+def is_explained(swing: Swing, hertz: float) -> bool:
+    """Whether slow modes that decay by the model make a swing at a high frequency that does not grow far."""
     first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
-    return last / first
+    fast = swing.turns_hz is not None or too_fast(swing.times, swing.signal)
+    return fast and swing.known.holds and swing.times[-1] < _gone(swing, hertz) and last < _FAR * first
 
 
-def _lasts(swing: Swing) -> float:
-    return float(swing.times[-1] - swing.response[0][0])
+def _gone(swing: Swing, hertz: float) -> float:
+    rate = swing.known.rate(hertz)
+    return float(swing.response[0][0]) + _GONE / -rate if rate is not None and rate < 0 else 0.0
 
 
-def is_explained(swing: Swing, oscillation: Oscillation) -> bool:
-    """Whether modes that the model knows to decay make a fast oscillation that does not grow far meanwhile."""
-    rate = swing.known.rate(oscillation.frequency_hz)
-    decays = rate is not None and _lasts(swing) < swing.known.decays_until(oscillation.frequency_hz)
-    return decays and _growth(swing) < _FAR
-
-
-def is_known_to_decay(swing: Swing) -> bool:
-    """Whether the model's modes at the frequency of a swing that is too fast for the looks decay."""
-    rate = swing.known.rate(crossings_hz(swing.times, swing.signal)) if too_fast(swing.times, swing.signal) else None
-    return rate is not None and rate < 0
-
-
-def _fast_doubt(swing: Swing, oscillation: Oscillation, *, grows: bool) -> str:
-    if _growth(swing) <= (1.0 if grows else KEPT):
+def _fast_doubt(swing: Swing, hertz: float, *, grows: bool) -> str:
+    first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
+    if last <= (1.0 if grows else KEPT) * first:
         return "it was larger before"
-    rate = swing.known.rate(oscillation.frequency_hz)
+    if (swing.known.rate(hertz) or 0.0) > 0 or (not grows and swing.times[-1] >= _gone(swing, hertz)):
+        return ""
     sizes = np.array([np.median(part) for part in np.array_split(swing.response[1][1:], 5)])
     rates = np.diff(np.log(sizes)) if (sizes > 0).all() else np.zeros(1)
-    even = rates.sum() > _GROWN and 0 < rates.max() < _EVEN * rates.min()
-    if (rate is not None and rate >= 0) or (grows and (even or rises(swing.signal, extents=True))):
+    if grows and (rises(swing.signal, extents=True) or _GROWN < rates.sum() < 4 * _EVEN * rates.min()):
         return ""
-    if not grows and _lasts(swing) >= swing.known.decays_until(oscillation.frequency_hz):
-        return ""
-    if rate is not None:
-        return f"the linear model's modes there decay, the slowest at {rate:+.3g} 1/s, and may beat"
-    return "no linear model tells of modes there, and offsets that decay and beat swing like that for a while"
+    tells = swing.known.holds and swing.known.rate(hertz) is not None
+    return f"modes that decay may beat like that{'' if tells else ' (no model tells, as none holds here)'}"
 
 
 def irregular_doubt(swing: Swing) -> str:
@@ -156,8 +154,7 @@ def needed_end(swing: Swing, oscillation: Oscillation | None = None) -> float:
     longer = begin + 1.5 * (end - begin)
     if oscillation is None:
         return longer
-    hertz = oscillation.frequency_hz
-    return begin + max(longer - begin, 1.2 * PERIODS / hertz, swing.known.decays_until(hertz))
+    return max(longer, begin + 1.2 * PERIODS / oscillation.frequency_hz, _gone(swing, oscillation.frequency_hz))
 
 
 def _same(one: Oscillation, other: Oscillation) -> bool:

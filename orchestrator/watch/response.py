@@ -14,16 +14,15 @@ from orchestrator.watch import swing_findings
 from orchestrator.watch.confirmation import (
     KEPT,
     STEADY,
+    Known,
     Swing,
     change,
     doubt,
     irregular_doubt,
     is_explained,
-    is_known_to_decay,
     rms,
 )
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
-from orchestrator.watch.known_modes import NOTHING_KNOWN, KnownModes
 from orchestrator.watch.limit import is_inner
 from orchestrator.watch.seen import Seen, is_derivative, unit
 from orchestrator.watch.stretches import Stretch
@@ -63,9 +62,8 @@ part."""
 
 
 def unsettled_response(
-    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], known: KnownModes = NOTHING_KNOWN, *,
-    noisy: bool = False,
-) -> list[Finding]:  # fmt: skip
+    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], known: Known, *, noisy: bool = False
+) -> list[Finding]:
     """At most one growing and one sustained oscillation in a stretch, each in the signal where it is strongest.
 
     If an oscillation is faster than the looks, only such oscillations are reported, because the looks would show it as
@@ -124,7 +122,7 @@ def _told(
             finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
             if finding is None or finding.kind in told or not _goes_on(swing, oscillation, stretch.breaks):
                 continue
-            if swing.turns_hz is not None and is_explained(swing, oscillation):
+            if swing.turns_hz is not None and is_explained(swing, oscillation.frequency_hz):
                 continue
             why = "" if clean else doubt(swing, oscillation)
             if not why:
@@ -135,7 +133,7 @@ def _told(
             why = "" if swing_findings.swing_rises(swing) else irregular_doubt(swing)
             if not why:
                 irregular.append(swing_findings.irregular_swing(swing, unit(swing.name, system), stretch))
-            elif not doubtful and not is_known_to_decay(swing):
+            elif not doubtful and not is_explained(swing, oscillations.crossings_hz(swing.times, swing.signal)):
                 doubtful.append(swing_findings.doubtful_irregular_swing(swing, why, unit(swing.name, system), stretch))
     return [*told.values()] or irregular[:1] or doubtful
 
@@ -205,10 +203,8 @@ def _is_clean(swing: Swing, oscillation: oscillations.Oscillation) -> bool:
     """Whether one oscillation, with one phase, makes the whole swing, so that its growth is certain."""
     since = swing.times - swing.times[-1]
     turn = np.exp((oscillation.rate + 2j * np.pi * oscillation.frequency_hz) * since)
-    shape, whole = (
-        oscillations.without_trend(np.column_stack([turn.real, turn.imag])),
-        oscillations.without_trend(swing.signal),
-    )
+    shape = oscillations.without_trend(np.column_stack([turn.real, turn.imag]))
+    whole = oscillations.without_trend(swing.signal)
     rest = whole - shape @ np.linalg.lstsq(shape, whole, rcond=None)[0]
     part = float(np.linalg.norm(rest) / np.linalg.norm(whole))
     return part < (CLEAN if change(swing, oscillation.rate) > STEADY + 2 * part else CLEAN / 3)

@@ -46,7 +46,7 @@ def test_offsets_that_beat_are_never_unstable_however_long_the_run_is(lasts):
 
 def test_what_the_response_alone_cannot_tell_is_said_with_a_remedy():
     (finding,) = found(BEATS, 4.0)
-    assert "no linear model tells of modes there" in finding.message
+    assert "no model tells, as none holds here" in finding.message
     assert "let the run go on to t = " in finding.message
 
 
