@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.watch.oscillation import Oscillation, strongest_oscillation, too_fast, without_trend
+from orchestrator.watch.oscillation import Oscillation, strongest_oscillation, without_trend
 
 KEPT = 0.7  # A swing is decaying if its last third is smaller than this part of its middle third
 
@@ -42,6 +42,17 @@ class Swing:
     # followed between the looks
     turns_hz: float | None = None
     known: Known = Known()
+
+    def is_explained(self, hertz: float) -> bool:
+        """Whether modes that the model knows to decay make a fast swing that does not grow far."""
+        first, *_, last = (float(part.mean()) for part in np.array_split(self.signal, 3))
+        slow = self.turns_hz is not None and self.known.holds and self.times[-1] < self.gone(hertz)
+        return slow and last < _FAR * first
+
+    def gone(self, hertz: float) -> float:
+        """Time from which on nothing is left of modes that decay at a frequency [s]; 0 if there are none."""
+        rate = self.known.rate(hertz)
+        return float(self.response[0][0]) + _GONE / -rate if rate is not None and rate < 0 else 0.0
 
 
 STEADY = 0.05  # the logarithm of a sustained oscillation's amplitude changes less over the judged part
@@ -107,23 +118,11 @@ def doubt(swing: Swing, oscillation: Oscillation) -> str:
     return ""
 
 
-def is_explained(swing: Swing, hertz: float) -> bool:
-    """Whether slow modes that decay by the model make a swing at a high frequency that does not grow far."""
-    first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
-    fast = swing.turns_hz is not None or too_fast(swing.times, swing.signal)
-    return fast and swing.known.holds and swing.times[-1] < _gone(swing, hertz) and last < _FAR * first
-
-
-def _gone(swing: Swing, hertz: float) -> float:
-    rate = swing.known.rate(hertz)
-    return float(swing.response[0][0]) + _GONE / -rate if rate is not None and rate < 0 else 0.0
-
-
 def _fast_doubt(swing: Swing, hertz: float, *, grows: bool) -> str:
     first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
     if last <= (1.0 if grows else KEPT) * first:
         return "it was larger before"
-    if (swing.known.rate(hertz) or 0.0) > 0 or (not grows and swing.times[-1] >= _gone(swing, hertz)):
+    if (swing.known.rate(hertz) or 0.0) > 0 or (not grows and swing.times[-1] >= swing.gone(hertz)):
         return ""
     sizes = np.array([np.median(part) for part in np.array_split(swing.response[1][1:], 5)])
     rates = np.diff(np.log(sizes)) if (sizes > 0).all() else np.zeros(1)
@@ -154,7 +153,7 @@ def needed_end(swing: Swing, oscillation: Oscillation | None = None) -> float:
     longer = begin + 1.5 * (end - begin)
     if oscillation is None:
         return longer
-    return max(longer, begin + 1.2 * PERIODS / oscillation.frequency_hz, _gone(swing, oscillation.frequency_hz))
+    return max(longer, begin + 1.2 * PERIODS / oscillation.frequency_hz, swing.gone(oscillation.frequency_hz))
 
 
 def _same(one: Oscillation, other: Oscillation) -> bool:

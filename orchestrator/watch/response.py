@@ -11,17 +11,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch import oscillation as oscillations
 from orchestrator.watch import swing_findings
-from orchestrator.watch.confirmation import (
-    KEPT,
-    STEADY,
-    Known,
-    Swing,
-    change,
-    doubt,
-    irregular_doubt,
-    is_explained,
-    rms,
-)
+from orchestrator.watch.confirmation import KEPT, STEADY, Known, Swing, change, doubt, irregular_doubt, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.watch.limit import is_inner
 from orchestrator.watch.seen import Seen, is_derivative, unit
@@ -122,7 +112,7 @@ def _told(
             finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
             if finding is None or finding.kind in told or not _goes_on(swing, oscillation, stretch.breaks):
                 continue
-            if swing.turns_hz is not None and is_explained(swing, oscillation.frequency_hz):
+            if swing.is_explained(oscillation.frequency_hz):
                 continue
             why = "" if clean else doubt(swing, oscillation)
             if not why:
@@ -133,7 +123,7 @@ def _told(
             why = "" if swing_findings.swing_rises(swing) else irregular_doubt(swing)
             if not why:
                 irregular.append(swing_findings.irregular_swing(swing, unit(swing.name, system), stretch))
-            elif not doubtful and not is_explained(swing, oscillations.crossings_hz(swing.times, swing.signal)):
+            elif not doubtful:
                 doubtful.append(swing_findings.doubtful_irregular_swing(swing, why, unit(swing.name, system), stretch))
     return [*told.values()] or irregular[:1] or doubtful
 
@@ -143,12 +133,8 @@ def resting_signals(seen: Seen, system: System) -> dict[str, Numbers]:
     everything: Mapping[str, Numbers] = {**seen.values, **seen.last}
     found = {}
     for name, signal in everything.items():
-        if (
-            is_derivative(name)
-            or is_inner(name, system)
-            or unit(name, system) == "rad"
-            or not np.isfinite(signal).all()
-        ):
+        rests = unit(name, system) != "rad" and np.isfinite(signal).all()
+        if not rests or is_derivative(name) or is_inner(name, system):
             continue
         if not name.endswith(("_re", "_im")):
             found[name] = signal
