@@ -17,7 +17,7 @@ KEPT = 0.7  # A swing is decaying if its last third is smaller than this part of
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownModes:
     """Eigenvalues of the linear model at the start [rad/s], and whether it is that of the stretch as well."""
 
     modes: Sequence[complex] = ()
@@ -41,7 +41,7 @@ class Swing:
     # half of the rate at which the signal turns [Hz], counted at every communication step; only for signals that were
     # followed between the looks
     turns_hz: float | None = None
-    known: Known = Known()
+    known: KnownModes = KnownModes()
 
     def is_explained(self, hertz: float) -> bool:
         """Whether modes that the model knows to decay make a fast swing that does not grow far."""

@@ -11,7 +11,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch import oscillation as oscillations
 from orchestrator.watch import swing_findings
-from orchestrator.watch.confirmation import KEPT, STEADY, Known, Swing, change, doubt, irregular_doubt, rms
+from orchestrator.watch.confirmation import KEPT, STEADY, KnownModes, Swing, change, doubt, irregular_doubt, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.watch.limit import is_inner
 from orchestrator.watch.seen import Seen, is_derivative, unit
@@ -52,7 +52,7 @@ part."""
 
 
 def unsettled_response(
-    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], known: Known, *, noisy: bool = False
+    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], known: KnownModes, *, noisy: bool = False
 ) -> list[Finding]:
     """At most one growing and one sustained oscillation in a stretch, each in the signal where it is strongest.
 

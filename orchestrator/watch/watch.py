@@ -16,7 +16,7 @@ from orchestrator.coupling.filtered_recorder import FilteredRecorder
 from orchestrator.coupling.recorder import Recorder, RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
-from orchestrator.watch.confirmation import Known
+from orchestrator.watch.confirmation import KnownModes
 from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import above_declared, active_limits, limit_signals
 from orchestrator.watch.response import enough_looks, judgements, resting_signals, unsettled_response
@@ -196,7 +196,7 @@ class _Responses:
 
     def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
         acting = among(self._disturbances, part)
-        known = Known(self._modes, self._settings.as_at_start(part.begin))
+        known = KnownModes(self._modes, self._settings.as_at_start(part.begin))
         found = unsettled_response(self._seen, self._system, part, self._units, known, noisy=bool(acting))
         found = [finding for finding in found if not any(one.explains(finding) for one in acting)]
         if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units, known):
