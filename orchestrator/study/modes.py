@@ -64,6 +64,7 @@ class ModesResult:
     hidden: Hidden | None
     # the continuous model, without a communication step; None where a component gives no derivatives
     system: LinearModel | None
+    eigenvalues: Sequence[complex] = ()  # all of ``model`` [rad/s]; none where it is too large for them
     # of the components that were identified: largest relative difference of model and measured response
     fit_errors: dict[str, float] = field(default_factory=dict)
     unnamed: Mapping[str, str] = field(default_factory=dict)  # why no mode bears a name that the case gives, by name
@@ -265,6 +266,7 @@ class Linearised:
                 ),
             ),
             system=self._system,
+            eigenvalues=() if spectrum is None else spectrum.eigenvalues.tolist(),
             fit_errors={name: c.disagreement for name, c in self._blocks.components.items() if c.source == IDENTIFIED},
             unnamed=naming.reasons,
         )  # fmt: skip

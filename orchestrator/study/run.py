@@ -172,7 +172,7 @@ def _run(
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
     dataset, failure = _recorded(watch, prepared, recording, failure)
-    findings = watch.findings(failure, master.late_starts, modes.misfits)
+    findings = watch.findings(failure, master.late_starts, modes.misfits, () if modes.fit_errors else modes.eigenvalues)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
     unprotected = tuple(
         f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"

@@ -4,6 +4,7 @@ Over a few periods two decaying oscillations that beat, or the harmonics that a 
 voltages and currents, look like one that grows. An eigenvalue belongs to the system: a true growth has one rate in
 every part of the response, while that of a beat changes from part to part."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,6 +14,19 @@ from orchestrator.arrays import Numbers
 from orchestrator.watch.oscillation import Oscillation, strongest_oscillation, without_trend
 
 KEPT = 0.7  # A swing is decaying if its last third is smaller than this part of its middle third
+
+
+@dataclass(frozen=True)
+class KnownModes:
+    """Eigenvalues of the linear model at the start [rad/s], and whether it is that of the stretch as well."""
+
+    modes: Sequence[complex] = ()
+    holds: bool = False
+
+    def rate(self, hertz: float) -> float | None:
+        """Largest real part [1/s] at a frequency or, as magnitudes show it, at half of it; None without modes there."""
+        sizes = [(z.real, z.imag / (2 * np.pi * hertz)) for z in self.modes]
+        return max((rate for rate, part in sizes if min(abs(part - 1), abs(2 * part - 1)) < SAME), default=None)
 
 
 @dataclass(frozen=True)
@@ -27,6 +41,18 @@ class Swing:
     # half of the rate at which the signal turns [Hz], counted at every communication step; only for signals that were
     # followed between the looks
     turns_hz: float | None = None
+    known: KnownModes = KnownModes()
+
+    def is_explained(self, hertz: float) -> bool:
+        """Whether modes that the model knows to decay make a fast swing that does not grow far."""
+        first, *_, last = (float(part.mean()) for part in np.array_split(self.signal, 3))
+        slow = self.turns_hz is not None and self.known.holds and self.times[-1] < self.gone(hertz)
+        return slow and last < _FAR * first
+
+    def gone(self, hertz: float) -> float:
+        """Time from which on nothing is left of modes that decay at a frequency [s]; 0 if there are none."""
+        rate = self.known.rate(hertz)
+        return float(self.response[0][0]) + _GONE / -rate if rate is not None and rate < 0 else 0.0
 
 
 STEADY = 0.05  # the logarithm of a sustained oscillation's amplitude changes less over the judged part
@@ -38,6 +64,9 @@ those that seemed to grow in every part of the response had 4 at most."""
 
 SAME = 0.05  # largest relative difference of frequency between the judged part and the whole response
 AGREE = 2.0  # largest factor between the growth rates of the judged part and of the whole response
+_GONE, _FAR = 3.0, 2.0  # time constants of a mode until it is gone, and factor by which a beat grows between thirds
+_GROWN, _EVEN = 0.7, 1.3  # least true growth over fifths, as a logarithm, and its mean by its least: a beat bends more
+
 FAR_ABOVE, RISING = 10.0, 1.3
 """A swing of any shape grows if it rises by the first factor from the first to the last quarter, and by the second one
 at least from each quarter to the next."""
@@ -67,8 +96,7 @@ def doubt(swing: Swing, oscillation: Oscillation) -> str:
     """Why an oscillation that seems to grow, or to last, may decay; empty where the whole response confirms it."""
     grows = change(swing, oscillation.rate) > STEADY
     if swing.turns_hz is not None:
-        first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
-        return "" if last > (1.0 if grows else KEPT) * first else "it was larger before"
+        return _fast_doubt(swing, oscillation.frequency_hz, grows=grows)
     times, signal = (part[1:] for part in swing.response)  # the first look is that before the event
     if grows and rises(signal):
         return ""
@@ -90,6 +118,20 @@ def doubt(swing: Swing, oscillation: Oscillation) -> str:
     return ""
 
 
+def _fast_doubt(swing: Swing, hertz: float, *, grows: bool) -> str:
+    first, *_, last = (float(part.mean()) for part in np.array_split(swing.signal, 3))
+    if last <= (1.0 if grows else KEPT) * first:
+        return "it was larger before"
+    if (swing.known.rate(hertz) or 0.0) > 0 or (not grows and swing.times[-1] >= swing.gone(hertz)):
+        return ""
+    sizes = np.array([np.median(part) for part in np.array_split(swing.response[1][1:], 5)])
+    rates = np.diff(np.log(sizes)) if (sizes > 0).all() else np.zeros(1)
+    if grows and (rises(swing.signal, extents=True) or _GROWN < rates.sum() < 4 * _EVEN * rates.min()):
+        return ""
+    tells = swing.known.holds and swing.known.rate(hertz) is not None
+    return f"modes that decay may beat like that{'' if tells else ' (no model tells, as none holds here)'}"
+
+
 def irregular_doubt(swing: Swing) -> str:
     """Why a swing of any shape, which seems to last, may decay; empty where its sizes do not fall."""
     sizes = np.array([rms(piece) for piece in np.array_split(swing.signal, _PIECES)])
@@ -109,7 +151,9 @@ def needed_end(swing: Swing, oscillation: Oscillation | None = None) -> float:
     """Time until which a run should go on for a clear answer [s]."""
     begin, end = float(swing.response[0][0]), float(swing.times[-1])
     longer = begin + 1.5 * (end - begin)
-    return max(longer, begin + 1.2 * PERIODS / oscillation.frequency_hz) if oscillation is not None else longer
+    if oscillation is None:
+        return longer
+    return max(longer, begin + 1.2 * PERIODS / oscillation.frequency_hz, swing.gone(oscillation.frequency_hz))
 
 
 def _same(one: Oscillation, other: Oscillation) -> bool:

@@ -7,12 +7,8 @@ from typing import Any, Literal
 Kind = Literal["growth", "growing_oscillation", "sustained_oscillation", "run_away", "undisturbed_motion",
                "active_limit", "loss_of_synchronism", "not_judged", "not_finite", "failure", "misfit"]  # fmt: skip
 
-UNSTABLE: frozenset[Kind] = frozenset(
-    {
-        "growth", "growing_oscillation", "sustained_oscillation", "run_away", "loss_of_synchronism", "not_finite",
-        "failure",
-    }
-)  # fmt: skip
+UNSTABLE: frozenset[Kind] = frozenset(("growth", "growing_oscillation", "sustained_oscillation", "run_away",
+                                       "loss_of_synchronism", "not_finite", "failure"))  # fmt: skip
 """Kinds of finding that a stable system cannot give. ``not_judged`` is a remark: noise hides what there may
 be, or the run ends too early after an event; ``misfit`` is of a device and its binding, whatever the run does."""
 

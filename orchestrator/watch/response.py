@@ -1,6 +1,7 @@
 """The response after an event: an oscillation that grows, or one that neither grows nor decays."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -10,7 +11,7 @@ from orchestrator.arrays import Numbers
 from orchestrator.coupling.system import System
 from orchestrator.watch import oscillation as oscillations
 from orchestrator.watch import swing_findings
-from orchestrator.watch.confirmation import KEPT, STEADY, Swing, change, doubt, irregular_doubt, rms
+from orchestrator.watch.confirmation import KEPT, STEADY, KnownModes, Swing, change, doubt, irregular_doubt, rms
 from orchestrator.watch.finding import NOT_JUDGED, Finding, Kind
 from orchestrator.watch.limit import is_inner
 from orchestrator.watch.seen import Seen, is_derivative, unit
@@ -51,7 +52,7 @@ part."""
 
 
 def unsettled_response(
-    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], *, noisy: bool = False
+    seen: Seen, system: System, stretch: Stretch, units: Sequence[str], known: KnownModes, *, noisy: bool = False
 ) -> list[Finding]:
     """At most one growing and one sustained oscillation in a stretch, each in the signal where it is strongest.
 
@@ -66,7 +67,7 @@ def unsettled_response(
     times = seen.times[first:]
     slow = (_swing(name, y[first:], times, begin) for name, y in resting_signals(seen, system).items())
     fast = (_fast_swing(name, seen, first, begin) for name in seen.turns)
-    swings = [swing for swing in chain(slow, fast) if swing is not None]
+    swings = [replace(swing, known=known) for swing in chain(slow, fast) if swing is not None]
     swings.sort(key=lambda s: (s.name.partition(".")[0] not in units, -s.size))
     # An oscillation faster than the looks appears in the signals as a slower one, therefore it is searched first.
     quick = [s for s in swings if s.turns_hz is not None]
@@ -111,6 +112,8 @@ def _told(
             finding = _regular(swing, oscillation, unit(swing.name, system), stretch)
             if finding is None or finding.kind in told or not _goes_on(swing, oscillation, stretch.breaks):
                 continue
+            if swing.is_explained(oscillation.frequency_hz):
+                continue
             why = "" if clean else doubt(swing, oscillation)
             if not why:
                 told[finding.kind] = finding
@@ -130,12 +133,8 @@ def resting_signals(seen: Seen, system: System) -> dict[str, Numbers]:
     everything: Mapping[str, Numbers] = {**seen.values, **seen.last}
     found = {}
     for name, signal in everything.items():
-        if (
-            is_derivative(name)
-            or is_inner(name, system)
-            or unit(name, system) == "rad"
-            or not np.isfinite(signal).all()
-        ):
+        rests = unit(name, system) != "rad" and np.isfinite(signal).all()
+        if not rests or is_derivative(name) or is_inner(name, system):
             continue
         if not name.endswith(("_re", "_im")):
             found[name] = signal
@@ -190,10 +189,8 @@ def _is_clean(swing: Swing, oscillation: oscillations.Oscillation) -> bool:
     """Whether one oscillation, with one phase, makes the whole swing, so that its growth is certain."""
     since = swing.times - swing.times[-1]
     turn = np.exp((oscillation.rate + 2j * np.pi * oscillation.frequency_hz) * since)
-    shape, whole = (
-        oscillations.without_trend(np.column_stack([turn.real, turn.imag])),
-        oscillations.without_trend(swing.signal),
-    )
+    shape = oscillations.without_trend(np.column_stack([turn.real, turn.imag]))
+    whole = oscillations.without_trend(swing.signal)
     rest = whole - shape @ np.linalg.lstsq(shape, whole, rcond=None)[0]
     part = float(np.linalg.norm(rest) / np.linalg.norm(whole))
     return part < (CLEAN if change(swing, oscillation.rate) > STEADY + 2 * part else CLEAN / 3)

@@ -9,6 +9,8 @@ from orchestrator.coupling.events import Event, Fault
 from orchestrator.coupling.imperfections import Noise, Quantisation
 from orchestrator.coupling.system import System
 
+_FAULT = ".fault.on"  # the switch of a fault at a bus, whose values act only while it is on
+
 
 class Settings:
     """Parameters of a system at the times of the looks [s]."""
@@ -39,14 +41,25 @@ class Settings:
         now: dict[str, float | None] = {}
         found = set(self._faults)
         for time, name, value in self._changes:
-            if name not in now:
-                component, _, variable = name.partition(".")
-                plan = self._system.components[component]
-                now[name] = None if plan.value(variable) is None else plan.number(variable)
-            if value != now[name]:
+            if value != now.get(name, self._start(name)):
                 found.add(time)
             now[name] = value
         return sorted(found)
+
+    def _start(self, name: str) -> float | None:
+        component, _, variable = name.partition(".")
+        plan = self._system.components[component]
+        return None if plan.value(variable) is None else plan.number(variable)
+
+    def as_at_start(self, time: float) -> bool:
+        """Whether all that was set until a time [s] has its start value again, as after a fault that opens nothing."""
+        now = {name: value for when, name, value in self._changes if when <= time}
+        over = tuple(name.removesuffix("on") for name, on in now.items() if name.endswith(_FAULT) and not on)
+        back = all(name.startswith(over) or value == self._start(name) for name, value in now.items())
+        return back and all(fault > time for fault in self._faults)
+
+    def ends_fault(self, time: float) -> bool:
+        return any(when == time and name.endswith(_FAULT) and not on for when, name, on in self._changes)
 
     def connected(self, component: str) -> Numbers:
         """Whether a component is on the grid, from its own breaker and the grid's port for it: 1 or 0, shape (n,)."""

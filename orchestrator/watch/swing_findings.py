@@ -100,11 +100,8 @@ def _irregular_amplitude(swing: Swing) -> float:
 def _finding(
     kind: Kind, time: float, swing: Swing, message: str, oscillation: Oscillation, stretch: Stretch
 ) -> Finding:
-    figures = {
-        "growth_rate": oscillation.rate,
-        "frequency_hz": oscillation.frequency_hz,
-        "amplitude": oscillation.amplitude,
-    }
+    rate, hertz = oscillation.rate, oscillation.frequency_hz
+    figures = {"growth_rate": rate, "frequency_hz": hertz, "amplitude": oscillation.amplitude}
     return Finding(kind, time, *_place(swing.name), message, _until(stretch), figures)
 
 

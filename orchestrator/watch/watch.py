@@ -16,6 +16,7 @@ from orchestrator.coupling.filtered_recorder import FilteredRecorder
 from orchestrator.coupling.recorder import Recorder, RowSink
 from orchestrator.coupling.system import System
 from orchestrator.errors import ComponentError, CosimError, NotFiniteError
+from orchestrator.watch.confirmation import KnownModes
 from orchestrator.watch.finding import MISFIT, UNSTABLE, Finding, Kind
 from orchestrator.watch.limits import above_declared, active_limits, limit_signals
 from orchestrator.watch.response import enough_looks, judgements, resting_signals, unsettled_response
@@ -79,9 +80,8 @@ def still_departing(seen: Seen, system: System, stretches: Sequence[Stretch]) ->
             f"{float(times[-(len(times) // 4)]):.4g} s to {where} {name} moves more than before, by {most:.3g} "
             f"{unit(name, system)}; let the run go on until it comes to rest, and look at it"
         )
-        return [
-            Finding("not_judged", stretch.begin, component, variable, message, None if stretch.last else stretch.end)
-        ]
+        until = None if stretch.last else stretch.end
+        return [Finding("not_judged", stretch.begin, component, variable, message, until)]
     return []
 
 
@@ -103,14 +103,10 @@ class Watch:
     def __init__(self, prepared: PreparedScenario, sink: RowSink | None = None) -> None:
         self._prepared = prepared
         every = look_every(prepared.step_size, prepared.record_every, prepared.stop_time)
-        keep = (
-            max(1, every // prepared.record_every) if sink is not None else 1
-        )  # what is on the disk need not be in memory
-        self.recorder = (
-            FilteredRecorder(prepared.record, prepared.record_every, sink=sink, keep=keep)
-            if prepared.record_filtered
-            else Recorder(prepared.record, prepared.record_every, sink=sink, keep=keep)
-        )
+        # what is on the disk need not be in memory
+        keep = max(1, every // prepared.record_every) if sink is not None else 1
+        kind = FilteredRecorder if prepared.record_filtered else Recorder
+        self.recorder = kind(prepared.record, prepared.record_every, sink=sink, keep=keep)
         needed = dict.fromkeys(
             [*limit_signals(prepared.system), *angle_signals(prepared.system), *speed_signals(prepared.system)]
         )
@@ -127,19 +123,23 @@ class Watch:
         failure: CosimError | None = None,
         late_starts: Mapping[str, LateStart] | None = None,
         misfits: Mapping[str, Sequence[Misfit]] = MappingProxyType({}),
+        modes: Sequence[complex] = (),
     ) -> list[Finding]:
         """The findings, in the order of their beginning; available after the run, even after one that failed.
 
-        ``misfits``: Of devices and their bindings, by component."""
+        ``misfits``: Of devices and their bindings, by component.
+        ``modes``: Eigenvalues of the linear model at the start [rad/s]; empty if not all are known."""
         seen = rescaled(self._watcher.seen(self.recorder if self._looks_at_records else None), misfits)
         whole = failure is None
         system = self._prepared.system
-        told = judged(seen, system, self._prepared.events, whole=whole) if len(seen.times) > 1 else ()
+        told = judged(seen, system, self._prepared.events, modes, whole=whole) if len(seen.times) > 1 else ()
         found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), told)
         return sorted(found, key=lambda finding: finding.time)
 
 
-def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool = True) -> list[Finding]:
+def judged(
+    seen: Seen, system: System, events: Sequence[Event], modes: Sequence[complex] = (), *, whole: bool = True
+) -> list[Finding]:
     """All findings from the signals.
 
     ``whole``: Whether the run came to its end; of one that did not, nobody asks whether it settles."""
@@ -160,7 +160,9 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
     if happened and [finding.kind for finding in undisturbed] != ["undisturbed_motion"]:
         parts = [part for part in parts if part.begin >= happened[0]]
     units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
-    responses = _Responses(seen, system, units, disturbances(system, events, end))
+    at_a_limit = any(finding.kind == "active_limit" and finding.until is None for finding in found)
+    modes = () if at_a_limit else modes
+    responses = _Responses(seen, system, units, disturbances(system, events, end), settings, modes)
     told = _first_of_each(chain.from_iterable(responses.found(part) for part in parts))
     if happened and not enough_looks(seen, parts[-1]):
         responses.short.append(parts[-1])
@@ -172,8 +174,12 @@ def judged(seen: Seen, system: System, events: Sequence[Event], *, whole: bool =
 
 
 class _Responses:
-    def __init__(self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest]) -> None:
+    def __init__(
+        self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest], settings: Settings,
+        modes: Sequence[complex],
+    ) -> None:  # fmt: skip
         self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
+        self._settings, self._modes = settings, modes
         self.masked: dict[Stretch, Sequence[Unrest]] = {}
         self.short: list[Stretch] = []
         self.clear: list[Stretch] = []
@@ -184,20 +190,21 @@ class _Responses:
         told = self._one(part, told=len(pieces) == 1)
         if part.breaks and not judgements(told):
             told = [f for piece in pieces for f in self._one(piece)] or told
-        if not told and not among(self._disturbances, part):
+        if not told and not among(self._disturbances, part) and not self._settings.ends_fault(part.end):
             self.clear.append(part)
         return told
 
     def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
         acting = among(self._disturbances, part)
-        found = unsettled_response(self._seen, self._system, part, self._units, noisy=bool(acting))
+        known = KnownModes(self._modes, self._settings.as_at_start(part.begin))
+        found = unsettled_response(self._seen, self._system, part, self._units, known, noisy=bool(acting))
         found = [finding for finding in found if not any(one.explains(finding) for one in acting)]
-        if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units):
+        if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units, known):
             self.masked[part] = acting
         if part.end - part.begin >= SETTLING * (1 - 1e-9):
             return found
         growing = [finding for finding in found if finding.kind == "growing_oscillation"]
-        if told and growing != found:
+        if told and growing != found and not self._settings.ends_fault(part.end):
             self.short.append(part)
         return growing
 

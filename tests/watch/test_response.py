@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from orchestrator.watch.confirmation import KnownModes
 from orchestrator.watch.response import unsettled_response
 from orchestrator.watch.stretches import Stretch
 from tests.watch.seen import seen_of, system
@@ -24,7 +25,9 @@ def response(rate, hertz, size=0.02, settling=0.05):
 
 def found(stop=STOP, **signals):
     named = {f"{name}.y": y for name, y in signals.items()}
-    return unsettled_response(seen_of(named, stop), system(*signals), Stretch(EVENT, stop, last=True), ("a",))
+    return unsettled_response(
+        seen_of(named, stop), system(*signals), Stretch(EVENT, stop, last=True), ("a",), KnownModes()
+    )
 
 
 @pytest.mark.parametrize("hertz", [0.3, 1.1, 37.3, 60.0, 200.0, 433.0])
