@@ -46,8 +46,8 @@ class Swing:
     def is_explained(self, hertz: float) -> bool:
         """Whether modes that the model knows to decay make a fast swing that does not grow far."""
         first, *_, last = (float(part.mean()) for part in np.array_split(self.signal, 3))
-        slow = self.turns_hz is not None and self.known.holds and self.times[-1] < self.gone(hertz)
-        return slow and last < _FAR * first
+        swing_still = self.turns_hz is not None and self.known.holds and self.times[-1] < self.gone(hertz)
+        return swing_still and last < _FAR * first
 
     def gone(self, hertz: float) -> float:
         """Time from which on nothing is left of modes that decay at a frequency [s]; 0 if there are none."""
