@@ -3,6 +3,7 @@
 Inside, every scan is in one form: currents are counted into what is scanned, rows and columns are d and q of one port
 after the other, and the q axis leads the d axis. What stands in a file in another form is turned as it is read."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -24,8 +25,8 @@ _COIL = 0.3  # least likeness to a coil from which on it tells
 _FEW = 8  # points from which on it tells
 
 _CLEAR = 0.35  # most that an admittance may miss the relation by: resonances between coarse rows miss it by more
-_SURE, _NEAR = 0.25, 0.15  # most to miss the opposite relation by, and to differ from it, where no coil is seen
-_TOPS = (_TOP, 2.5, np.inf)  # parts of the highest frequency from which on it is looked for
+_SURE = 0.2  # most that both miss a relation by, in their geometric mean, where it tells without a coil
+_TOPS = (_TOP, 2.5, np.inf)  # parts of the highest frequency from which on such a one is looked for
 
 _HOLE, _BESIDE = 3.0, 8
 """A step of the frequency this many times as long as each of so many to either side may be a hole."""
@@ -141,15 +142,19 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
     At high frequencies a device is a circuit Z(jω), that dq shows at ω + ω₀ in the one sequence and at ω − ω₀ in the
     other. Half their sum and difference, a and c, then meet a(ω + ω₀) − a(ω − ω₀) = c(ω + ω₀) + c(ω − ω₀). So do those
     of its admittance, which rises where it ends in a capacitor. Where neither rises so, as behind a damped capacitor,
-    control could hide the relation: there only a clear opposite one tells."""
+    control may hide the relation: there only one that is met closely tells."""
     forms, seen = (np.linalg.pinv(values), values), 1.0
     for Z, most in zip(forms, (np.inf, _CLEAR), strict=True):
         coil, part, unlike = _turning(frequencies, Z, rated_hz, frequencies[-1] / _TOP)
         if _COIL < coil < 1 / _COIL:
             seen = part if unlike < most else 1.0
             break
-    opposite = (_turning(frequencies, Z, rated_hz, frequencies[-1] / top)[1:] for top in _TOPS for Z in forms)
-    return min([seen, *(part for part, unlike in opposite if abs(part + 1) < _NEAR and unlike < _SURE)])
+    bands = [[_turning(frequencies, Z, rated_hz, frequencies[-1] / top)[1:] for Z in forms] for top in _TOPS]
+    met, opposite = (
+        min(math.sqrt(math.prod(math.hypot(part - sign, unlike) for part, unlike in band)) for band in bands) < _SURE
+        for sign in (1, -1)
+    )
+    return -1.0 if opposite else 1.0 if met and seen < _OTHER_AXIS else seen
 
 
 def _turning(frequencies: Numbers, Z: Complex, rated_hz: float, start: float) -> tuple[float, float, float]:
