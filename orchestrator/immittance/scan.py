@@ -157,7 +157,7 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
     return -1.0 if opposite else 1.0 if met and seen < _OTHER_AXIS else seen
 
 
-def _turning(frequencies: Numbers, Z: Complex, rated_hz: float, start: float) -> tuple[float, float, float]:
+def _turning(frequencies: Numbers, Z: Vector, rated_hz: float, start: float) -> tuple[float, float, float]:
     """Likeness to a coil from a frequency on, the rated frequency that is seen, and by what part the relation fails."""
     f = frequencies[(frequencies >= start) & (frequencies > 2 * rated_hz)]
     f = f[f <= frequencies[-1] - rated_hz]
