@@ -3,6 +3,7 @@
 Inside, every scan is in one form: currents are counted into what is scanned, rows and columns are d and q of one port
 after the other, and the q axis leads the d axis. What stands in a file in another form is turned as it is read."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -24,6 +25,8 @@ _COIL = 0.3  # least likeness to a coil from which on it tells
 _FEW = 8  # points from which on it tells
 
 _CLEAR = 0.35  # most that an admittance may miss the relation by: resonances between coarse rows miss it by more
+_SURE = 0.2  # most that both miss a relation by, in their geometric mean, where it tells without a coil
+_TOPS = (_TOP, 2.5, np.inf)  # parts of the highest frequency from which on such a one is looked for
 
 _HOLE, _BESIDE = 3.0, 8
 """A step of the frequency this many times as long as each of so many to either side may be a hole."""
@@ -138,20 +141,36 @@ def _rated_seen(frequencies: Numbers, values: Vector, rated_hz: float) -> float:
 
     At high frequencies a device is a circuit Z(jω), that dq shows at ω + ω₀ in the one sequence and at ω − ω₀ in the
     other. Half their sum and difference, a and c, then meet a(ω + ω₀) − a(ω − ω₀) = c(ω + ω₀) + c(ω − ω₀). So do those
-    of its admittance, which rises where it ends in a capacitor."""
-    f = frequencies[(frequencies >= frequencies[-1] / _TOP) & (frequencies > 2 * rated_hz)]
+    of its admittance, which rises where it ends in a capacitor. Where neither rises so, as behind a damped capacitor,
+    control may hide the relation: there only one that is met closely tells."""
+    forms, seen = (np.linalg.pinv(values), values), 1.0
+    for Z, most in zip(forms, (np.inf, _CLEAR), strict=True):
+        coil, part, unlike = _turning(frequencies, Z, rated_hz, frequencies[-1] / _TOP)
+        if _COIL < coil < 1 / _COIL:
+            seen = part if unlike < most else 1.0
+            break
+    bands = [[_turning(frequencies, Z, rated_hz, frequencies[-1] / top)[1:] for Z in forms] for top in _TOPS]
+    met, opposite = (
+        min(math.sqrt(math.prod(math.hypot(part - sign, unlike) for part, unlike in band)) for band in bands) < _SURE
+        for sign in (1, -1)
+    )
+    return -1.0 if opposite else 1.0 if met and seen < _OTHER_AXIS else seen
+
+
+def _turning(frequencies: Numbers, Z: Vector, rated_hz: float, start: float) -> tuple[float, float, float]:
+    """Likeness to a coil from a frequency on, the rated frequency that is seen, and by what part the relation fails."""
+    f = frequencies[(frequencies >= start) & (frequencies > 2 * rated_hz)]
     f = f[f <= frequencies[-1] - rated_hz]
-    for Z, most in ((np.linalg.pinv(values), np.inf), (values, _CLEAR)) if len(f) >= _FEW else ():
-        along, cross = (Z[:, 0, 0] + Z[:, 1, 1]) / 2, 0.5j * (Z[:, 1, 0] - Z[:, 0, 1])
-        a, c = ([np.interp(f + k * rated_hz, frequencies, x) for k in (-1, 1)] for x in (along, cross))
-        size = a[0] + a[1] + 1e-300
-        rises, turns = (a[1] - a[0]) / size, (c[1] + c[0]) / size
-        coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
-        if _COIL < np.median(coil.real) < 1 / _COIL:
-            seen = float(np.vdot(rises, turns).real / np.vdot(rises, rises).real)
-            unlike = np.linalg.norm(turns - seen * rises) / np.linalg.norm(rises)
-            return seen if unlike < most else 1.0
-    return 1.0
+    if len(f) < _FEW:
+        return 0.0, 1.0, np.inf
+    along, cross = (Z[:, 0, 0] + Z[:, 1, 1]) / 2, 0.5j * (Z[:, 1, 0] - Z[:, 0, 1])
+    a, c = ([np.interp(f + k * rated_hz, frequencies, x) for k in (-1, 1)] for x in (along, cross))
+    size = a[0] + a[1] + 1e-300
+    rises, turns = (a[1] - a[0]) / size, (c[1] + c[0]) / size
+    coil = rises * f / rated_hz  # 1 of an inductance, 0 of a resistance
+    seen = float(np.vdot(rises, turns).real / (np.vdot(rises, rises).real + 1e-300))
+    unlike = np.linalg.norm(turns - seen * rises) / (np.linalg.norm(rises) + 1e-150)
+    return float(np.median(coil.real)), seen, float(unlike)
 
 
 def is_active(scan: Scan) -> bool:

@@ -7,9 +7,9 @@ import pytest
 
 from orchestrator.errors import InputError
 from orchestrator.immittance import scan_files
-from orchestrator.immittance.scan import PortPoint, Scan, check_sign, other_q_axis
+from orchestrator.immittance.scan import PortPoint, Scan, check_sign, in_own_form, other_q_axis
 from orchestrator.immittance.scan_files import read_scan, write_ztool
-from tests.immittance.plants import Line, constant_power
+from tests.immittance.plants import Line, constant_power, random_plant
 
 F = np.geomspace(1, 500, 120)
 NO_CROSS = "were dq and qd left at 0, or has one the wrong sign? They show no reactance where dd and qq do"
@@ -139,6 +139,27 @@ def test_the_axes_are_known_of_a_device_that_ends_in_a_capacitor(tmp_path):
     write_ztool(Scan("filter", 2 * np.pi * f, Y, ("P",)), tmp_path / "radians.txt")
     with pytest.raises(InputError, match="are its frequencies in rad/s"):
         read_scan(tmp_path / "radians.txt", 50.0)
+
+
+def test_the_axes_are_known_of_a_device_whose_capacitor_is_damped(tmp_path):
+    """From 280 Hz on its admittance is flat: neither it nor the impedance rises as a coil's."""
+    f, eye, J = np.geomspace(1, 1500, 300), np.eye(2), np.array([[0, -1], [1, 0]])
+    capacitor = 0.557 * (1j * f[:, None, None] / 50 * eye + J)
+    lag = 1 + 2j * np.pi * f[:, None, None] * 0.005
+    Y = np.array([[1.092, 0.506], [0.506, -1.092]]) / lag + 0.18 * eye
+    Y = Y + np.linalg.inv(0.322 * eye + np.linalg.inv(capacitor))
+    write_ztool(Scan("filter", f, Y, ("P",)), tmp_path / "right.txt")
+    assert not read_scan(tmp_path / "right.txt", 50.0).questions
+    write_ztool(Scan("filter", f, other_q_axis(Y), ("P",)), tmp_path / "wrong.txt")
+    with pytest.raises(InputError, match="q axis leads the d axis"):
+        read_scan(tmp_path / "wrong.txt", 50.0)
+
+
+def test_fast_control_in_its_own_frame_is_not_taken_for_another_axis():
+    rng, f = np.random.default_rng(5), np.geomspace(1, 1500, 200)
+    for _ in range(40):
+        values = random_plant(rng).admittance(f)
+        assert (in_own_form("a", f, values, 50.0, q_leads=True)[0] == values).all()
 
 
 def test_alpha_beta_impedances_are_those_of_the_sequences(tmp_path):
