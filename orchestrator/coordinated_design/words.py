@@ -40,9 +40,8 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
 def _no_margin(thin: float | None, wanted: float) -> str:
     if thin is None:
         return ""
-    if thin < wanted:
-        return f"; no margin: {100 * thin:.2f} % with gains of × {MORE:g}"
-    return f"; no margin: with gains of × {MORE:g} another mode falls below its least damping, or the system grows"
+    why = f"{100 * thin:.2f} %" if thin < wanted else "another mode below its least damping, or growth,"
+    return f"; no margin: {why} with gains of × {MORE:g}"
 
 
 def _cannot_be_had(verdict: PointsVerdict, worst: float) -> str:

@@ -6,11 +6,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-_WRITTEN = ("out", "html", "save", "scan", "junit")
-"""Options that name what is written."""
-
-_BESIDE = {".toml": (".csv", ".json"), ".cfg": (".dat",)}
-"""Endings of files that are written beside one: of a design over points, and of a recording."""
+_WRITTEN = ("out", "html", "save", "scan", "junit")  # options that name what is written
+_BESIDE = {".toml": (".csv", ".json"), ".cfg": (".dat",)}  # endings of what is written beside a file
 
 said: list[Callable[[], dict[str, Any]]] = []
 """The ``command`` in force, with the hashes of the ``code`` and of the ``inputs``; from Python without a command."""
@@ -29,7 +26,8 @@ def written(options: Mapping[str, Any]) -> Iterator[Path]:
 def files_read(options: Mapping[str, Any]) -> dict[str, Path]:
     """Files that options name to be read, and those that the TOML files among them name."""
     found = {}
-    for text in _texts([value for name, value in options.items() if name not in _WRITTEN]):
+    given = (value for name, value in options.items() if name not in _WRITTEN)
+    for text in (str(one) for value in given for one in (value if isinstance(value, list) else [value])):
         for path in (Path(text), Path(text.rpartition("=")[2])):
             with suppress(OSError, ValueError):
                 if path.is_file():
@@ -37,14 +35,6 @@ def files_read(options: Mapping[str, Any]) -> dict[str, Path]:
                     if path.suffix == ".toml":
                         found |= files_named(path.read_text(encoding="utf-8", errors="replace"), path.parent)
     return found
-
-
-def _texts(value: Any) -> Iterator[str]:
-    if isinstance(value, str | Path):
-        yield str(value)
-    elif isinstance(value, list | tuple):
-        for one in value:
-            yield from _texts(one)
 
 
 def files_named(text: str, home: Path) -> dict[str, Path]:
