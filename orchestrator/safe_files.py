@@ -9,9 +9,7 @@ from pathlib import Path
 
 from orchestrator.errors import InputError, ResultsError
 
-inputs: set[Path] = set()
-"""Real paths of the files that the command in force reads; nothing is written over them."""
-
+inputs: set[Path] = set()  # real paths of the files that the command in force reads
 PARTIAL = ".part-"  # begins the names of files that are not finished, and stands in those of folders that are not
 
 

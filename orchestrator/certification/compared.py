@@ -65,9 +65,7 @@ def said_of(difference: float, tolerance: float) -> str:
 
 WRITTEN_LAST = ("made", "files", "seal")
 
-WORDS = frozenset(("norm", "title", "clause", "source", "date", "readings"))
-"""Entries that another version has in other words."""
-
+WORDS = frozenset(("norm", "title", "clause", "source", "date", "readings"))  # another version has others
 TAKEN = frozenset(("tool", "environment", "details", "parameters", "file", "binding", "again", "reason"))
 """Entries that cannot be had anew; beside those that are written last."""
 
