@@ -9,6 +9,7 @@ from pathlib import Path
 
 from orchestrator.errors import InputError, ResultsError
 
+inputs: set[Path] = set()  # real paths of the files that the command in force reads
 PARTIAL = ".part-"  # begins the names of files that are not finished, and stands in those of folders that are not
 
 
@@ -30,9 +31,15 @@ def made_folder(given: str | Path, label: str = "", what: str = "results cannot 
     return path
 
 
+def spare_input(path: Path) -> None:
+    if inputs and path.resolve() in inputs:
+        raise InputError(f"{path}: the command reads this file and would write over it; choose another place by --out")
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A path to write to; the file there gets the name ``path`` at the end, or is removed if something fails."""
+    spare_input(path)
     partial = path.with_name(f"{PARTIAL}{os.getpid()}-{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

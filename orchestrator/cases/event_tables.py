@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from fmus.grid.names import lines_among
+from fmus.grid.network import Network
 from orchestrator.cases import schema
 from orchestrator.cases.assignment import convert_value
 from orchestrator.cases.draft import Draft, Findings
@@ -38,7 +39,8 @@ def scenario_events(draft: Draft, clock: Clock | None, stop: float) -> tuple[Eve
             _note_late(draft, table.time, stop, where)
             draft.found.not_reached.append(table.time)
         else:
-            draft.found.questions += [Problem(where, text) for text in _endless(table, stop)]
+            asked = (*_endless(table, stop), *_elsewhere(table, draft.network))
+            draft.found.questions += [Problem(where, text) for text in asked]
         for event in _all_events_of(draft, table, clock, stop, where):
             checked = event if isinstance(event, coupled.Fault) else _checked(draft, event, fed, where)
             if checked is not None and _is_point(draft, clock, event.time, "the event", where):
@@ -99,6 +101,14 @@ def _endless(table: schema.EventTable, stop: float) -> Iterator[str]:
         yield f"reclose_after = {reclose:g} s: the line recloses only after the run, which stops at {stop:g} s"
 
 
+def _elsewhere(table: schema.EventTable, network: Network | None) -> Iterator[str]:
+    if isinstance(table, schema.BusFaultTable) and table.cleared_by is not None and network is not None:
+        ends = {line.name: (line.from_bus, line.to_bus) for line in network.lines}.get(table.cleared_by, ())
+        if ends and table.bus not in ends:
+            text = f"{table.cleared_by} opens for a fault at {table.bus}, but it joins {' and '.join(ends)}"
+            yield f"{text}: the fault goes away though nothing that leads to it opens; is another line meant?"
+
+
 def _all_events_of(draft: Draft, table: schema.EventTable, clock: Clock, stop: float, where: str) -> list[Event]:
     if isinstance(table, schema.WireEventTable):
         return wire_events(draft, table, clock, stop, where)
@@ -131,7 +141,11 @@ def _events_of(draft: Draft, table: schema.SettingEventTable, where: str) -> lis
 def forcing_events(draft: Draft, table: schema.ForcingTable, clock: Clock, stop: float, where: str) -> list[Event]:
     plan = draft.system.components.get(table.component)
     if plan is None:
-        if table.component not in draft.given.scenario.remove:
+        if table.component in draft.given.scenario.remove:
+            if table.place:
+                text = f"{table.place} cannot act: the scenario has no {table.component}"
+                draft.found.questions.append(Problem("", text))
+        else:
             names = list(draft.system.components)
             known = close_names(table.component, names, f"the case has: {', '.join(draft.tables)}")
             draft.note(where, f"there is no component {table.component!r}; {known}")

@@ -65,11 +65,9 @@ def said_of(difference: float, tolerance: float) -> str:
 
 WRITTEN_LAST = ("made", "files", "seal")
 
-TAKEN = frozenset(
-    ("tool", "environment", "details", "parameters", "file", "binding", "again", "reason",
-     "norm", "title", "clause", "source", "date", "readings")
-)  # fmt: skip
-"""Entries that cannot be had anew, or that another version has in other words; beside those that are written last."""
+WORDS = frozenset(("norm", "title", "clause", "source", "date", "readings"))  # another version has others
+TAKEN = frozenset(("tool", "environment", "details", "parameters", "file", "binding", "again", "reason"))
+"""Entries that cannot be had anew; beside those that are written last."""
 
 _SAME, _SAME_IN_SIGNAL = 1e-9, 1e-5
 """Largest relative difference of a figure that comes out anew; of a mode that is found in a signal."""
@@ -80,9 +78,10 @@ _SHOWN = 200  # characters of a value that are shown
 
 def faults_of(stated: Mapping[str, Any], again: Mapping[str, Any]) -> Iterator[str]:
     """Sentences on what is stated and does not come out; rows are compared by their names."""
+    taken = TAKEN if _of_one_program(stated, again) else TAKEN | WORDS
     rows = "points" if "points" in again else "rows"
     whole = [{k: v for k, v in c.items() if k not in (rows, *WRITTEN_LAST)} for c in (stated, again)]
-    for place, text in differences(whole[0], whole[1]):
+    for place, text in differences(whole[0], whole[1], taken):
         yield f"{place!r} {text}"
     named = [{_name(row): row for row in content[rows]} for content in (stated, again)]
     listed = [_name(row) for row in stated[rows]]
@@ -93,7 +92,7 @@ def faults_of(stated: Mapping[str, Any], again: Mapping[str, Any]) -> Iterator[s
     )
     yield from (f"{what}: {', '.join(dict.fromkeys(names))}" for what, names in compared if names)
     for name in (name for name in named[0] if name in named[1]):
-        for place, text in differences(named[0][name], named[1][name]):
+        for place, text in differences(named[0][name], named[1][name], taken):
             yield f"{name}: its response and figures come to other findings: {place!r} {text}"
 
 
@@ -101,9 +100,14 @@ def _name(row: Mapping[str, Any]) -> str:
     return f"row {row['row']}" if "row" in row else f"X_L = {row['X_L']:g} pu"
 
 
-def differences(stated: Any, again: Any, tolerance: float = _SAME) -> Iterator[tuple[str, str]]:
+def _of_one_program(*records: Content) -> bool:
+    one, other = ([(r.get("environment") or {}).get(key) for key in ("gfor-cosim", "Commit")] for r in records)
+    return one == other and None not in one
+
+
+def differences(stated: Any, again: Any, taken: frozenset[str], tolerance: float = _SAME) -> Iterator[tuple[str, str]]:
     if isinstance(stated, dict) and isinstance(again, dict):
-        keys = [k for k in (*again, *stated) if not (k in TAKEN and k in again)]
+        keys = [k for k in (*again, *stated) if not (k in taken and k in again)]
         pairs = {k: (stated.get(k, _NOTHING), again.get(k, _NOTHING)) for k in keys}
     elif isinstance(stated, list) and isinstance(again, list) and len(stated) == len(again):
         pairs = {str(k): pair for k, pair in enumerate(zip(stated, again, strict=True))}
@@ -112,7 +116,7 @@ def differences(stated: Any, again: Any, tolerance: float = _SAME) -> Iterator[t
             yield "", f"is {_text(stated)}, and {_text(again)} comes out"
         return
     for key, pair in pairs.items():
-        for place, text in differences(*pair, _SAME_IN_SIGNAL if key == "modal" else tolerance):
+        for place, text in differences(*pair, taken, _SAME_IN_SIGNAL if key == "modal" else tolerance):
             yield f"{key}.{place}" if place else key, text
 
 

@@ -4,7 +4,7 @@ import argparse
 import codecs
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from io import TextIOWrapper
 from itertools import pairwise
@@ -18,6 +18,7 @@ from orchestrator.errors import INTERRUPTED, TERMINATED, CosimError, InputError
 from orchestrator.fmi.interrupts import calls
 from orchestrator.late import import_xarray_alone
 from orchestrator.results import origin
+from orchestrator.safe_files import inputs, spare_input
 from orchestrator.spelling import as_options
 
 _ESCAPE = "gfor_escape"
@@ -44,8 +45,6 @@ OLD = {
 """Spellings before 0.3, which work until 1.0, with today's."""
 
 _MODULES = {new: old for old, new in OLD.items()}  # a command in a group has the module of its old name
-
-_LONGEST_PATH = 200
 
 _READERS = ("signal compare", "signal identify", "signal source", "verify")
 """Commands that read recordings, with xarray, and hand no array of theirs to dask or pint."""
@@ -85,12 +84,18 @@ def _done(words: Sequence[str]) -> int:
         with calls:  # libraries take an interrupt in their import for an error of their own
             parser = _parser(_command_in(words))
         options = parser.parse_args(words)
-        origin.said[:] = [lambda: _origin(words)]
+        files = origin.files_read(vars(options))
+        origin.said[:] = [lambda: _origin(words, files)]
+        inputs.update(path.resolve() for path in files.values())
+        for path in origin.written(vars(options)):
+            spare_input(path)
         return int(options.command(options))
     except (CosimError, SetupError, OSError) as error:
         if is_interrupt(error):
             raise
         return _failed(error)
+    finally:
+        inputs.clear()
 
 
 def _spelt_today(words: Sequence[str]) -> list[str]:
@@ -107,21 +112,15 @@ def _command_in(words: Sequence[str]) -> str | None:
     return next((name for name in (" ".join(named), *named[:1]) if name in COMMANDS), None)
 
 
-def _origin(words: Sequence[str]) -> dict[str, Any]:
+def _origin(words: Sequence[str], files: Mapping[str, Path]) -> dict[str, Any]:
     from orchestrator.points.code import code_hash  # noqa: PLC0415 - only where results are written
-    from orchestrator.points.key import files_named, sha256_of  # noqa: PLC0415 - likewise
+    from orchestrator.points.key import sha256_of  # noqa: PLC0415 - likewise
     from orchestrator.results.manifest import inputs_behind  # noqa: PLC0415 - likewise
 
-    inputs = dict[str, str]()
-    given = (word for before, word in pairwise(["", *words]) if before not in ("--out", "--html"))
-    for path in (Path(word) for word in given if len(word) < _LONGEST_PATH and Path(word).exists()):
-        if path.is_file():
-            inputs[str(path)] = sha256_of(path)
-        if path.suffix == ".toml":
-            inputs |= files_named(path.read_text(encoding="utf-8", errors="replace"), path.parent)
-        else:
-            inputs |= {f"{path}/{name}": of for name, of in inputs_behind(path).items()}
-    return {"command": shlex.join(["gfor", *words]), "code": code_hash(), "inputs": inputs}
+    hashes = {name: sha256_of(path) for name, path in files.items()}
+    for path in (word for before, word in pairwise(["", *words]) if before.removeprefix("--") not in origin.WRITTEN):
+        hashes |= {f"{path}/{name}": of for name, of in inputs_behind(Path(path)).items()}
+    return {"command": shlex.join(["gfor", *words]), "code": code_hash(), "inputs": hashes}
 
 
 def _failed(error: CosimError | SetupError | OSError) -> int:

@@ -133,6 +133,8 @@ def _writable(out: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         existed = path.exists()
+        if existed and path.is_file() and "[set]" not in (path.read_text("utf-8", "replace") or "[set]"):
+            raise InputError(f"--out {path}: another file is there, not a parameter file; choose another place")
         path.open("a", encoding="utf-8").close()
         if not existed:
             path.unlink()

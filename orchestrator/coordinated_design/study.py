@@ -217,7 +217,7 @@ def design_over_points(
     if wanted is not None and reached:
         found = search.with_least_gain(found, wanted + _SPARE)
         more = search.tried(found.x * np.tile([1.0, 1.0, MORE], len(plan.groups))).worth
-        thin = None if more.worst >= wanted else more.worst
+        thin = None if more.worst >= wanted and more.allowed else more.worst
     settings = tuple(space.group_settings(found.x))
     stage("operating points with the controllers")
     then = replace(work, report=lambda n, of: work.report(of + n, 2 * of))

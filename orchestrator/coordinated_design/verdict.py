@@ -152,7 +152,7 @@ class PointsVerdict:
     ``wanted``: damping ratio that is wanted everywhere; None for the best that there is.
     ``largest``: the largest gain that the search was allowed [pu].
     ``compared``: number of settings of an exhaustive grid none of which was better; 0 without one.
-    ``thin``: the least damping ratio with `MORE` of the gains, where that is less than wanted; else None."""
+    ``thin``: least damping ratio with `MORE` of the gains, where that is too much for it or other modes; else None."""
 
     def __init__(
         self, points: Sequence[JudgedPoint], wanted: float | None, largest: float = 0.0, compared: int = 0,

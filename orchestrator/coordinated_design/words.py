@@ -26,8 +26,7 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
     aim = "" if wanted is None else f"{100 * wanted:g} % at all {total} points and outages"
     if verdict.met:
         if wanted is not None:
-            thin = f"; no margin: {100 * verdict.thin:.2f} % with gains of × {MORE:g}" if verdict.thin else ""
-            return VerdictSentence(True, "REACHED", f"{aim}{tail}{thin}")
+            return VerdictSentence(True, "REACHED", f"{aim}{tail}{_no_margin(verdict.thin, wanted)}")
         return VerdictSentence(True, "better", f"at all {total} points and outages{tail}")
     reasons = _reasons(verdict)
     if verdict.met is None:
@@ -36,6 +35,13 @@ def verdict_of(verdict: PointsVerdict) -> VerdictSentence:
     short = wanted is not None and worst is not None and worst < wanted
     beyond = f"; {_cannot_be_had(verdict, worst)}" if short and worst is not None and not verdict.astray else ""
     return VerdictSentence(False, word, f"{', '.join([aim] * bool(aim) + reasons)}{beyond}{tail}")
+
+
+def _no_margin(thin: float | None, wanted: float) -> str:
+    if thin is None:
+        return ""
+    why = f"{100 * thin:.2f} %" if thin < wanted else "another mode below its least damping, or growth,"
+    return f"; no margin: {why} with gains of × {MORE:g}"
 
 
 def _cannot_be_had(verdict: PointsVerdict, worst: float) -> str:

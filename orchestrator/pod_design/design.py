@@ -23,7 +23,7 @@ from orchestrator.errors import AnalysisError, InputError
 from orchestrator.pod_design import lead_lag as leads
 from orchestrator.pod_design.closed_loop import Placed, PodLoop, PodSetting, figures_of
 from orchestrator.pod_design.guard import Naming, Surroundings, breach, surroundings
-from orchestrator.pod_design.margins import LARGER_GAIN, Margins, compute_margins
+from orchestrator.pod_design.margins import LARGER_GAIN, VARIATION, Margins, compute_margins
 from orchestrator.pod_design.refinement import Judgement, Refinement, refine, sweep
 from orchestrator.pod_design.target import (
     CRITICAL,
@@ -145,6 +145,9 @@ class PodDesign:
     after: Surroundings
     broken: str | None  # the prohibited effect of the final setting on other modes; empty if there is no such effect
     margins: Margins | None
+    spoilt: (
+        str | None
+    )  # what `LARGER_GAIN` does to other modes, as ``broken``; None where it does not, or without margins
     # examined_before, examined: verdict over the whole spectrum without the controller and with the final setting.
     examined_before: Examination
     examined: Examination
@@ -335,17 +338,20 @@ def _design(start: _Start, loop: PodLoop, report: StageReport) -> PodDesign:
         report("other gains")
         with suppress(AnalysisError):  # the mode cannot be followed
             other_gain = sweep(loop, off, filters, required, request.bounds(search=False), "as designed").chosen
-    margins = None
+    margins = spoilt = None
     if request.margins and final.setting.gain and examined.stability.stable is not False:
         report("margins")
         margins = compute_margins(loop, off, final, request.least_damping)
+        with suppress(AnalysisError):  # the mode cannot be followed
+            more = loop.place(off, (1 + VARIATION) * final.setting.gain, final.setting.filters)
+            spoilt = breach(before, around(more), request.least_damping)
     return PodDesign(
         request=request, case=start.case, target=start.target, prepared=start.prepared, mode_name=start.mode_name,
         initial=initial, required_damping=required, predicted=predicted,
         sensitivities=GainSensitivities(bare.eigenvalue, S, S_turned), filters=filters,
         gain_non_compensated=gains[0], gain_compensated=gains[1], gain=gain, designed=designed, refinement=refinement,
         other_gain=other_gain, final=final, before=before, after=after,
-        broken=broken or _unstable(examined.stability), margins=margins,
+        broken=broken or _unstable(examined.stability), margins=margins, spoilt=spoilt,
         examined_before=start.examined, examined=examined,
     )  # fmt: skip
 

@@ -174,6 +174,8 @@ def verdict(d: PodDesign) -> str:
                 f"; no margin: {percent(d.achieved_damping)} at K = {d.final.setting.gain:.4g} pu, and "
                 f"{percent(d.thin_margin)} at {LARGER_GAIN}"
             )
+        if d.met and d.spoilt:
+            text += f"; no margin: at {LARGER_GAIN} {d.spoilt}"
         if not d.refinement and d.active_bound == "lower":
             text += (
                 f"; the lower bound of the gain is active, {d.unbounded_gain:.4g} pu were computed before it: "

@@ -3,9 +3,7 @@ worker refuses a changed case or changed code."""
 
 import hashlib
 import json
-import re
 from collections.abc import Mapping
-from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -74,16 +72,6 @@ def same_case(reference: str, wanted: str, trust_fmus: bool = False) -> Case:
             "and on a cluster give all machines the same files"
         )
     return case
-
-
-def files_named(text: str, home: Path) -> dict[str, str]:
-    """SHA-256 of the files that a text names in quotes, as a case does."""
-    found = {}
-    for name in re.findall(r"""["']([^"'\n]{1,200})["']""", text):
-        with suppress(OSError, ValueError):
-            if (path := home / name).is_file():
-                found[name] = sha256_of(path)
-    return found
 
 
 def sha256_of(path: Path) -> str:

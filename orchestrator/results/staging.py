@@ -11,7 +11,7 @@ from shutil import rmtree
 from orchestrator.errors import InputError
 from orchestrator.results.manifest import MANIFEST, Manifest, read_manifest, write_manifest
 from orchestrator.results.recording import ENDED_EARLY
-from orchestrator.safe_files import PARTIAL, flush, not_written
+from orchestrator.safe_files import PARTIAL, flush, not_written, spare_input
 
 _OLD = ".old-"
 _DONE_WITH = ".done-with"
@@ -127,6 +127,7 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
         names = _files(path)
         write_manifest(path, run, names, scenarios, _readable(folder))
         for name in [*names, MANIFEST]:
+            spare_input(folder / name)
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(path / name, folder / name)
         flush(folder)

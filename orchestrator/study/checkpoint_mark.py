@@ -17,7 +17,8 @@ from orchestrator.cases.locate import place_in
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import few
 from orchestrator.points.code import code_hash, library_versions
-from orchestrator.points.key import component_content, files_named, sha256_of
+from orchestrator.points.key import component_content, sha256_of
+from orchestrator.results.origin import files_named
 
 Keys = tuple[str, ...]
 
@@ -57,7 +58,8 @@ def mark_of(prepared: PreparedScenario) -> dict[str, str]:
 def computed(prepared: PreparedScenario) -> dict[str, str]:
     """When and from what a run was computed: date, hash of the code, and hashes of the case's text and of all files."""
     case, fmus = prepared.case, {plan.description.path for plan in prepared.system.components.values()}
-    files = files_named(case.text, case.directory) | {p.name: sha256_of(p) for p in sorted(fmus) if p.is_file()}
+    paths = files_named(case.text, case.directory) | {path.name: path for path in sorted(fmus) if path.is_file()}
+    files = {name: sha256_of(path) for name, path in paths.items()}
     inputs = {case.path.name: hashlib.sha256(case.text.encode()).hexdigest(), **files}
     return {"date": f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", "code": code_hash(), "inputs": json.dumps(inputs)}
 

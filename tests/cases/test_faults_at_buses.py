@@ -34,6 +34,14 @@ def test_a_fault_begins_ends_and_its_line_opens(tmp_path):
     assert after["grid.b3.v"] < 1.5
 
 
+@pytest.mark.parametrize(("line", "asked"), [("l12", True), ("l23", False), ("l31", False)])
+def test_a_line_elsewhere_that_clears_a_fault_is_asked_about(tmp_path, line, asked):
+    ready = prepared(tmp_path, FAULT + f'duration = "50 ms"\ncleared_by = "{line}"\n')
+    said = [str(q) for q in ready.questions if "is another line meant?" in str(q)]
+    assert bool(said) is asked
+    assert all("l12 opens for a fault at b3, but it joins b1 and b2" in text for text in said)
+
+
 def test_a_fault_without_an_end_stays(tmp_path):
     ready = prepared(tmp_path, FAULT)
     assert len(ready.events) == 1

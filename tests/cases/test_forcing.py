@@ -72,6 +72,13 @@ def test_what_cannot_be_forced_is_told_with_the_words_of_the_command(force, said
     assert "--force" in str(error.value)
 
 
+def test_a_unit_that_only_another_scenario_has_is_asked_about():
+    case = gfor.load("two_area_rms")
+    asked = {name: case.scenario(name, force="gfor 0.6 Hz 2 %").prepared.questions for name in ("base", "gfor")}
+    assert [str(q) for q in asked["base"]] == ["--force 'gfor 0.6 Hz 2 %' cannot act: the scenario has no gfor"]
+    assert not asked["gfor"]
+
+
 def test_two_forcings_of_one_reference_are_refused():
     with pytest.raises(CaseError, match="is set at 1 s by"):
         gfor.load("two_area_rms").scenario("gfor", force=["sg1 0.8 Hz 2 %", "sg1 0.9 Hz 2 %"])

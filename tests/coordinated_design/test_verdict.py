@@ -55,9 +55,10 @@ def test_a_mode_that_gained_two_points_of_damping_was_moved(after, unmoved):
     assert ("which these controllers hardly move" in verdict_sentence(found)) is unmoved
 
 
-@pytest.mark.parametrize("thin", [None, 0.0957])
+@pytest.mark.parametrize("thin", [None, 0.0957, 0.12])
 def test_a_setting_that_more_gain_spoils_has_no_margin(thin):
     points = list(judged(WHERE, [modes((1.0, 0.05))], [modes((1.0, 0.1001))], Aim((), 0.05), {}))
     said = verdict_sentence(PointsVerdict(points, 0.1, thin=thin))
     assert said.startswith("REACHED: 10 %")
-    assert ("; no margin: 9.57 % with gains of × 1.2" in said) is (thin is not None)
+    assert ("; no margin: 9.57 % with gains of × 1.2" in said) is (thin == 0.0957)
+    assert ("; no margin: another mode below its least damping" in said) is (thin == 0.12)

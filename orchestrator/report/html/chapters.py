@@ -192,6 +192,8 @@ def _design(file: Path, c: Content) -> Chapter:
     )
     if thin := c.get("thin_margin_damping_ratio"):
         answer += f"; no margin: {100 * thin:.2f} % with 20 % more gain"
+    if c["met"] and (spoilt := c.get("larger_gain_spoils")):
+        answer += f"; no margin: with 20 % more gain {spoilt}"
     sure = f"closed loop of the coupled FMUs: {c['verdict']}"
     modes = {word: [c[f"{which}_mode"]] for word, which in _DESIGNED.items()}
     content = _map("The mode that was designed for", modes) + studies.design(dict(c))
