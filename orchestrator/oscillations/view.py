@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.cases.given import Time, moment
+from orchestrator.cases.given import Time, part_of_record
 from orchestrator.errors import CosimError
 from orchestrator.late import pd, xr
 from orchestrator.oscillations.measurements import Measurements
@@ -77,7 +77,7 @@ def sources_of(
     dataset: xr.Dataset, label: str, start: Time | None, stop: Time | None, prepared: PreparedScenario | None = None
 ) -> Sources:
     """The oscillations of a part of a record, beside the units' models in a scenario or in its own built-in case."""
-    begin, end = (None if t is None else moment(t, name) for t, name in ((start, "start"), (stop, "stop")))
+    begin, end = part_of_record(dataset["time"].values, start, stop, label)
     measured, models = measurements_of(dataset.sel(time=slice(begin, end)), label), None
     if prepared is not None or "case_file" in dataset.attrs:
         from orchestrator.oscillations import unit_models as own  # noqa: PLC0415 - only where there is a case
