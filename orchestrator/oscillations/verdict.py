@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
+from orchestrator.oscillations.close_lines import close_lines, most_explained, skirt
 from orchestrator.oscillations.detection import Signals, SpectralLine, envelope, find_oscillations, phasors, signals_of
 from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, felt_beyond, opinions
 from orchestrator.oscillations.measurements import Measurements
@@ -57,9 +57,10 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     periods = len(t) * step * f
     if periods < _FEWEST_PERIODS:
         return Evidence("not known", 0.0, 0.0, 0.0, 0.0, 0.0, periods, False, (f"only {periods:.1f} periods are seen",))
-    seen = []
+    seen, envelopes = [], []
     for k in columns:
         z, half = envelope(t, signals.values[used, k], f)
+        envelopes.append((t[half : len(t) - half], z, signals.values[used, k]))
         size, late = np.abs(z), t[half : len(t) - half]
         slope, level = np.polyfit(late - late.mean(), np.log(np.maximum(size, 1e-300)), 1)
         trend = np.exp(level + slope * (late - late.mean()))
@@ -70,12 +71,17 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         spread = size.std() / size.mean()
         pair = _pair(late, z) if spread > _RESTLESS else 0.0
         seen.append([spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair])
-    skirt = float(np.median([_skirt(t, signals.values[used, k], f) for k in columns]))
+    beside = float(np.median([skirt(t, signals.values[used, k], [f]) for k in columns]))
     spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
     disturbed = _disturbed(signals, found)
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
-    figures = Evidence("not known", damping, spread, kurtosis, coherence, skirt, periods, disturbed, ())
+    figures = Evidence("not known", damping, spread, kurtosis, coherence, beside, periods, disturbed, ())
     kind, reasons = _judged(figures, change, pair, found)
+    if kind == "mode":
+        lines = [close for one in envelopes if (close := close_lines(*one, t, f))]
+        if 2 * len(lines) > len(columns):
+            said = ", ".join(f"{x:.3f}" for x in lines[0])
+            kind, reasons = "not known", [f"steady sines at close frequencies ({said} Hz) would explain it as well"]
     return replace(figures, kind=kind, reasons=tuple(reasons))
 
 
@@ -113,28 +119,10 @@ def _judged(seen: Evidence, change: float, pair: float, found: SpectralLine) -> 
 
 
 def _pair(times: Numbers, z: Numbers) -> float:
-    """Part of the power of a complex envelope that the best of many pairs of sines explains, up to three widths off."""
+    """Part of the power of a complex envelope that the best of many pairs of sines explains, up to two widths off."""
     t = (times - times[0]) / (times[-1] - times[0])
     some = np.unique(np.linspace(0, len(t) - 1, 64).astype(int))
-    waves = np.exp(2j * np.pi * np.outer(t[some], np.arange(-2, 2.01, 0.125)))
-    power, best = float((np.abs(z[some]) ** 2).sum()), 0.0
-    for one, other in combinations(waves.T, 2):
-        pair = np.column_stack([one, other])
-        best = max(best, float((np.abs(pair @ np.linalg.lstsq(pair, z[some], rcond=None)[0]) ** 2).sum()))
-    return best / power
-
-
-def _skirt(times: Numbers, values: Numbers, frequency: float) -> float:
-    """Mean power beside a line that is taken away, within five widths of it, as a multiple of that further off."""
-    amplitude = phasors(times, values[:, None], [frequency])[0]
-    rest = values - np.real(amplitude * np.exp(2j * np.pi * frequency * times))
-    line = np.polyfit(times - times.mean(), rest, 2)
-    rest = (rest - np.polyval(line, times - times.mean())) * np.hanning(len(rest))
-    power = np.abs(np.fft.rfft(rest)) ** 2
-    length = len(times) * float(times[1] - times[0])
-    apart = np.abs(np.fft.rfftfreq(len(rest), length / len(times)) - frequency) * length
-    near, far = (apart > 1.5) & (apart < 5), (apart > 8) & (apart < min(25.0, 0.5 * frequency * length))
-    return float(power[near].mean() / (power[far].mean() or 1e-300)) if near.any() and far.any() else 1.0
+    return most_explained(t[some], z[some], np.arange(-2, 2.01, 0.125), 2)[1]
 
 
 def _disturbed(signals: Signals, found: SpectralLine) -> bool:
