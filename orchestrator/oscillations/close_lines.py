@@ -1,6 +1,6 @@
 """Whether what looks like one mode is several steady sines whose frequencies a record hardly tells apart."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -18,6 +18,7 @@ more of a mode in noise that wanders, and 0.07 and more where they also leave no
 _SKIRT = 3.0  # power close beside the lines as a multiple of that further off: beside planted ones 0.6 to 1.1
 _NOTHING = 1e-4  # left by sines without noise, beside which a skirt is what the fit itself leaves
 _BETTER = 0.2  # of what one exponential leaves, from which on sines are the better account
+_ALIKE = 2.0  # times what two leave, up to which sines are as good a one: two modes that ring down leave far less
 
 
 def close_lines(times: Numbers, z: Numbers, values: Numbers, span: Numbers, frequency: float) -> list[float]:
@@ -27,7 +28,8 @@ def close_lines(times: Numbers, z: Numbers, values: Numbers, span: Numbers, freq
     length = float(times[-1] - times[0])
     some = np.unique(np.linspace(0, len(times) - 1, _SAMPLES).astype(int))
     t, z = (times[some] - times[0]) / length, z[some]
-    most = min(_LEFT, _BETTER * _exponential(t, z))
+    one, two = (_exponentials(t, z, _sines(t, z, count)[0]) for count in (1, 2))
+    most = min(_LEFT, _BETTER * one, max(_ALIKE * two, _NOTHING))
     for count in _COUNTS:
         offsets, left = _sines(t, z, count)
         lines = [frequency + float(x) / length for x in sorted(offsets)]
@@ -48,27 +50,29 @@ def most_explained(t: Numbers, z: Complex, offsets: Numbers, count: int) -> tupl
 
 
 def _sines(t: Numbers, z: Complex, count: int) -> tuple[Numbers, float]:
-    from scipy.optimize import minimize  # noqa: PLC0415 - slow to import
-
-    def left(offsets: Numbers) -> float:
-        waves = np.exp(2j * np.pi * np.outer(t, offsets))
-        rest = z - waves @ np.linalg.lstsq(waves, z, rcond=None)[0]
-        return float(np.vdot(rest, rest).real / np.vdot(z, z).real)
-
+    """Their frequencies, and the part of the power that they leave."""
     first, _ = most_explained(t, z, np.arange(-_REACH, _REACH + 0.01, 0.25), count)
-    best = minimize(left, first, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6, "maxiter": 300})
-    return best.x, float(best.fun)
+    return _fitted(lambda offsets: _left(t, z, 2j * np.pi * offsets), first)
 
 
-def _exponential(t: Numbers, z: Complex) -> float:
-    """Part of the power that the best exponential, decaying or growing, leaves."""
+def _exponentials(t: Numbers, z: Complex, offsets: Numbers) -> float:
+    """Part of the power that as many exponentials, which decay or grow, leave."""
+    n = len(offsets)
+    starts = [np.concatenate([np.full(n, rate), offsets]) for rate in (-1.0, 1.0)]
+    return min(_fitted(lambda x: _left(t, z, x[:n] + 2j * np.pi * x[n:]), start)[1] for start in starts)
+
+
+def _left(t: Numbers, z: Complex, rates: Complex) -> float:
+    waves = np.exp(np.outer(t, rates))
+    rest = z - waves @ np.linalg.lstsq(waves, z, rcond=None)[0]
+    return float(np.vdot(rest, rest).real / np.vdot(z, z).real)
+
+
+def _fitted(left: Callable[[Numbers], float], first: Numbers) -> tuple[Numbers, float]:
     from scipy.optimize import minimize  # noqa: PLC0415 - slow to import
 
-    def left(rate: Numbers) -> float:
-        wave = np.exp(rate[0] * (t - 0.5) + 2j * np.pi * rate[1] * t)
-        return float(1 - abs(np.vdot(wave, z)) ** 2 / (np.vdot(wave, wave).real * np.vdot(z, z).real))
-
-    return min(float(minimize(left, [start, 0.0], method="Nelder-Mead").fun) for start in (-1.0, 1.0))
+    best = minimize(left, first, method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6, "maxiter": 400})
+    return best.x, float(best.fun)
 
 
 def skirt(times: Numbers, values: Numbers, lines: Sequence[float]) -> float:
