@@ -60,7 +60,6 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     seen, envelopes = [], []
     for k in columns:
         z, half = envelope(t, signals.values[used, k], f)
-        envelopes.append((t[half : len(t) - half], z, signals.values[used, k]))
         size, late = np.abs(z), t[half : len(t) - half]
         slope, level = np.polyfit(late - late.mean(), np.log(np.maximum(size, 1e-300)), 1)
         trend = np.exp(level + slope * (late - late.mean()))
@@ -69,7 +68,16 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         wave = np.real(z * np.exp(2j * np.pi * f * late))
         kurtosis = (wave**4).mean() / (wave**2).mean() ** 2
         spread = size.std() / size.mean()
-        pair = _pair(late, z) if spread > _RESTLESS else 0.0
+        some = np.unique(np.linspace(0, len(z) - 1, 64).astype(int))
+        envelopes.append(
+            (
+                (late[some] - late[0]) / (late[-1] - late[0]),
+                z[some],
+                late,
+                signals.values[used, k][half : len(t) - half],
+            )
+        )
+        pair = most_explained(*envelopes[-1][:2], np.arange(-2, 2.01, 0.125), 2)[1] if spread > _RESTLESS else 0.0
         seen.append([spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair])
     beside = float(np.median([skirt(t, signals.values[used, k], [f]) for k in columns]))
     spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
@@ -78,7 +86,7 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     figures = Evidence("not known", damping, spread, kurtosis, coherence, beside, periods, disturbed, ())
     kind, reasons = _judged(figures, change, pair, found)
     if kind == "mode":
-        lines = [close for one in envelopes if (close := close_lines(*one, t, f))]
+        lines = [close for one in envelopes if (close := close_lines(*one, f))]
         if 2 * len(lines) > len(columns):
             said = ", ".join(f"{x:.3f}" for x in lines[0])
             kind, reasons = "not known", [f"steady sines at close frequencies ({said} Hz) would explain it as well"]
@@ -116,13 +124,6 @@ def _judged(seen: Evidence, change: float, pair: float, found: SpectralLine) -> 
     if restless and seen.kurtosis > _SINE and seen.coherence < 0.9:
         return "mode", [f"its amplitude and phase wander as noise makes them ({figures})"]
     return "not known", [f"neither steady nor restless: {figures}"]
-
-
-def _pair(times: Numbers, z: Numbers) -> float:
-    """Part of the power of a complex envelope that the best of many pairs of sines explains, up to two widths off."""
-    t = (times - times[0]) / (times[-1] - times[0])
-    some = np.unique(np.linspace(0, len(t) - 1, 64).astype(int))
-    return most_explained(t[some], z[some], np.arange(-2, 2.01, 0.125), 2)[1]
 
 
 def _disturbed(signals: Signals, found: SpectralLine) -> bool:
