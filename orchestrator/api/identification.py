@@ -62,8 +62,7 @@ def identify(
     window = curve.sel(time=slice(begin, end))
     require_numbers(window, signal, label)
     modes = strongest_modes(curve, begin, end)
-    times = window["time"].values
-    line = straight_line(times, window.values)
+    times, line = window["time"].values, straight_line(window["time"].values, window.values)
     return SignalModes(signal, float(times[0]), float(times[-1]), modes, sampling(times), line)
 
 

@@ -131,10 +131,9 @@ def part_of_record(times: Numbers, start: Any, stop: Any, label: str) -> tuple[f
     if begin >= last:
         raise InputError(f"start = {start!r}: the record of {label} ends at t = {last:g} s; give an earlier start")
     end = last if stop is None else moment(stop, "stop")
-    if end <= begin:
-        raise InputError(f"stop = {stop!r}: it must come after start = {start!r}; give a later stop")
-    if end <= first:
-        raise InputError(f"stop = {stop!r}: the record of {label} begins at t = {first:g} s; give a later stop")
+    if end <= max(begin, first):
+        after = f"the begin of {label}, t = {first:g} s" if begin <= first else f"start = {start!r}"
+        raise InputError(f"stop = {stop!r}: it must come after {after}; give a later stop")
     return begin, end
 
 

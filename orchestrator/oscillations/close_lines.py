@@ -48,8 +48,9 @@ def _fitted(t: Numbers, z: Vector, count: int, rates: Sequence[float] = ()) -> t
         return float(np.vdot(rest, rest).real / np.vdot(z, z).real)
 
     first, _ = most_explained(t, z, np.arange(-_REACH, _REACH + 0.01, 0.25), count)
-    options = {"xatol": 1e-3, "fatol": 1e-6, "maxiter": 400}
-    best = minimize(left, [*first, *rates], method="Nelder-Mead", options=options)
+    best = minimize(
+        left, [*first, *rates], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6, "maxiter": 400}
+    )
     return best.x[:count], float(best.fun)
 
 

@@ -51,8 +51,7 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     f, step = found.frequency, float(signals.times[1] - signals.times[0])
     settle = 0 if found.begin is None else round(2 / (f * step))
     used = slice(min(found.first + settle, found.last - 2), found.last)
-    names = list(found.amplitudes)[: min(found.clear or _STRONGEST, _STRONGEST)]
-    columns = [signals.names.index(name) for name in names]
+    columns = [*map(signals.names.index, [*found.amplitudes][: min(found.clear or _STRONGEST, _STRONGEST)])]
     t = signals.times[used]
     periods = len(t) * step * f
     if periods < _FEWEST_PERIODS:
@@ -68,22 +67,16 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         wave = np.real(z * np.exp(2j * np.pi * f * late))
         kurtosis = (wave**4).mean() / (wave**2).mean() ** 2
         spread = size.std() / size.mean()
-        some = np.unique(np.linspace(0, len(z) - 1, 64).astype(int))
-        envelopes.append(
-            (
-                (late[some] - late[0]) / (late[-1] - late[0]),
-                z[some],
-                late,
-                signals.values[used, k][half : len(t) - half],
-            )
-        )
+        some, span = np.unique(np.linspace(0, len(z) - 1, 64).astype(int)), late[-1] - late[0]
+        envelopes.append(((late[some] - late[0]) / span, z[some], late, signals.values[used, k][half : len(t) - half]))
         pair = most_explained(*envelopes[-1][:2], np.arange(-2, 2.01, 0.125), 2)[1] if spread > _RESTLESS else 0.0
         seen.append([spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair])
     beside = float(np.median([skirt(t, signals.values[used, k], [f]) for k in columns]))
     spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
-    disturbed = _disturbed(signals, found)
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
-    figures = Evidence("not known", damping, spread, kurtosis, coherence, beside, periods, disturbed, ())
+    figures = Evidence(
+        "not known", damping, spread, kurtosis, coherence, beside, periods, _disturbed(signals, found), ()
+    )
     kind, reasons = _judged(figures, change, pair, found)
     if kind == "mode":
         lines = [close for one in envelopes if (close := close_lines(*one, f))]
@@ -206,9 +199,8 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
 def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, str]:
     """What drives it, where the methods agree or one is known not to apply."""
     if evidence.kind != "forced":
-        known = "a mode of the system has no source"
-        what = known if evidence.kind == "mode" else "it is not known whether it is forced"
-        return None, f"{what}: {evidence.reasons[0]}"
+        known = evidence.kind == "mode" and "a mode of the system has no source"
+        return None, f"{known or 'it is not known whether it is forced'}: {evidence.reasons[0]}"
     if said[0].method == OWN_MODEL:
         others = "; ".join(f"{o.method}: {o.reason}" for o in said[1:] if o.applies and o.place != said[0].place)
         return said[0].place, f"{said[0].reason}{others and f' (besides, {others})'}"

@@ -51,9 +51,8 @@ class Sources:
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor signal source --json`` prints, as JSON's types."""
-        found = [one.as_json() for one in self.oscillations]
         said = {"record": self.label, "places": self.places, "remarks": list(self.remarks)}
-        return self._about | said | {"oscillations": found}
+        return self._about | said | {"oscillations": [one.as_json() for one in self.oscillations]}
 
     def table(self) -> pd.DataFrame:
         """One row for each oscillation: frequency [Hz], kind, source, what drives, begin [s] and the reason."""
