@@ -132,8 +132,7 @@ def part_of_record(times: Numbers, start: Any, stop: Any, label: str) -> tuple[f
         raise InputError(f"start = {start!r}: the record of {label} ends at t = {last:g} s; give an earlier start")
     end = last if stop is None else moment(stop, "stop")
     if end <= max(begin, first):
-        after = f"the begin of {label}, t = {first:g} s" if begin <= first else f"start = {start!r}"
-        raise InputError(f"stop = {stop!r}: it must come after {after}; give a later stop")
+        raise InputError(f"stop = {stop!r}: it must come after start = {start or first!r}; give a later stop")
     return begin, end
 
 

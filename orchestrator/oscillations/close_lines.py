@@ -48,9 +48,7 @@ def _fitted(t: Numbers, z: Vector, count: int, rates: Sequence[float] = ()) -> t
         return float(np.vdot(rest, rest).real / np.vdot(z, z).real)
 
     first, _ = most_explained(t, z, np.arange(-_REACH, _REACH + 0.01, 0.25), count)
-    best = minimize(
-        left, [*first, *rates], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6, "maxiter": 400}
-    )
+    best = minimize(left, [*first, *rates], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6, "maxfev": 700})
     return best.x[:count], float(best.fun)
 
 

@@ -74,14 +74,13 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     beside = float(np.median([skirt(t, signals.values[used, k], [f]) for k in columns]))
     spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
-    figures = Evidence(
-        "not known", damping, spread, kurtosis, coherence, beside, periods, _disturbed(signals, found), ()
-    )
+    shocked = _disturbed(signals, found)
+    figures = Evidence("not known", damping, spread, kurtosis, coherence, beside, periods, shocked, ())
     kind, reasons = _judged(figures, change, pair, found)
     if kind == "mode":
         lines = [close for one in envelopes if (close := close_lines(*one, f))]
         if 2 * len(lines) > len(columns):
-            said = ", ".join(f"{x:.3f}" for x in lines[0])
+            said = ", ".join(map("{:.3f}".format, lines[0]))
             kind, reasons = "not known", [f"steady sines at close frequencies ({said} Hz) would explain it as well"]
     return replace(figures, kind=kind, reasons=tuple(reasons))
 
