@@ -12,7 +12,7 @@ from orchestrator.analysis.identification import sampling
 from orchestrator.analysis.mode_doubts import straight_line
 from orchestrator.api.results import Run
 from orchestrator.asked import text_or_none
-from orchestrator.cases.given import Time, moment
+from orchestrator.cases.given import Time, moment, part_of_record
 from orchestrator.errors import AnalysisError, InputError
 from orchestrator.oscillations.verdict import forced_frequencies
 from orchestrator.results.recorded import warn_of_early_end
@@ -58,17 +58,11 @@ def identify(
         raise InputError(f"signal = None; {_ONE_SIGNAL}")
     dataset, label = opened(run, "run")
     curve = recorded(dataset, signal, label)
-    begin, last = moment(start, "start"), float(curve["time"][-1])
-    if begin >= last:
-        raise InputError(f"start = {start!r}: the record of {label} ends at t = {last:g} s; give an earlier start")
-    end = last if stop is None else moment(stop, "stop")
-    if end <= begin:
-        raise InputError(f"stop = {stop!r}: it must come after start = {start!r}; give a later stop")
-    require_numbers(curve.sel(time=slice(begin, end)), signal, label)
-    modes = strongest_modes(curve, begin, end)
+    begin, end = part_of_record(curve["time"].values, start, stop, label)
     window = curve.sel(time=slice(begin, end))
-    times = window["time"].values
-    line = straight_line(times, window.values)
+    require_numbers(window, signal, label)
+    modes = strongest_modes(curve, begin, end)
+    times, line = window["time"].values, straight_line(window["time"].values, window.values)
     return SignalModes(signal, float(times[0]), float(times[-1]), modes, sampling(times), line)
 
 
@@ -104,8 +98,7 @@ def ambient(
     names = [signals] if isinstance(signals, str) else list(signals)
     if not names:
         raise InputError(f"signals = {signals!r}; {_ONE_SIGNAL}, or several")
-    begin = moment(start, "start")
-    end = float(dataset["time"][-1]) if stop is None else moment(stop, "stop")
+    begin, end = part_of_record(dataset["time"].values, start, stop, label)
     length = end - begin if window is None else moment(window, "window")
     curves = [recorded(dataset, name, label).sel(time=slice(begin, end)) for name in names]
     for name, curve in zip(names, curves, strict=True):

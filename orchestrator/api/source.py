@@ -60,5 +60,4 @@ def source(
 
 def contest_sources(folder: Path) -> list[Sources]:
     """`source` of each case of a folder, or of folders in it, in the form of the 2021 IEEE-NASPI contest."""
-    measured = [read_contest(path) for path in contest_cases(folder)]
-    return [Sources(one, locate(one)) for one in measured]
+    return [Sources(one, locate(one)) for one in map(read_contest, contest_cases(folder))]

@@ -18,6 +18,7 @@ from orchestrator.errors import InputError
 from orchestrator.late import pd
 
 if TYPE_CHECKING:
+    from orchestrator.arrays import Numbers
     from orchestrator.cases.parameter_files import ParameterFile
 
 Time = float | str  # A time: a number of seconds, or text with a unit such as ``"200 us"``
@@ -121,6 +122,18 @@ def in_seconds(time: Time | None, argument: str) -> float | None:
 def moment(time: Any, argument: str) -> float:
     """A time on the axis of a run [s], which begins at 0."""
     return number_between(time, "s", argument, 0.0, 1e308, "a time of 0 or later and finite, such as 2.0 or '500 ms'")
+
+
+def part_of_record(times: Numbers, start: Any, stop: Any, label: str) -> tuple[float, float]:
+    """Begin and end [s] of a part of a record; by default, as None, its own."""
+    first, last = float(times[0]), float(times[-1])
+    begin = first if start is None else moment(start, "start")
+    if begin >= last:
+        raise InputError(f"start = {start!r}: the record of {label} ends at t = {last:g} s; give an earlier start")
+    end = last if stop is None else moment(stop, "stop")
+    if end <= max(begin, first):
+        raise InputError(f"stop = {stop!r}: it must come after start = {start or first!r}; give a later stop")
+    return begin, end
 
 
 def in_megabytes(given: Any, argument: str, least: float) -> float:

@@ -172,6 +172,5 @@ def _relative(signals: Signals, base: SpectralLine, order: int) -> float:
     t, x = signals.times[used], signals.values[used]
     whole = np.abs(phasors(t, x, [base.frequency]))
     part = np.abs(phasors(t, x, [order * base.frequency, base.frequency]))
-    spread = x.std(axis=0)
-    clear = whole > 0.5 * spread
+    clear = whole > 0.5 * x.std(axis=0)
     return float((part[clear] / whole[clear]).max()) if clear.any() else 0.0

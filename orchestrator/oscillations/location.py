@@ -105,8 +105,7 @@ def works(places: Sequence[Site], times: Numbers, found: SpectralLine, others: S
 
     They are those of the mean phasors of several blocks, each turned by the phase that all signals share; errors are
     the jackknife's."""
-    blocks = block_phasors(places, times, found, others)
-    (whole, errors) = jackknife(blocks, _energies)
+    whole, errors = jackknife(block_phasors(places, times, found, others), _energies)
     names = tuple(place.name for place in places)
     return _Work(names, whole[0], errors[0]), _Work(names, whole[1], errors[1])
 

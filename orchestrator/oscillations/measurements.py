@@ -79,7 +79,7 @@ def _without_doubles(times: Numbers, places: Sequence[Site], said: list[str]) ->
     """A time that is written twice, as simulators do at a discontinuity, counts with what comes after it."""
     if not np.isfinite(times).all() or (np.diff(times) < 0).any():
         raise InputError("the times of the record do not rise; sort its rows")
-    keep = np.append(np.diff(times) > 0, True)
+    keep = np.append(np.diff(times) > 0, True)[: len(times)]
     if not keep.all():
         said.append(f"{int((~keep).sum())} times are written twice; the later row of each is used")
     return times[keep], [_each(place, lambda x: x[keep]) for place in places]

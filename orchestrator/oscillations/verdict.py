@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
 
 from orchestrator.arrays import Numbers
+from orchestrator.oscillations.close_lines import close_lines, most_explained, skirt
 from orchestrator.oscillations.detection import Signals, SpectralLine, envelope, find_oscillations, phasors, signals_of
 from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, felt_beyond, opinions
 from orchestrator.oscillations.measurements import Measurements
@@ -51,13 +51,12 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     f, step = found.frequency, float(signals.times[1] - signals.times[0])
     settle = 0 if found.begin is None else round(2 / (f * step))
     used = slice(min(found.first + settle, found.last - 2), found.last)
-    names = list(found.amplitudes)[: min(found.clear or _STRONGEST, _STRONGEST)]
-    columns = [signals.names.index(name) for name in names]
+    columns = [*map(signals.names.index, [*found.amplitudes][: min(found.clear or _STRONGEST, _STRONGEST)])]
     t = signals.times[used]
     periods = len(t) * step * f
     if periods < _FEWEST_PERIODS:
         return Evidence("not known", 0.0, 0.0, 0.0, 0.0, 0.0, periods, False, (f"only {periods:.1f} periods are seen",))
-    seen = []
+    seen, envelopes = [], []
     for k in columns:
         z, half = envelope(t, signals.values[used, k], f)
         size, late = np.abs(z), t[half : len(t) - half]
@@ -68,14 +67,21 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         wave = np.real(z * np.exp(2j * np.pi * f * late))
         kurtosis = (wave**4).mean() / (wave**2).mean() ** 2
         spread = size.std() / size.mean()
-        pair = _pair(late, z) if spread > _RESTLESS else 0.0
+        some, span = np.unique(np.linspace(0, len(z) - 1, 64).astype(int)), late[-1] - late[0]
+        envelopes.append(((late[some] - late[0]) / span, z[some], late, signals.values[used, k][half : len(t) - half]))
+        pair = most_explained(*envelopes[-1][:2], np.arange(-2, 2.01, 0.125), 2)[1] if spread > _RESTLESS else 0.0
         seen.append([spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair])
-    skirt = float(np.median([_skirt(t, signals.values[used, k], f) for k in columns]))
+    beside = float(np.median([skirt(t, signals.values[used, k], [f]) for k in columns]))
     spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
-    disturbed = _disturbed(signals, found)
     damping = float(-100 * slope / np.hypot(slope, 2 * np.pi * f))
-    figures = Evidence("not known", damping, spread, kurtosis, coherence, skirt, periods, disturbed, ())
+    shocked = _disturbed(signals, found)
+    figures = Evidence("not known", damping, spread, kurtosis, coherence, beside, periods, shocked, ())
     kind, reasons = _judged(figures, change, pair, found)
+    if kind == "mode":
+        lines = [close for one in envelopes if (close := close_lines(*one, f))]
+        if 2 * len(lines) > len(columns):
+            said = ", ".join(map("{:.3f}".format, lines[0]))
+            kind, reasons = "not known", [f"steady sines at close frequencies ({said} Hz) would explain it as well"]
     return replace(figures, kind=kind, reasons=tuple(reasons))
 
 
@@ -110,31 +116,6 @@ def _judged(seen: Evidence, change: float, pair: float, found: SpectralLine) -> 
     if restless and seen.kurtosis > _SINE and seen.coherence < 0.9:
         return "mode", [f"its amplitude and phase wander as noise makes them ({figures})"]
     return "not known", [f"neither steady nor restless: {figures}"]
-
-
-def _pair(times: Numbers, z: Numbers) -> float:
-    """Part of the power of a complex envelope that the best of many pairs of sines explains, up to three widths off."""
-    t = (times - times[0]) / (times[-1] - times[0])
-    some = np.unique(np.linspace(0, len(t) - 1, 64).astype(int))
-    waves = np.exp(2j * np.pi * np.outer(t[some], np.arange(-2, 2.01, 0.125)))
-    power, best = float((np.abs(z[some]) ** 2).sum()), 0.0
-    for one, other in combinations(waves.T, 2):
-        pair = np.column_stack([one, other])
-        best = max(best, float((np.abs(pair @ np.linalg.lstsq(pair, z[some], rcond=None)[0]) ** 2).sum()))
-    return best / power
-
-
-def _skirt(times: Numbers, values: Numbers, frequency: float) -> float:
-    """Mean power beside a line that is taken away, within five widths of it, as a multiple of that further off."""
-    amplitude = phasors(times, values[:, None], [frequency])[0]
-    rest = values - np.real(amplitude * np.exp(2j * np.pi * frequency * times))
-    line = np.polyfit(times - times.mean(), rest, 2)
-    rest = (rest - np.polyval(line, times - times.mean())) * np.hanning(len(rest))
-    power = np.abs(np.fft.rfft(rest)) ** 2
-    length = len(times) * float(times[1] - times[0])
-    apart = np.abs(np.fft.rfftfreq(len(rest), length / len(times)) - frequency) * length
-    near, far = (apart > 1.5) & (apart < 5), (apart > 8) & (apart < min(25.0, 0.5 * frequency * length))
-    return float(power[near].mean() / (power[far].mean() or 1e-300)) if near.any() and far.any() else 1.0
 
 
 def _disturbed(signals: Signals, found: SpectralLine) -> bool:
@@ -217,9 +198,8 @@ def locate(measured: Measurements, models: UnitModels | None = None) -> list[Loc
 def _verdict(evidence: Evidence, said: Sequence[Opinion]) -> tuple[str | None, str]:
     """What drives it, where the methods agree or one is known not to apply."""
     if evidence.kind != "forced":
-        known = "a mode of the system has no source"
-        what = known if evidence.kind == "mode" else "it is not known whether it is forced"
-        return None, f"{what}: {evidence.reasons[0]}"
+        known = evidence.kind == "mode" and "a mode of the system has no source"
+        return None, f"{known or 'it is not known whether it is forced'}: {evidence.reasons[0]}"
     if said[0].method == OWN_MODEL:
         others = "; ".join(f"{o.method}: {o.reason}" for o in said[1:] if o.applies and o.place != said[0].place)
         return said[0].place, f"{said[0].reason}{others and f' (besides, {others})'}"

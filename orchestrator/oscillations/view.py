@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from orchestrator.cases.given import Time, moment
+from orchestrator.cases.given import Time, part_of_record
 from orchestrator.errors import CosimError
 from orchestrator.late import pd, xr
 from orchestrator.oscillations.measurements import Measurements
@@ -52,9 +52,8 @@ class Sources:
 
     def as_json(self) -> dict[str, Any]:
         """The same as ``gfor signal source --json`` prints, as JSON's types."""
-        found = [one.as_json() for one in self.oscillations]
         said = {"record": self.label, "places": self.places, "remarks": list(self.remarks)}
-        return self._about | said | {"oscillations": found}
+        return self._about | said | {"oscillations": [one.as_json() for one in self.oscillations]}
 
     def table(self) -> pd.DataFrame:
         """One row for each oscillation: frequency [Hz], kind, source, what drives, begin [s] and the reason."""
@@ -78,7 +77,7 @@ def sources_of(
     dataset: xr.Dataset, label: str, start: Time | None, stop: Time | None, prepared: PreparedScenario | None = None
 ) -> Sources:
     """The oscillations of a part of a record, beside the units' models in a scenario or in its own built-in case."""
-    begin, end = (None if t is None else moment(t, name) for t, name in ((start, "start"), (stop, "stop")))
+    begin, end = part_of_record(dataset["time"].values, start, stop, label)
     measured, models = measurements_of(dataset.sel(time=slice(begin, end)), label), None
     if prepared is not None or "case_file" in dataset.attrs:
         from orchestrator.oscillations import unit_models as own  # noqa: PLC0415 - only where there is a case

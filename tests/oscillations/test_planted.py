@@ -300,6 +300,27 @@ def test_two_forcings_at_close_frequencies_beat_and_are_no_mode():
     assert "two steady sines" in found.reason
 
 
+@pytest.mark.parametrize(
+    "sines", [{0.7: 0.02, 0.75: 0.02}, {0.7: 0.02, 0.712: 0.012}, {0.68: 0.015, 0.7: 0.015, 0.725: 0.015}]
+)
+def test_forcings_at_close_frequencies_in_several_units_are_no_mode(sines):
+    """The phase of each between the units is its own, so that no signal beats as another does."""
+    t, rng = times_of(60.0), np.random.default_rng(2)
+    noise = load_noise(len(t), 3, 30.0, 5e-4, 4).T
+    places = []
+    for k, name in enumerate(("sg1", "sg2", "sg3")):
+        parts = [
+            rng.uniform(0.5, 1.0) * a * np.exp(2j * np.pi * (f * t + 0.3 * rng.uniform())) for f, a in sines.items()
+        ]
+        x = sum(parts)
+        places.append(
+            Site(name, "unit", f"bus {name}", 1 + 0.01 * x.real, 0.1 * x.imag, 5 + x.real + noise[k], 1 + 0.1 * x.real)
+        )
+    found = locate(made_ready("close", t, places))
+    assert {one.evidence.kind for one in found} == {"not known"}
+    assert all(one.source is None for one in found)
+
+
 def test_noise_of_loads_alone_forces_nothing():
     for name in ("two_area", "ieee39"):
         found = locate(record(name, {}, loads=0.002, measuring=5e-5, times=times_of(60.0)))

@@ -139,3 +139,19 @@ def test_what_is_no_case_of_the_contest(tmp_path, measured):
 def test_neither_or_both_are_refused(gfor, tmp_path):
     assert gfor("source")[0] == 2
     assert gfor("signal", "source", tmp_path, "--contest", tmp_path)[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("part", "rule"),
+    [
+        (("--start", "50"), "start = 50.0: the record of {} ends at t = "),
+        (("--start", "20", "--stop", "10"), "stop = 10.0: it must come after start"),
+        (("--start", "10.001", "--stop", "10.002"), "0 samples"),
+    ],
+)
+def test_a_part_of_a_record_without_samples(gfor, tmp_path, measured, part, rule):
+    path = csv(tmp_path / "pmu.csv", measured)
+    code, _, err = gfor("signal", "source", path, *part)
+    assert code == 2
+    assert err.count("error:") == 1
+    assert rule.format(path) in err
