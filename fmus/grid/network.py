@@ -164,7 +164,6 @@ class Network:
                 yield f"line {line.name!r} has the ratio {line.tap:g} {ends}; it must exceed 0, and is 1 without one"
 
     def _reactance_rule(self, line: Line) -> str:
-        """The rule for a reactance, and the remedy."""
         if self.phasors:
             return f"its size must be at least {SMALLEST_REACTANCE:g}: merge buses that nothing separates"
         return (

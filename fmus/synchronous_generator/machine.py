@@ -70,9 +70,7 @@ class Machine:
     @property
     def field_current(self) -> Expr:
         """X_md·i_f: 1 pu gives 1 pu open-circuit voltage; the constant emf where there is no field winding."""
-        if self.d.fixed_emf is not None:
-            return self.d.fixed_emf
-        return self.d.X_m * self.d.current(0)
+        return self.d.fixed_emf if self.d.fixed_emf is not None else self.d.X_m * self.d.current(0)
 
 
 def flux_state(m: ModelBuilder, name: str, start: Expr, text: str) -> Expr:

@@ -94,10 +94,8 @@ def derivative_functions(model: Model) -> dict[str, Function]:
 
     ``direction`` and ``adjoint`` are of (ẋ, y) by (x, u, p, c); ``start_direction`` and ``start_adjoint`` of the
     initialisation (c, x) by p."""
-    x, u, p, c = (
-        symbols(name, len(group))
-        for name, group in (("x", model.states), ("u", model.inputs), ("p", model.parameters), ("c", model.calculated))
-    )
+    groups = {"x": model.states, "u": model.inputs, "p": model.parameters, "c": model.calculated}
+    x, u, p, c = (symbols(name, len(group)) for name, group in groups.items())
     known = [x, u, p, c]
     follows = [*model.derivatives.of(*known), *model.outputs_function.of(*known)]
     start = model.initialise.of(p)

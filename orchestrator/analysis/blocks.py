@@ -150,9 +150,7 @@ class Blocks:
     def over_step(self, name: str) -> LineMap:
         """The map of a component over the whole step, with inputs that follow straight lines."""
         c = self.components[name]
-        if self.parts == 1:
-            return LineMap(c.A, c.B, np.zeros_like(c.B))
-        return over_parts(c.A, c.B, self.parts)
+        return LineMap(c.A, c.B, np.zeros_like(c.B)) if self.parts == 1 else over_parts(c.A, c.B, self.parts)
 
     @property
     def serves_continuous(self) -> bool:

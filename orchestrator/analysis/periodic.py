@@ -55,9 +55,7 @@ class PeriodicPoint:
 
 def model_of(master: Master, blocks: Blocks) -> LinearModel:
     """The step map of a system, or that over the period after which it repeats."""
-    if blocks.period == 1:
-        return compose(blocks, master.schedule)
-    return period_model(master, blocks)
+    return compose(blocks, master.schedule) if blocks.period == 1 else period_model(master, blocks)
 
 
 def period_model(master: Master, blocks: Blocks) -> LinearModel:

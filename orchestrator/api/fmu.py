@@ -126,7 +126,6 @@ class Fmu(Closing):
         return self.description.variables[name]
 
     def _converted(self, values: Mapping[str, Any]) -> dict[str, float | bool]:
-        """The values in the variables' own units."""
         try:
             return {name: convert(self._variable(name), value) for name, value in plain(values).items()}
         except ValueError as error:

@@ -35,6 +35,5 @@ def run(options: argparse.Namespace) -> int:
                          "repeat the command with the same --into")  # fmt: skip
     if options.code == GB and len(devices) == 1:
         return run_stiffness(options, devices[0])
-    if len(devices) > 1 or options.code == ALL:
-        return run_matrix(options, devices)
-    return run_one(options, devices[0])
+    several = len(devices) > 1 or options.code == ALL
+    return run_matrix(options, devices) if several else run_one(options, devices[0])

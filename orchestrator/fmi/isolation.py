@@ -105,9 +105,7 @@ class IsolatedComponent(RemoteCalls):
     def _last_words(self) -> str:
         """Its newest log messages, or the end of what it wrote."""
         assert self._process is not None
-        if texts := self._texts():
-            return "; ".join(texts)
-        return self._process.last_words()
+        return "; ".join(self._texts()) or self._process.last_words()
 
     def _remote(self, call: str, command: str, *arguments: Any) -> Any:
         if self._end is not None:

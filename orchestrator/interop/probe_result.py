@@ -155,9 +155,7 @@ def _columns(path: Path, heads: list[str], named: dict[str, str]) -> dict[str, i
 def _means(head: str, signal: str) -> bool:
     plain = re.sub(r"\[[^\]]*\]\s*$|\([^)]*\)\s*$", "", head).strip().strip("\"'").lower()
     plain = re.sub(r"[^a-z0-9]+", ".", plain).strip(".")
-    if signal == "time":
-        return plain in _TIMES
-    return f".{plain}".endswith("." + signal.replace("_", "."))
+    return plain in _TIMES if signal == "time" else f".{plain}".endswith("." + signal.replace("_", "."))
 
 
 def _number(path: Path, line: list[str], heads: list[str], column: int, row: int) -> float:

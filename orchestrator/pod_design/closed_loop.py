@@ -108,9 +108,7 @@ class PodLoop:
         self._latest: tuple[PodSetting, LinearModel] | None = (off, self._off)
 
     def model(self, setting: PodSetting) -> LinearModel:
-        if setting.gain == 0:
-            return self._off
-        return self._model(setting)
+        return self._off if setting.gain == 0 else self._model(setting)
 
     def block(self, name: str) -> ComponentLinearization:
         return self._blocks.components[name]

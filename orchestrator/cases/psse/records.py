@@ -129,9 +129,7 @@ def _text_of(path: Path) -> str:
 
 def _numbered(text: str) -> Iterator[tuple[int, str]]:
     """Lines with their numbers, without those that only comment."""
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.startswith("@!"):
-            yield number, line
+    yield from ((n, line) for n, line in enumerate(text.splitlines(), start=1) if not line.startswith("@!"))
 
 
 def _sections(
