@@ -153,6 +153,8 @@ def test_all_commands_take_an_ssp(two_area, tmp_path, capsys):
     assert without["scenarios"][0].pop("power_flow")["machines"]
     assert with_ssp["scenarios"][0].pop("models") is None  # nor which kind of models its FMUs are
     assert without["scenarios"][0].pop("models") == "emt"
+    bases = [found["scenarios"][0].pop("basis") for found in (with_ssp, without)]
+    assert bases[0]["machines"] == bases[1]["machines"], bases
     assert with_ssp == without
     assert main(["run", ssp, "--stop", "0.2", "--out", str(tmp_path / "run")]) == 0
     assert main(["report", str(tmp_path / "run")]) == 0
