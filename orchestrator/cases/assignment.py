@@ -129,18 +129,18 @@ def _assign_key(draft: Draft, key: str, value: Value, where: str) -> None:
 def _switch(draft: Draft, key: str, value: Value) -> str:
     """How an element is switched that a key means by another word, or without its grid; "" for any other key."""
     owner, _, word = key.rpartition(".")
-    element, grid = owner.rpartition(".")[2], draft.grid or ""
-    homes = ((element, "connected"), (grid, f"{element}.connected"), (grid, f"{element}.scale"))
+    item, grid = owner.rpartition(".")[2], draft.grid or ""
+    homes = (key.partition(".")[::2], (item, "connected"), (grid, f"{item}.connected"), (grid, f"{item}.scale"))
     fitting = {name: fnmatch.filter(draft.system.components, name) for name, _ in homes}
-    found = [(name, own) for name, own in homes if any(_has(draft, one, own) for one in fitting[name])]
-    if word not in SERVICE or not found or _has(draft, key.partition(".")[0], key.partition(".")[2]):
+    found = [(name, what) for name, what in homes if any(_has(draft, one, what) for one in fitting[name])]
+    if word not in SERVICE or not found or found[0] == homes[0]:
         return ""
     (name, variable), state = found[0], STATES.get(str(value).lower())
     if state is None:
-        return f"{word} = {value!r}; it must be true or false; {element} is switched by {name}.{variable}"
+        return f"{word} = {value!r}; it must be true or false; {item} is switched by {name}.{variable}"
     on = state != (word in ("out", "off"))
     text = str(int(on)) if variable.endswith("scale") else str(on).lower()
-    return f"{element} is switched {'on' if on else 'off'} by {name}.{variable}={text}; write that"
+    return f"{item} is switched {'on' if on else 'off'} by {name}.{variable}={text}; write that"
 
 
 def _has(draft: Draft, name: str, variable: str) -> bool:
