@@ -127,7 +127,7 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
         names = _files(path)
         write_manifest(path, run, names, scenarios, _readable(folder))
         for name in [*names, MANIFEST]:
-            spare_input(folder / name)
+            spare_input(folder / name, path / name)
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(path / name, folder / name)
         flush(folder)
