@@ -139,7 +139,7 @@ def test_a_runs_row_says_what_was_given_and_which_models_were_run(gfor, tmp_path
     assert gfor("run", "two_area_rms", "--scenario", "gfor", *given, "--out", tmp_path)[0] == 0
     text = write_report(tmp_path, short=True).read_text(encoding="utf-8")
     assert "SG + GFOR, with fault &quot;bus_2, 5 ms, from 2 ms&quot;, models = emt: not known" in text
-    assert "<td>emt models; modes of the FMUs that were simulated" in re.sub("<td[^>]*>", "<td>", text)
+    assert "<td>emt models, loads constant impedance" in re.sub("<td[^>]*>", "<td>", text)
     assert "phasor models; modes" not in text
 
 
