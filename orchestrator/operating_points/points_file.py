@@ -104,11 +104,12 @@ def questions_about(
             text = f"at most {most:g} {unit}, where the case itself has {own:.4g} {unit}; are these values in pu?"
             yield Problem(place, text)
     feeding = [unit for unit in elements.units if unit not in elements.balancing]
-    others = {unit: own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in feeding}
-    leaves = {point.name: _left(point, prepared, elements, others) for row, point in zip(rows, points, strict=True)
+    fed = {unit: own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in feeding}
+    load = load_of(elements.loads, prepared.system.components[elements.grid])
+    leaves = {point.name: _left(point, prepared, elements, fed, load) for row, point in zip(rows, points, strict=True)
               if (row.get("generation") or "").strip() not in _MEANT}  # fmt: skip
     worst = max(leaves, key=lambda name: abs(leaves[name]), default="")
-    more, load = leaves.get(worst, 0.0), load_of(elements.loads, prepared.system.components[elements.grid])
+    more = leaves.get(worst, 0.0)
     if abs(more) > _LEFT * abs(load):
         who = ", ".join(elements.balancing) or elements.slack
         text = f"at {worst} the slack ({who}) feeds {abs(more):.4g} MW {'more' if more > 0 else 'less'}, as the other"
@@ -116,10 +117,11 @@ def questions_about(
         yield Problem(str(path), f"{text} units' powers do not follow the load there: {remedy}")
 
 
-def _left(point: OperatingCase, prepared: PreparedScenario, elements: Elements, others: Mapping[str, float]) -> float:
+def _left(
+    point: OperatingCase, prepared: PreparedScenario, elements: Elements, others: Mapping[str, float], load: float
+) -> float:
     """What a point leaves to the slack [MW] of what the loads draw more and units out of service fed; 0 where that is
     nearer to the slack's own share than to all of it. ``others``: units beside the slack's, and what each feeds."""
-    load = load_of(elements.loads, prepared.system.components[elements.grid])
     wanted, given = _drawn(point, prepared, elements) - load, 0.0
     for unit, power in others.items():
         if unit in point.out:
@@ -136,8 +138,7 @@ def _drawn(point: OperatingCase, prepared: PreparedScenario, elements: Elements)
     """Active power of the loads at a point [MW]."""
     plan, head = prepared.system.components[elements.grid], f"{elements.grid}."
     own = {k.removeprefix(head): v for k, v in point.values.items() if k.startswith(head) and not isinstance(v, str)}
-    on = [load for load in elements.loads if load not in point.out]
-    return load_of(on, replace(plan, parameters=plan.parameters | own))
+    return load_of([x for x in elements.loads if x not in point.out], replace(plan, parameters=plan.parameters | own))
 
 
 def _reading(path: Path, column: str, elements: Elements, prepared: PreparedScenario) -> Reading:

@@ -182,7 +182,7 @@ def verdict(d: PodDesign) -> str:
                 f"--gain-bounds 0:{d.request.bounds(search=True)[1]:g} --refine finds the least gain that meets it"
             )
         return text
-    return text + _out_of_reach(d, d.refinement) if d.refinement else text + _other_gain(d)
+    return text + (_out_of_reach(d, d.refinement) if d.refinement else _other_gain(d))
 
 
 def _other_gain(d: PodDesign) -> str:

@@ -126,8 +126,9 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
         yield path
         names = _files(path)
         write_manifest(path, run, names, scenarios, _readable(folder))
-        for name in [*names, MANIFEST]:
+        for name in [*names, MANIFEST]:  # before any is moved
             spare_input(folder / name, path / name)
+        for name in [*names, MANIFEST]:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(path / name, folder / name)
         flush(folder)

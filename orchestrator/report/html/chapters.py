@@ -160,9 +160,8 @@ def has_fault(scenario: Content) -> bool:
 
 def _screening(file: Path, c: Content) -> Chapter:
     where = "somewhere" if c["stable"] is False else "everywhere"
-    answer = (
-        f"{_STABLE[c['stable']]} {where}: {counted(c['points'], 'operating point')}, {counted(c['outages'], 'outage')}"
-    )
+    points, outages = counted(c["points"], "operating point"), counted(c["outages"], "outage")
+    answer = f"{_STABLE[c['stable']]} {where}: {points}, {outages}"
     if worst := min((m["worst"] for m in c["modes"]), key=lambda w: w["damping_percent"], default=None):
         answer += (f"; least damped {worst['frequency_hz']:.3f} Hz, {worst['damping_percent']:.2f} %, "
                    f"{'' if c['points'] == 1 else worst['point'] + ', '}outage {worst['outage']}")  # fmt: skip

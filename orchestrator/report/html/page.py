@@ -164,6 +164,7 @@ def _of_run(run: Results, figures: Figures) -> Sections:
 
 _RECORDS = {".nc", ".csv", ".cfg", ".dat"}  # of which each folder has one of the same name
 _OUTPUTS = {"--out", "--html"}
+_NOTHING = "nothing that is known of"
 _OPEN, _LONGEST = 4, 240  # what was not judged on the first page, and the characters of each
 
 
@@ -172,14 +173,12 @@ def first_page(chapters: Sequence[Chapter]) -> str:
     notes = {text: f"note {k}" for k, text in enumerate((t for t, n in open_.items() if n > 1), start=1)}
     for one in chapters:
         shade = {True: "good", False: "bad", None: "soft"}[one.good]
-        lost = [escape(notes.get(text) or short(text, _LONGEST)) for text in one.not_judged[:_OPEN]] or [
-            "nothing that is known of"
-        ]
+        lost = [escape(notes.get(text) or short(text, _LONGEST)) for text in one.not_judged[:_OPEN]]
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
         given = "".join(f"<br>{escape(text)}" for text in (str(one.source), _given(one.source)) if text)
         asked = f'{escape(one.question)}<span class="soft">{given}</span>'
-        rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), "<br>".join(lost) + more])
+        rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), "<br>".join(lost or [_NOTHING]) + more])
     said = "".join(
         f"<p>{name[0].upper()}{name[1:]}: {escape(short(text, _LONGEST))}</p>" for text, name in notes.items()
     )
