@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-WRITTEN = ("out", "html", "save", "scan", "junit")  # options that name what is written
+WRITTEN = ("out", "into", "html", "save", "scan", "junit")  # options that name what is written
 _BESIDE = {".toml": (".csv", ".json"), ".cfg": (".dat",)}  # endings of what is written beside a file
 
 said: list[Callable[[], dict[str, Any]]] = []

@@ -31,6 +31,7 @@ def files(tmp_path, monkeypatch):
         ([*DESIGN, "--points", "points.csv", "--out", "points.toml"], "points.csv"),
         (["new", "net.raw", "own.toml", "--out", "own.toml", "--force"], "own.toml"),
         (["signal", "source", "rec.csv", "--html", "rec.csv"], "rec.csv"),
+        (["certify", "rec.csv", "--code", "miso", "--into", "rec.csv"], "rec.csv"),
     ],
 )  # fmt: skip
 def test_a_file_that_is_read_is_not_written_over(gfor, files, tmp_path, arguments, spared):
