@@ -52,6 +52,10 @@ def compare(
     (first, label_a), (second, label_b) = opened(a, "a"), opened(b, "b")
     labels = (label_a, label_b) if label_a != label_b else (f"a ({label_a})", f"b ({label_b})")
     _warn_of_different_ends(first, second, labels)
+    if (cases := [run.attrs.get("case_file") for run in (first, second)])[0] != cases[1] and None not in cases:
+        told = [f"{label} of {run.attrs['case']}" for label, run in zip(labels, (first, second), strict=True)]
+        text = f"the runs are of two case files ({', '.join(told)}): what differs may be the networks"
+        warnings.warn(text, ResultsWarning, stacklevel=2)
     begin = RINGS_FROM if start is None else moment(start, "start")
     ends = [(label, float(run["time"][-1])) for run, label in zip((first, second), labels, strict=True)]
     short = [(label, end) for label, end in ends if end <= begin]

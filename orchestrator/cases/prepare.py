@@ -7,7 +7,6 @@ from typing import Any
 
 from fmus.grid.network import Network
 from fmus.toolchain.catalogue import model_names, network_of, parts_of
-from fmus.toolchain.extras import installed_version
 from orchestrator.binding.binding import bound_fmu
 from orchestrator.cases import component_forms
 from orchestrator.cases.areas import in_two_areas
@@ -240,10 +239,8 @@ class Preparer:
             self.draft.note_network(self.draft.given.place("units", origin.common.removesuffix("_parameters")), text)
 
     def _is_native(self, name: str, table: ComponentTable) -> bool:
-        """The kind of FMU that a component of the catalogue gets; the strongest layer decides.
-
-        What the component's table wants is for speed alone, with the same bits, and needs a compiler to be there."""
-        native = table.native and bool(installed_version("ziglang"))
+        """The kind of FMU that a component of the catalogue gets; the strongest layer decides."""
+        native = table.native
         for choice in (choice for layer in self.draft.given.layers for choice in layer.natives if choice.fits(name)):
             try:
                 native = choice.native

@@ -13,9 +13,10 @@ from orchestrator.analysis.steady_state import find_operating_point
 from orchestrator.arrays import Complex, Matrix
 from orchestrator.cases.case import built_in_cases, load_case
 from orchestrator.cases.prepare import PreparedScenario
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 from orchestrator.oscillations.models import Response, UnitModel, UnitModels, turn
 from orchestrator.results.storage import measuring_places
+from orchestrator.safe_files import file_hash
 from orchestrator.study.modes import running
 
 _VOLTAGE, _CURRENT, _EMF, _SHUNT = ("v_re", "v_im"), ("i_re", "i_im"), ("e_re", "e_im"), ("y_re", "y_im")
@@ -80,6 +81,22 @@ def recorded_case(attributes: Mapping[str, Any]) -> PreparedScenario | None:
         return None
     scenario, values = str(attributes["scenario"]), json.loads(attributes["values"])
     (prepared,) = case.prepare([scenario])
-    changed = {key: value for key, value in values.items() if prepared.values.get(key) != value}
-    (prepared,) = case.prepare([scenario], changed) if changed else (prepared,)
+    given = json.loads(attributes.get("given", "{}"))
+    if changed := {key: value for key, value in given.items() if prepared.given.get(key) != value}:
+        (prepared,) = case.prepare([scenario], changed)
     return prepared if dict(prepared.values) == values else None
+
+
+def unlike(attributes: Mapping[str, Any], prepared: PreparedScenario) -> str:
+    """What of a record's own case is another one in the scenario whose models judge it; "" where nothing is known."""
+    case, there = prepared.case, prepared.given
+    found = ["the case file"] if attributes.get("case_file", case.text) != case.text else []
+    for name, content in json.loads(attributes.get("inputs", "{}")).items():
+        if (path := case.directory / name) != case.path and path.is_file() and file_hash(path) != content:
+            found.append(name)
+    if attributes.get("scenario", prepared.name) != prepared.name:
+        found.append(f"the scenario ({attributes['scenario']!r}, not {prepared.name!r})")
+    elif "given" in attributes:
+        own = json.loads(attributes["given"])
+        found += sorted(key for key in {*own, *there} if own.get(key) != there.get(key))
+    return few(found, 4)

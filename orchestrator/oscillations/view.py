@@ -93,8 +93,8 @@ def sources_of(
         given = f"--case {case} --scenario {dataset.attrs['scenario']}"
         remark = f"without its own case the run is judged by its signals alone; the units' models decide: give {given}"
         measured = replace(measured, remarks=(remark, *measured.remarks))
-    if models and prepared and (recorded := dataset.attrs.get("scenario", prepared.name)) != prepared.name:
-        remark = f"it is a record of the scenario {recorded!r}, and judged with the models of {prepared.name!r}"
+    if models and prepared and (differ := own.unlike(dataset.attrs, prepared)):
+        remark = f"the models that judge it are not of the recorded system; what differs: {differ}"
         measured = replace(measured, remarks=(*measured.remarks, remark))
     located = locate(measured, models)
     if models and prepared:

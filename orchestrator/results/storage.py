@@ -27,13 +27,14 @@ _CSV_ROWS = 10_000  # rows of a table that are written at a time
 
 
 def provenance(prepared: PreparedScenario) -> dict[str, str | float]:
-    """What a result was made from: case text, values, versions, FMU guids, step and schedule."""
+    """What a result was made from: case text, values and those given, versions, FMU guids, step and schedule."""
     packages = ("gfor-cosim", "fmpy", "numpy", "pythonfmu", "scipy")
     fmus = {name: plan.description for name, plan in prepared.system.components.items()}
     tolerance = prepared.schedule.tolerance
     return {
         "case": prepared.case.name, "scenario": prepared.name, "title": prepared.title,
         "case_file": prepared.case.text, "values": json.dumps(prepared.values),
+        "given": json.dumps(prepared.given),
         "events": "; ".join(map(str, prepared.events)), "step_size_s": prepared.step_size,
         "schedule": f"{prepared.schedule.name}: {' | '.join(', '.join(g) for g in prepared.schedule.groups)}",
         **({} if tolerance is None else {"tolerance": tolerance}),

@@ -13,7 +13,7 @@ from orchestrator.study.ring_down import ring_down_of
 TIMES = np.arange(0, 15, 0.01)
 
 
-def save(folder, eigenvalue, offset=0.0, times=TIMES):
+def save(folder, eigenvalue, offset=0.0, times=TIMES, **attributes):
     """A run in which one signal rings with a known mode and another stays."""
     ring = 1 + 1e-3 * np.real(np.exp(eigenvalue * times))
     data = {
@@ -21,7 +21,7 @@ def save(folder, eigenvalue, offset=0.0, times=TIMES):
         "b.omega": ("time", np.ones_like(times) + offset, {"units": "pu"}),
     }
     folder.mkdir()
-    xr.Dataset(data, coords={"time": times}).to_netcdf(folder / "trajectory.nc", engine="scipy")
+    xr.Dataset(data, {"time": times}, attributes).to_netcdf(folder / "trajectory.nc", engine="scipy")
     return folder
 
 
@@ -48,6 +48,17 @@ def test_without_signals_those_that_differ_most_are_shown(runs, capsys):
     assert main(["signal", "compare", *map(str, runs)]) == 0
     out = capsys.readouterr().out
     assert out.index("b.omega") < out.index("a.omega")
+
+
+def test_runs_of_two_cases_are_told(tmp_path, gfor):
+    one, same, other = (
+        save(tmp_path / name, -0.3 + 4j, case=name, case_file=text)
+        for name, text in (("one", "x = 1"), ("same", "x = 1"), ("other", "x = 2"))
+    )
+    assert f"two case files ({one} of one, {other} of other)" in " ".join(
+        gfor("signal", "compare", one, other)[2].split()
+    )
+    assert "two case files" not in gfor("signal", "compare", one, same)[2]
 
 
 def test_the_modes_of_a_signal(runs, capsys):

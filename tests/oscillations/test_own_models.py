@@ -9,7 +9,9 @@ import pytest
 import orchestrator as gfor_api
 from orchestrator.oscillations.models import OWN_MODEL, UnitModels
 from orchestrator.oscillations.reading import measurements_of
+from orchestrator.oscillations.unit_models import unlike
 from orchestrator.oscillations.verdict import locate
+from orchestrator.safe_files import file_hash
 from tests.oscillations.test_planted import TIMES, at, late, turned
 from tests.oscillations.test_reading import csv
 from tests.support.forced_records import model, record, sine, times_of, unit_models_of
@@ -138,12 +140,32 @@ def test_a_run_is_compared_with_the_models_of_its_own_case(run, gfor, tmp_path):
     (one,) = json.loads(out)["oscillations"]
     assert (code, one["source"], one["methods"][0]["method"]) == (0, "sg1", OWN_MODEL)
     other = gfor_api.source(run.dataset, scenario=gfor_api.load("two_area_rms").scenario("pod_p"))
-    assert "a record of the scenario 'gfor', and judged with the models of 'pod_p'" in other.remarks[-1]
-    assert not any("judged with" in remark for remark in run.source().remarks)
+    assert other.remarks[-1].endswith("what differs: the scenario ('gfor', not 'pod_p')")
+    assert not any("what differs" in remark for remark in run.source().remarks)
     assert not any("--case" in remark for remark in run.source().remarks)
     foreign = run.dataset.assign_attrs(case_file="name = 'mine'", inputs='{"mine.toml": "1a"}')
     first = gfor_api.source(foreign).remarks[0]
     assert first.endswith("the units' models decide: give --case mine.toml --scenario gfor")
+
+
+def test_a_run_with_values_of_its_own_is_judged_by_models_with_them(tmp_path):
+    """And beside models with other values, or of another case, the remark names what differs."""
+    case = gfor_api.load("two_area_rms")
+    run = case.scenario("gfor", {"gfor.P_0": 0.3}, force="sg1.exciter.V_ref 0.8 Hz 2 %").run(stop=20.0)
+    run.save(tmp_path)
+    (found,) = (sources := gfor_api.source(tmp_path / "gfor"))
+    assert (found.source, sources.remarks) == ("sg1", ())
+    for name, differs in (("two_area_rms", "gfor.P_0"), ("two_area", "the case file, gfor.P_0")):
+        other = gfor_api.source(tmp_path / "gfor", scenario=gfor_api.load(name).scenario("gfor"))
+        assert other.remarks[-1].endswith(f"what differs: {differs}")
+
+
+def test_a_file_of_the_case_that_was_edited_since_the_run_is_told():
+    prepared = gfor_api.load("kundur").scenario("gfor").prepared
+    (name,) = (path.name for path in prepared.case.directory.glob("*.csv"))
+    seen = file_hash(prepared.case.directory / name)
+    assert unlike({"inputs": json.dumps({name: seen, "gone.raw": "1a"})}, prepared) == ""
+    assert unlike({"inputs": json.dumps({name: "1a"})}, prepared) == name
 
 
 def test_a_table_of_phasors_is_compared_with_a_case(run, gfor, tmp_path):
