@@ -31,8 +31,8 @@ def made_folder(given: str | Path, label: str = "", what: str = "results cannot 
     return path
 
 
-def spare_input(path: Path, new: Path | None = None) -> None:  # a copy of itself is no loss
-    if inputs and path.resolve() in inputs and (new is None or file_hash(new) != file_hash(path)):
+def spare_input(path: Path) -> None:
+    if inputs and path.resolve() in inputs:
         raise InputError(f"{path}: the command reads this file and would write over it; name another one to write")
 
 

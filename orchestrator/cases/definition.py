@@ -45,6 +45,12 @@ class CaseDefinition:
     injections: bool = False  # whether the grid takes a current besides at every bus; see `Network.injections`
 
     @property
+    def content(self) -> bytes:
+        """``text`` with the line ends of its file, as long as that says the same."""
+        there, text = self.path.read_bytes() if self.path.is_file() else b"", self.text.encode("utf-8")
+        return there if there.replace(b"\r\n", b"\n") == text else text
+
+    @property
     def name(self) -> str:
         return self.table.name
 

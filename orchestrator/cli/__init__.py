@@ -89,6 +89,10 @@ def _done(words: Sequence[str]) -> int:
         inputs.update(path.resolve() for path in files.values())
         for path in origin.written(vars(options)):
             spare_input(path)
+            if path.is_file():
+                from orchestrator.results.manifest import spare_result  # noqa: PLC0415 - only where it is needed
+
+                spare_result(path)
         return int(options.command(options))
     except (CosimError, SetupError, OSError) as error:
         if is_interrupt(error):

@@ -12,7 +12,11 @@ from orchestrator.cli.terminal import make_console, print_json, print_parts
 from orchestrator.errors import CosimError, InputError
 from orchestrator.operating_points.points_file import folder_of, settings_in
 from orchestrator.report.tables import make_table
+from orchestrator.results.staging import new_run_id, staged
 from orchestrator.results.storage import save_table
+from orchestrator.safe_files import spare_input
+
+TABLE = "points.csv"
 
 
 def by_point(
@@ -24,6 +28,7 @@ def by_point(
     """Rows of what is found at each point, shown and kept; one that fails says why, and the others go on.
 
     Raises an `InputError` where all of them fail."""
+    spare_input(folder / TABLE)
     rows: list[dict[str, Any]] = []
     lost = 0
     for name, values in settings_in(options.points).items():
@@ -34,13 +39,14 @@ def by_point(
             lost += 1
     columns = max((list(row) for row in rows), key=len)
     cells = [{column: row.get(column) for column in columns} for row in rows]
-    save_table(cells, folder / "points.csv")
     if options.json:
         print_json(rows)
     else:
         shown = [tuple(_cell(value) for value in row.values()) for row in cells]
         table = make_table("Operating points", *(column.replace("_", " ") for column in columns), rows=shown)
         print_parts(make_console(), [table, escape(f"Results in {folder}")])
+    with staged(folder, new_run_id()) as staging:
+        save_table(cells, staging / TABLE)
     if lost == len(rows):
         raise InputError(f"{options.points}: no point could be computed; the remark of each says why")
     return rows

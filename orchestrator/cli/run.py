@@ -32,7 +32,15 @@ from orchestrator.report.progress import progress_bar
 from orchestrator.results.lock import held
 from orchestrator.results.recorded import open_whole
 from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder, require_room
-from orchestrator.results.staging import ScenarioFolder, mend, new_run_id, staged, unfinished
+from orchestrator.results.staging import (
+    ScenarioFolder,
+    check_free,
+    mend,
+    new_run_id,
+    require_results,
+    staged,
+    unfinished,
+)
 from orchestrator.results.storage import save_dataset
 from orchestrator.safe_files import PARTIAL, made_folder
 from orchestrator.study import beside
@@ -81,6 +89,9 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     """Run the scenarios; each is written as soon as it is done."""
     require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
     mend(folder)
+    check_free(folder, "case.toml", scenarios[0].prepared.case.content)
+    for scenario in scenarios:
+        require_results(folder / scenario.name)
     if options.resume is None:
         _say_unfinished(folder)
     console = terminal.make_console(stderr=options.json)

@@ -104,6 +104,14 @@ def read_manifest(folder: Path) -> Manifest | None:
         raise InputError(f"{path}: it cannot be read as the list of a run's files: {error}; {_AGAIN}") from error
 
 
+def spare_result(path: Path) -> None:
+    """Refuse a file to write that stands in the manifest beside it: results of a run are replaced by a run alone."""
+    found = read_manifest(path.parent)
+    if found and path.name in (*found.files, MANIFEST):
+        raise InputError(f"{path}: it is one of the results in {path.parent}, and would be written over; name another "
+                         "file to write")  # fmt: skip
+
+
 def inputs_behind(result: Path) -> dict[str, str]:
     """Hashes of what a run's folder, or a file in it, was made from; empty where no manifest says so of it."""
     try:

@@ -1,17 +1,18 @@
 """Results beside their place until they are whole: then they are put there at once, with a manifest."""
 
+import hashlib
 import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from secrets import token_hex
-from shutil import rmtree
+from shutil import copy2, rmtree
 
 from orchestrator.errors import InputError
-from orchestrator.results.manifest import MANIFEST, Manifest, read_manifest, write_manifest
+from orchestrator.results.manifest import MANIFEST, Manifest, read_manifest, sha256_of, write_manifest
 from orchestrator.results.recording import ENDED_EARLY
-from orchestrator.safe_files import PARTIAL, flush, not_written, spare_input
+from orchestrator.safe_files import PARTIAL, flush, inputs, not_written
 
 _OLD = ".old-"
 _DONE_WITH = ".done-with"
@@ -33,6 +34,7 @@ class ScenarioFolder:
         self.run = run
         self.place = folder / scenario
         self.path = folder / f"{scenario}{PARTIAL}{run}"
+        require_results(self.place)
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             for left in self.path.rglob(f"{PARTIAL}*"):  # a resumed run has the id of the one that was killed
@@ -46,17 +48,34 @@ class ScenarioFolder:
             rmtree(self.path, ignore_errors=True)
 
     def publish(self, ended_early: str | None = None) -> Path:
-        """Put the folder in its place, whole; results of an earlier run that are there go.
+        """Put the folder in its place, whole; results of an earlier run that are there go, and files of others stay.
 
         ``ended_early``: why the run ended before its stop time; None where it reached that."""
         try:
             about = {"scenario": self.place.name} | ({} if ended_early is None else {ENDED_EARLY: ended_early})
             write_manifest(self.path, self.run, _files(self.path), about=about)
+            for name in _of_others(self.place):
+                if not (new := self.path / name).exists():
+                    new.parent.mkdir(parents=True, exist_ok=True)
+                    copy2(self.place / name, new)
             flush(self.path)
             _exchange(self.path, self.place, self.run)
         except OSError as error:
             raise not_written(self.place, error) from error
         return self.place
+
+
+def require_results(place: Path) -> None:
+    """Refuse a place for a scenario's results where something is that no run has made."""
+    if place.is_file() or (place.is_dir() and any(place.iterdir()) and not (place / MANIFEST).is_file()):
+        raise InputError(f"{place}: the results of the scenario {place.name!r} go there, and no run has made what is "
+                         "there now; give another --out, or move it")  # fmt: skip
+
+
+def _of_others(folder: Path) -> list[str]:
+    """Files that the folder's manifest does not list; none where it lists nothing that can be read."""
+    own = _readable(folder)
+    return [name for name in _files(folder) if name not in own.files] if own else []
 
 
 def _exchange(new: Path, place: Path, run: str) -> None:
@@ -118,16 +137,19 @@ def unfinished(folder: Path) -> list[Path]:
 
 @contextmanager
 def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Path]:
-    """A folder to write files to that are put into ``folder`` at the end, with a manifest of them."""
+    """A folder to write files to that are put into ``folder`` at the end, with a manifest of them.
+
+    Where a file is in the way that no command has written, or that this one reads, all of them stay beside it."""
     path = folder / f"{PARTIAL}{run}"
     rmtree(path, ignore_errors=True)  # a resumed run has the id of the one that was killed
     try:
         path.mkdir(parents=True)
         yield path
-        names = _files(path)
-        write_manifest(path, run, names, scenarios, _readable(folder))
-        for name in [*names, MANIFEST]:  # before any is moved
-            spare_input(folder / name, path / name)
+        names, own = _files(path), _readable(folder)
+        write_manifest(path, run, names, scenarios, own)
+        if taken := [name for name in names if _is_foreign(folder, name, own, sha256_of(path / name))]:
+            path.rename(folder / run)
+            raise foreign(folder / taken[0], f"the results are in {folder / run}")
         for name in [*names, MANIFEST]:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(path / name, folder / name)
@@ -136,6 +158,24 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
         raise not_written(folder, error) from error
     finally:
         rmtree(path, ignore_errors=True)
+
+
+def check_free(folder: Path, name: str, content: bytes) -> None:
+    """Refuse a file that is to be written where somebody else's is, before anything is computed for it."""
+    if _is_foreign(folder, name, _readable(folder), hashlib.sha256(content).hexdigest()):
+        raise foreign(folder / name, "give another --out, or move it")
+
+
+def _is_foreign(folder: Path, name: str, own: Manifest | None, content: str) -> bool:
+    """Whether a file that is there is read by the command, or of somebody else, and other than the new one."""
+    path = folder / name
+    listed = name in own.files if own else (folder / MANIFEST).is_file()
+    return path.is_file() and (not listed or path.resolve() in inputs) and sha256_of(path) != content
+
+
+def foreign(path: Path, remedy: str) -> InputError:
+    why = "the command reads it" if path.resolve() in inputs else "no command has written it"
+    return InputError(f"{path}: this file would be written over, and {why}; {remedy}")
 
 
 def _readable(folder: Path) -> Manifest | None:

@@ -18,7 +18,7 @@ from orchestrator.results.recording import TRAJECTORY
 from orchestrator.results.signals import relative_difference
 from orchestrator.results.staging import ScenarioFolder, new_run_id, staged
 from orchestrator.results.storage import save_csv, save_json, save_netcdf, save_table
-from orchestrator.safe_files import write_text
+from orchestrator.safe_files import write_bytes
 from orchestrator.study.answers import EarlyEnd, of_run
 from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, plot_participation, plot_signals
 from orchestrator.study.modes import ModesResult, modes_json
@@ -74,7 +74,7 @@ def save_study(
     results: Sequence[RunResult], folder: Path, beside: Sequence[str], early_end: EarlyEnd | None = None
 ) -> list[Path]:
     case = results[0].modes.prepared.case
-    write_text(folder / "case.toml", case.text)
+    write_bytes(folder / "case.toml", case.content)
     save_table(_shift_rows(results), folder / "step_size.csv")
     ended = None if early_end is None else early_end.as_json()
     made_of = {"case": case.name, "case_file": word_of(case, folder.parent)}  # the files are put there at the end

@@ -4,8 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.cases.case import load_case
 from orchestrator.cli.design import _writable
 from orchestrator.errors import InputError
+from orchestrator.results.manifest import MANIFEST, read_manifest
+from orchestrator.results.staging import staged
 from orchestrator.safe_files import inputs, spare_input
 
 CASE = '[network]\nraw = "net.raw"\n'
@@ -53,3 +56,72 @@ def test_a_design_replaces_a_parameter_file_and_no_other(files):
     assert _writable(Path("own.toml")) == Path("own.toml")
     with pytest.raises(InputError, match="another file is there, not a parameter file"):
         _writable(Path("net.raw"))
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """A case of one's own in a folder with other files."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.toml").write_text(load_case("infinite_bus").text)
+    return "run", "own.toml", "--scenario", "dip", "--stop", "0.02"
+
+
+@pytest.mark.parametrize("place", ["dip", "dip/notes.txt", "case.toml"])
+def test_what_no_run_has_made_is_not_replaced_by_one(gfor, study, tmp_path, place):
+    """A folder or a file with a scenario's name, and another case beside which results are put."""
+    path = tmp_path / place
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("mine")
+    code, _, err = gfor(*study, "--out", ".")
+    assert code == 2
+    assert str(Path(place).parts[0]) in err
+    assert path.read_text() == "mine"
+    assert not (tmp_path / "summary.json").exists()
+
+
+def test_a_run_that_is_repeated_leaves_the_files_of_others(gfor, study, tmp_path):
+    for _ in range(2):
+        code, _, err = gfor(*study, "--out", ".")
+        assert code == 0, err
+        (tmp_path / "dip/notes").mkdir(exist_ok=True)
+        (tmp_path / "dip/notes/mine.txt").write_text("mine")
+    assert (tmp_path / "dip/notes/mine.txt").read_text() == "mine"
+    assert "notes/mine.txt" not in read_manifest(tmp_path / "dip").files
+
+
+def test_a_case_with_other_line_ends_is_run_where_it_lies(gfor, study, tmp_path):
+    (tmp_path / "own.toml").rename("case.toml")
+    content = (tmp_path / "case.toml").read_bytes().replace(b"\n", b"\r\n")
+    (tmp_path / "case.toml").write_bytes(content)
+    code, _, err = gfor("run", "case.toml", *study[2:], "--out", ".")
+    assert code == 0, err
+    assert (tmp_path / "case.toml").read_bytes() == content
+
+
+def test_a_result_is_no_place_for_a_page(gfor, study, tmp_path):
+    gfor(*study, "--out", ".")
+    for name in ("dip/trajectory.nc", "summary.json", "dip/manifest.json"):
+        before = (tmp_path / name).read_bytes()
+        code, _, err = gfor("report", ".", "--out", name)
+        assert (code, f"{name}: it is one of the results" in err) == (2, True), err
+        assert (tmp_path / name).read_bytes() == before
+    assert gfor("report", ".", "--out", "page.html")[0] == 0
+    assert gfor("report", ".", "--out", "page.html")[0] == 0
+
+
+def put(folder, run, **files):
+    with staged(folder, run) as staging:
+        for name, text in files.items():
+            (staging / f"{name}.csv").write_text(text)
+
+
+def test_what_was_computed_stays_beside_a_file_that_is_in_its_way(tmp_path):
+    (tmp_path / "modes.csv").write_text("mine")
+    with pytest.raises(InputError, match=r"modes\.csv: .*no command has written it; the results are in .*one"):
+        put(tmp_path, "one", modes="new", other="new")
+    assert (tmp_path / "modes.csv").read_text() == "mine"
+    assert {path.name for path in (tmp_path / "one").iterdir()} == {"modes.csv", "other.csv", MANIFEST}
+    (tmp_path / "modes.csv").unlink()
+    for text in ("new", "newer"):
+        put(tmp_path, text, modes=text)
+    assert (tmp_path / "modes.csv").read_text() == "newer"
