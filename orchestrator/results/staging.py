@@ -145,9 +145,10 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
     try:
         path.mkdir(parents=True)
         yield path
-        names, own = _files(path), _readable(folder)
-        write_manifest(path, run, names, scenarios, own)
-        if taken := [name for name in names if _is_foreign(folder, name, own, sha256_of(path / name))]:
+        names = _files(path)
+        taken = [name for name in names if _is_foreign(folder, name, sha256_of(path / name))]
+        write_manifest(path, run, names, scenarios, _readable(folder))
+        if taken:
             path.rename(folder / run)
             raise foreign(folder / taken[0], f"the results are in {folder / run}")
         for name in [*names, MANIFEST]:
@@ -162,15 +163,26 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
 
 def check_free(folder: Path, name: str, content: bytes) -> None:
     """Refuse a file that is to be written where somebody else's is, before anything is computed for it."""
-    if _is_foreign(folder, name, _readable(folder), hashlib.sha256(content).hexdigest()):
+    if _is_foreign(folder, name, hashlib.sha256(content).hexdigest()):
         raise foreign(folder / name, "give another --out, or move it")
 
 
-def _is_foreign(folder: Path, name: str, own: Manifest | None, content: str) -> bool:
+def _is_foreign(folder: Path, name: str, content: str) -> bool:
     """Whether a file that is there is read by the command, or of somebody else, and other than the new one."""
     path = folder / name
-    listed = name in own.files if own else (folder / MANIFEST).is_file()
-    return path.is_file() and (not listed or path.resolve() in inputs) and sha256_of(path) != content
+    return path.is_file() and (path.resolve() in inputs or not _is_listed(folder, name)) and sha256_of(path) != content
+
+
+def _is_listed(folder: Path, name: str) -> bool:
+    """Whether a command has written the file, be it one that was killed while it put its files there."""
+    for place in (folder, *folder.glob(f"{PARTIAL}*")):
+        try:
+            found = read_manifest(place)
+        except InputError:  # damaged, as the files may be
+            return True
+        if found and name in found.files:
+            return True
+    return False
 
 
 def foreign(path: Path, remedy: str) -> InputError:

@@ -121,7 +121,7 @@ def test_what_was_computed_stays_beside_a_file_that_is_in_its_way(tmp_path):
         put(tmp_path, "one", modes="new", other="new")
     assert (tmp_path / "modes.csv").read_text() == "mine"
     assert {path.name for path in (tmp_path / "one").iterdir()} == {"modes.csv", "other.csv", MANIFEST}
-    (tmp_path / "modes.csv").unlink()
+    (tmp_path / "one").rename(tmp_path / ".part-one")  # as if it had been killed while it put its files there
     for text in ("new", "newer"):
         put(tmp_path, text, modes=text)
     assert (tmp_path / "modes.csv").read_text() == "newer"
