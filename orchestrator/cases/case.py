@@ -148,10 +148,10 @@ class Case(CaseDefinition):
 
     def _beside(
         self, overrides: Mapping[str, Value] | None, step_size: float | None, parameters: Sequence[ParameterFile],
-        name: str, plain: bool, further: Mapping[str, Value] | None = None,
+        name: str, plain: bool, further: Mapping[str, Value] | None = None, stop_time: float | None = None,
     ) -> PreparedScenario | None:  # fmt: skip
         if not plain:
-            return self.prepare([name], {**(overrides or {}), **(further or {})}, step_size, None, parameters)[0]
+            return self.prepare([name], {**(overrides or {}), **(further or {})}, step_size, stop_time, parameters)[0]
         return self.prepare([name], None, step_size)[0] if overrides or parameters else None
 
     def _switched_off(

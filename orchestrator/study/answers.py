@@ -1,7 +1,7 @@
 """The answer to what a study was run for, one line a scenario: verdict, the mode in question, one remark."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rich.table import Table
@@ -11,6 +11,8 @@ from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Cause
 from orchestrator.errors import RunInterruptedError
 from orchestrator.report.tables import COLOURS, first_few, make_table, short
+from orchestrator.results.mode_json import eigenvalue_json
+from orchestrator.study.after_events import least_damped
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 
@@ -31,15 +33,18 @@ class ScenarioAnswer:
     verdict: str
     mode: Mode | None  # the least damped mode of the range
     remark: str
+    after: Mode | None = None  # the same where the events leave something switched
 
     def as_json(self) -> dict[str, Any]:
-        return {
+        found = {
             "stable": self.good,
             "verdict": self.verdict,
             "frequency_hz": None if self.mode is None else self.mode.frequency_hz,
             "damping_percent": None if self.mode is None else self.mode.damping_percent,
             "remark": self.remark,
         }
+        after = self.after and eigenvalue_json(self.after.eigenvalue, self.after.damping_percent)
+        return found | ({"after_events": after} if after else {})
 
 
 def of_modes(result: ModesResult) -> ScenarioAnswer:
@@ -72,7 +77,15 @@ def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str,
 
 
 def of_run(result: RunResult) -> ScenarioAnswer:
-    """By what the run showed; its eigenvalues are those before its events."""
+    """By what the run showed, and by the eigenvalues before its events and after them."""
+    after, answer = least_damped(result.after), _by_response(result)
+    if result.unstable_after and answer.good is not False and isinstance(result.after, ModesResult):
+        remark = short(f"the system that the events leave: {of_modes(result.after).remark}", _LONGEST)
+        answer = replace(answer, good=False, verdict="UNSTABLE", remark=remark)
+    return replace(answer, after=after)
+
+
+def _by_response(result: RunResult) -> ScenarioAnswer:
     by_modes = of_modes(result.modes)
     title, mode = by_modes.subject, by_modes.mode
     if isinstance(result.failure, RunInterruptedError):
@@ -115,10 +128,13 @@ def answers_table(answers: Sequence[ScenarioAnswer], frequency_range: tuple[floa
     low, high = frequency_range
     table = make_table("", "Scenario", "Verdict", "f [Hz]", "Damping [%]", left=2)
     table.title = None
-    table.add_column(f"Least damped mode from {low:g} to {high:g} Hz: who swings; remark", overflow="fold")
+    when = ", before → after the events" if any(answer.after for answer in answers) else ""
+    table.add_column(f"Least damped mode from {low:g} to {high:g} Hz{when}: who swings; remark", overflow="fold")
     for answer in answers:
         mode = answer.mode
-        figures = ("–", "–") if mode is None else (f"{mode.frequency_hz:.3f}", f"{mode.damping_percent:.2f}")
+        modes = [one for one in (mode, answer.after) if one]
+        figures = [" → ".join(found) or "–" for found in ([f"{m.frequency_hz:.3f}" for m in modes],
+                                                          [f"{m.damping_percent:.2f}" for m in modes])]  # fmt: skip
         word = Text(answer.verdict, style=f"bold {COLOURS[answer.good]}")
         table.add_row(answer.subject, word, *figures, answer.remark)
     return table

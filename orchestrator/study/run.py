@@ -38,6 +38,7 @@ from orchestrator.fmi.protection import Protection, missing
 from orchestrator.results.recorded import open_whole
 from orchestrator.results.recording import ENDED_EARLY, TRAJECTORY, RecordingFolder
 from orchestrator.results.storage import trajectory_dataset
+from orchestrator.study.after_events import modes_after
 from orchestrator.study.checkpoint_mark import computed
 from orchestrator.study.checkpoints import Checkpoints
 from orchestrator.study.linear import linear_response
@@ -80,6 +81,12 @@ class RunResult:
     findings: list[Finding] = field(default_factory=list)
     # what kept each foreign FMU from the rest of the machine, by component
     protections: dict[str, tuple[Protection, ...]] = field(default_factory=dict)
+    after: ModesResult | str | None = None  # as `modes_after` has it
+
+    @property
+    def unstable_after(self) -> bool:
+        """Whether the system that the events leave has a growing mode, whatever the run could show of it."""
+        return isinstance(self.after, ModesResult) and self.after.stability.stable is False
 
     @property
     def went_unstable(self) -> list[Finding]:
@@ -144,6 +151,7 @@ def _run(
     watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None
+    after = None if federation else modes_after(prepared, frequency_range)
     with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]
@@ -172,7 +180,8 @@ def _run(
         except KeyboardInterrupt:
             failure = RunInterruptedError(f"{calls.how} at t = {master.time:.6g} s")
     dataset, failure = _recorded(watch, prepared, recording, failure)
-    findings = watch.findings(failure, master.late_starts, modes.misfits, () if modes.fit_errors else modes.eigenvalues)
+    known, later = (() if not isinstance(r, ModesResult) or r.fit_errors else r.eigenvalues for r in (modes, after))
+    findings = watch.findings(failure, master.late_starts, modes.misfits, known, later)
     ring_down, why_none = (None, "") if failure else ring_down_of(modes, dataset, findings)
     unprotected = tuple(
         f"{name} runs in a process of its own, and this system lacks: {'; '.join(lacking)}"
@@ -184,9 +193,10 @@ def _run(
         for name, plan in prepared.system.components.items()
         if plan.isolated is False and is_isolated(plan.description, None)
     )
-    about_run = (*map(str, prepared.about_rows), *([why_none] if why_none else []), *unprotected, *inside)
+    not_known = [after] if isinstance(after, str) else []
+    about_run = (*map(str, prepared.about_rows), *filter(None, [why_none]), *not_known, *unprotected, *inside)
     modes = replace(modes, warnings=(*modes.warnings, *about_run))
-    return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure, findings, protections)
+    return RunResult(modes, dataset, statistics, ring_down, shifts, follows, failure, findings, protections, after)
 
 
 def _diverging(master: Master) -> list[str]:

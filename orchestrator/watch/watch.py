@@ -1,7 +1,8 @@
 """The watch over a run: all checks together."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from types import MappingProxyType
 
@@ -124,22 +125,25 @@ class Watch:
         late_starts: Mapping[str, LateStart] | None = None,
         misfits: Mapping[str, Sequence[Misfit]] = MappingProxyType({}),
         modes: Sequence[complex] = (),
+        later: Sequence[complex] = (),
     ) -> list[Finding]:
         """The findings, in the order of their beginning; available after the run, even after one that failed.
 
         ``misfits``: Of devices and their bindings, by component.
-        ``modes``: Eigenvalues of the linear model at the start [rad/s]; empty if not all are known."""
+        ``modes``, ``later``: Eigenvalues of the linear model at the start, and of that which the events leave [rad/s];
+        empty if not all are known."""
         seen = rescaled(self._watcher.seen(self.recorder if self._looks_at_records else None), misfits)
         whole = failure is None
         system = self._prepared.system
-        told = judged(seen, system, self._prepared.events, modes, whole=whole) if len(seen.times) > 1 else ()
+        told = judged(seen, system, self._prepared.events, modes, later, whole=whole) if len(seen.times) > 1 else ()
         found = chain(_late(late_starts or {}), _failure(failure), _not_finite(seen), _misfits(misfits), told)
         return sorted(found, key=lambda finding: finding.time)
 
 
 def judged(
-    seen: Seen, system: System, events: Sequence[Event], modes: Sequence[complex] = (), *, whole: bool = True
-) -> list[Finding]:
+    seen: Seen, system: System, events: Sequence[Event], modes: Sequence[complex] = (), later: Sequence[complex] = (),
+    *, whole: bool = True,
+) -> list[Finding]:  # fmt: skip
     """All findings from the signals.
 
     ``whole``: Whether the run came to its end; of one that did not, nobody asks whether it settles."""
@@ -161,8 +165,9 @@ def judged(
         parts = [part for part in parts if part.begin >= happened[0]]
     units = [name for name, plan in system.components.items() if "omega" in plan.description.outputs]
     at_a_limit = any(finding.kind == "active_limit" and finding.until is None for finding in found)
-    modes = () if at_a_limit else modes
-    responses = _Responses(seen, system, units, disturbances(system, events, end), settings, modes)
+    modes, later = ((), ()) if at_a_limit else (modes, later)
+    known = partial(_known, settings, modes, later, max(happened, default=0.0))
+    responses = _Responses(seen, system, units, disturbances(system, events, end), settings, known)
     told = _first_of_each(chain.from_iterable(responses.found(part) for part in parts))
     if happened and not enough_looks(seen, parts[-1]):
         responses.short.append(parts[-1])
@@ -173,13 +178,21 @@ def judged(
     return found
 
 
+def _known(
+    settings: Settings, modes: Sequence[complex], later: Sequence[complex], last: float, begin: float
+) -> KnownModes:
+    """What is known of the modes in a stretch by its begin; ``last`` is the time of the last event [s]."""
+    as_before = settings.as_at_start(begin)
+    return KnownModes(later, True) if later and not as_before and begin >= last else KnownModes(modes, as_before)
+
+
 class _Responses:
     def __init__(
         self, seen: Seen, system: System, units: Sequence[str], disturbances: Sequence[Unrest], settings: Settings,
-        modes: Sequence[complex],
+        known: Callable[[float], KnownModes],
     ) -> None:  # fmt: skip
         self._seen, self._system, self._units, self._disturbances = seen, system, units, disturbances
-        self._settings, self._modes = settings, modes
+        self._settings, self._known = settings, known
         self.masked: dict[Stretch, Sequence[Unrest]] = {}
         self.short: list[Stretch] = []
         self.clear: list[Stretch] = []
@@ -196,7 +209,7 @@ class _Responses:
 
     def _one(self, part: Stretch, *, told: bool = True) -> list[Finding]:
         acting = among(self._disturbances, part)
-        known = KnownModes(self._modes, self._settings.as_at_start(part.begin))
+        known = self._known(part.begin)
         found = unsettled_response(self._seen, self._system, part, self._units, known, noisy=bool(acting))
         found = [finding for finding in found if not any(one.explains(finding) for one in acting)]
         if acting and told and not found and unsettled_response(self._seen, self._system, part, self._units, known):

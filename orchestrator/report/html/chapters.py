@@ -88,6 +88,8 @@ def of_run(folder: Path, scenarios: Sequence[Content], content: str = "", beside
         least = min((m for m in modes if m.get("damping_percent") is not None), key=lambda m: m["damping_percent"],
                     default=None)  # fmt: skip
         figures = f", least damped {least['frequency_hz']:.3f} Hz, {least['damping_percent']:.2f} %" if least else ""
+        if later := answer.get("after_events"):
+            figures += f", after the events {later['frequency_hz']:.3f} Hz, {later['damping_percent']:.2f} %"
         remark = f" ({answer['remark']})" if answer.get("remark") else ""
         said.append((stable, f"{title}: {word}{figures}{remark}"))
         open_ += [f"{title}: {f['message']}" for f in s.get("findings", []) if f["kind"] == "not_judged"]

@@ -1,0 +1,58 @@
+"""A run whose events leave a line open is judged by the system that is left as well, however short it is."""
+
+import json
+
+import pytest
+
+import orchestrator as gfor_api
+from orchestrator.study.after_events import switched
+from tests.screening.five_machines import five_machines
+
+pytestmark = pytest.mark.filterwarnings("ignore::orchestrator.api.scenario.UnusualDataWarning")
+
+FAST = {"R": 0.02, "T_1": 0.3, "T_2": 0.0, "T_3": 0.6}  # governors that feed the swing once the ring is open
+VALUES = {f"sg[1235].governor.{name}": value for name, value in FAST.items()} | {"grid.X_line_15_11": 0.5}
+FAULT = "bus_14, 60 ms, opens line_13_14, from 0.5 s"
+
+
+@pytest.fixture
+def case(tmp_path):
+    five_machines(tmp_path)
+    return tmp_path / "five.toml"
+
+
+def run(gfor, case, *further, stop="3"):
+    code, out, err = gfor(
+        "run", case, *further, "--stop", stop, "--json", "--fail-unstable", "--out", case.parent / "r"
+    )
+    assert code in (0, 1), err
+    (found,) = json.loads(out)
+    return code, found
+
+
+def test_a_network_that_is_unstable_after_the_fault_is_told(gfor, case):
+    values = [word for key, value in VALUES.items() for word in ("--set", f"{key}={value}")]
+    code, found = run(gfor, case, "--fault", FAULT, *values)
+    by_hand = gfor_api.load(case).scenario("base", VALUES | {"grid.line_13_14.connected": False}).modes()
+    least = min(by_hand, key=lambda mode: mode.damping_percent)
+    after, answer = found["answer"]["after_events"], found["answer"]
+    assert least.damping_percent < -1
+    assert (after["frequency_hz"], after["damping_percent"]) == pytest.approx(
+        (least.frequency_hz, least.damping_percent)
+    )
+    assert (code, answer["stable"], answer["verdict"]) == (1, False, "UNSTABLE")
+    assert "the system that the events leave: grows at" in answer["remark"] or "grows from" in answer["remark"]
+    assert answer["damping_percent"] > 7
+
+
+def test_a_network_that_stays_stable_is_stable(gfor, case):
+    code, found = run(gfor, case, "--fault", FAULT, stop="8")
+    assert (code, found["answer"]["verdict"]) == (0, "stable")
+    assert found["answer"]["after_events"]["damping_percent"] == pytest.approx(10.19, abs=0.05)
+
+
+def test_a_fault_that_opens_nothing_leaves_the_system_as_it_was(gfor, case):
+    _, found = run(gfor, case, "--fault", "bus_14, 60 ms, from 0.5 s")
+    assert "after_events" not in found["answer"]
+    scenario = gfor_api.load(case).scenario("base", fault=FAULT)
+    assert switched(scenario.prepared) == {"grid.line_13_14.connected": False}
