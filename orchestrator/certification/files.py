@@ -14,6 +14,7 @@ from orchestrator.certification.codes.record import code_json, code_responses
 from orchestrator.certification.figures import damping_json, damping_responses
 from orchestrator.certification.form import case_files
 from orchestrator.certification.report import page
+from orchestrator.errors import InputError
 from orchestrator.report.pdf import print_pdf
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import file_hash, write_text
@@ -39,6 +40,17 @@ def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
     content["files"] = hashes | {file.name: file_hash(file) for file in (html, *printed)}
     write_sealed(content, target)
     return [html, target, folder / RESPONSES, *printed]
+
+
+def spare_another(folder: Path, code: str) -> None:
+    """Refuse a folder with a certificate by another code, which this one would replace."""
+    try:
+        there = read_record(folder / JSON).get("code", "nts631")
+    except (OSError, ValueError, AttributeError):
+        return
+    if there != code:
+        raise InputError(f"{folder}: it holds a certificate by {there}, which one by {code} would replace; give "
+                         "another --out, or leave it out")  # fmt: skip
 
 
 def write_sealed(content: Mapping[str, Any], path: Path) -> None:

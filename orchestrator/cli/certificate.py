@@ -20,7 +20,7 @@ from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.codes.row import checked, in_words, like
 from orchestrator.certification.codes.row_verdict import NO_VERDICT, NOT_JUDGED
 from orchestrator.certification.details import Details, read_details
-from orchestrator.certification.files import JSON, save
+from orchestrator.certification.files import JSON, save, spare_another
 from orchestrator.certification.inside import check_target, put_inside
 from orchestrator.certification.judgement import PointVerdict
 from orchestrator.certification.kinds import WITH_VERDICT, CertifyRequest, bench_request, usual_folder
@@ -149,6 +149,7 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
         check_code_options(options, [device])
     folder = options.out or usual_folder(device.name, key)
     console = make_console(stderr=options.json)
+    spare_another(folder, key)
     if options.into:
         check_target(device.file, options.into)
     found, files = certified(options, device, key, folder, console)

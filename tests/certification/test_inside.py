@@ -12,6 +12,7 @@ import pytest
 
 import orchestrator as gfor
 from orchestrator.certification.codes.all_codes import CODES, ERCOT, FINGRID
+from orchestrator.certification.files import spare_another
 from orchestrator.certification.inside import FOLDER, taken_out
 from tests.pages.markdown import ROOT, blocks
 
@@ -78,6 +79,14 @@ def test_fmpy_alone_repeats_it_and_sees_another_fmu(certified, script, tmp_path)
                 data = re.sub(rb'(name="droop.R_f">\s*<[^>]* value=")[^"]*', rb"\g<1>0.1", data)
             new.writestr(name, data)
     assert "ANOTHER ANSWER" in repeated(script, other)[0]
+
+
+def test_a_certificate_by_another_code_is_not_replaced(converter, tmp_path, gfor_command):
+    (tmp_path / "certificate.json").write_text('{"code": "miso"}')
+    code, _, said = gfor_command("certify", converter, "--code", "ercot", "--no-check", "--out", tmp_path)
+    assert code == 2
+    assert "it holds a certificate by miso, which one by ercot would replace" in " ".join(said.split())
+    spare_another(tmp_path, "miso")
 
 
 def test_a_second_code_joins_and_the_same_code_replaces_its_own(certified, converter, tmp_path, gfor_command):
