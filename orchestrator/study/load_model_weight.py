@@ -25,23 +25,23 @@ class Choosable(Protocol):
 def load_model_weights(
     scenarios: Sequence[Choosable], results: Sequence[ModesResult], frequency_range: tuple[float, float]
 ) -> list[str]:
-    """The least damped mode of the range with both load models, of the scenario that they move most."""
+    """The least damped mode of the range with both load models, of the scenario where the lower one is least."""
     weights = [_weight(*each, frequency_range) for each in zip(scenarios, results, strict=True)]
-    known = [(size, text, result.prepared.name) for result, (size, text) in zip(results, weights, strict=True) if text]
+    known = [(least, text, r.prepared.name) for r, (least, text) in zip(results, weights, strict=True) if text]
     if not known:
         return []
-    _, text, name = max(known, key=lambda one: one[0])
+    _, text, name = min(known, key=lambda one: one[0])
     alike = len({text for _, text, _ in known}) == 1
-    return [text if alike else f"scenario {name!r}, where it is most of {len(known)}: {text}"]
+    return [text if alike else f"scenario {name!r}, the least damped of {len(known)}: {text}"]
 
 
 def _weight(scenario: Choosable, result: ModesResult, frequency_range: tuple[float, float]) -> tuple[float, str]:
-    """Points of damping between the load models, and the question; "" where there is none to ask."""
+    """The least damping [%] with either load model, and the question; "" where there is none to ask."""
     network = result.prepared.case.table.network
     if not is_open(network) or result.prepared.network is None or not result.prepared.network.loads:
         return 0.0, ""
     if (states := result.model.number_of_states) > _MOST_STATES:
-        return math.inf, (
+        return -math.inf, (
             f"the load model is open, and how much it moves the modes was not computed, as the system has {states} "
             f"states, more than {_MOST_STATES}; write which in [network], as load_model, once as each, and compare"
         )
@@ -50,12 +50,12 @@ def _weight(scenario: Choosable, result: ModesResult, frequency_range: tuple[flo
         found = None if other is None else compute_modes(other.prepared, frequency_range)
     except CosimError as error:
         text = f"the load model: with constant powers there are no modes: {str(error).splitlines()[0]}"
-        return math.inf, text
+        return -math.inf, text
     here, there = _least_damped(result), None if found is None else _least_damped(found)
     if here is None or there is None:
         return 0.0, ""
     low, high = frequency_range
-    return abs(there.damping_percent - here.damping_percent), (
+    return min(here.damping_percent, there.damping_percent), (
         f"the load model moves the least damped mode from {low:g} to {high:g} Hz: impedance {_figures(here)}, power "
         f"{_figures(there)}; write which in [network], as load_model"
     )

@@ -11,13 +11,13 @@ from orchestrator.study import load_model_weight
 @pytest.mark.parametrize(
     ("weights", "said"),
     [
-        ([(0.1, "little"), (1.6, "much"), (0.0, "")], ["scenario 'b', where it is most of 2: much"]),
+        ([(3.1, "more"), (0.1, "least"), (0.0, "")], ["scenario 'b', the least damped of 2: least"]),
         ([(1.6, "the same"), (1.6, "the same"), (0.0, "")], ["the same"]),
-        ([(9.0, "much"), (0.1, "little"), (math.inf, "no modes")], ["scenario 'c', where it is most of 3: no modes"]),
+        ([(9.0, "much"), (0.1, "little"), (-math.inf, "no modes")], ["scenario 'c', the least damped of 3: no modes"]),
         ([(0.0, "")] * 3, []),
     ],
 )
-def test_the_scenario_of_most_weight_is_told(monkeypatch, weights, said):
+def test_the_scenario_with_the_least_damping_is_told(monkeypatch, weights, said):
     found = dict(zip("abc", weights, strict=True))
     monkeypatch.setattr(load_model_weight, "_weight", lambda scenario, result, frequencies: found[scenario])
     results = [SimpleNamespace(prepared=SimpleNamespace(name=name)) for name in "abc"]
