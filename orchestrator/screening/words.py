@@ -47,7 +47,7 @@ def by_outage(summary: Summary) -> list[OutageRow]:
         unjudged = tuple(item for item in items if item.record.status is not Status.COMPUTED)
         rows.append(OutageRow(name, worst, least, unjudged, len(items)))
     return sorted(rows, key=lambda row: (
-        not row.unstable, not row.unjudged, row.least.damping if row.least else np.inf,
+        not row.unstable, not (row.unstable or row.unjudged), row.least.damping if row.least else np.inf,
     ))  # fmt: skip
 
 

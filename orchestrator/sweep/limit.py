@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.analysis.modes import Mode, damping_percent, make_mode
-from orchestrator.errors import ErrorKind
+from orchestrator.errors import ErrorKind, few
 from orchestrator.report.tables import short
 from orchestrator.sweep.point import PointRecord
 
@@ -127,10 +127,10 @@ class ParameterLimit:
             return f"{holding} over the whole range, {self.key} from {start} to {stop}{strained}{worst}"
         what = self.until.failing if self.kind is Ending.FAILS else str(self.kind)
         if self.holds_at is None:
-            return f"{what} already at the start, {self.key} = {at}{mode}{why}"
+            return f"{what} already at the start, {self.key} = {at}{self._again()}{mode}{why}"
         up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}{self._dip()}{strained}"
         if self.kind is Ending.FAILS:
-            return f"{up_to}, {what} at {at}{mode}"
+            return f"{up_to}, {what} at {at}{self._again()}{mode}"
         return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{why}"
 
     def _dip(self) -> str:
@@ -141,11 +141,13 @@ class ParameterLimit:
             return ""
         return f" (on the way {least['damping_percent']:.2f} % at {self._value(least['value'])})"
 
+    def _again(self) -> str:
+        shown = few(map(self._value, self.again), 2)
+        return f" ({self.until.holding} again at {shown}: the range is not of one piece)" if self.again else ""
+
     @property
     def remarks(self) -> list[str]:
-        shown = ", ".join(self._value(value) for value in self.again)
-        again = [f"{self.title}: {self.until.holding} again at {shown}: the range is not of one piece"]
-        return again * bool(self.again) + [
+        return [
             f"{self.title}: {len(self.tried)} values were tried before the bisection; a narrower piece between two of "
             "them that does not hold would not be seen: COUNT in --vary tries more"
         ]
