@@ -59,6 +59,16 @@ def write_bytes(path: Path, content: bytes) -> None:
         partial.write_bytes(content)
 
 
+def check_page(path: Path) -> None:
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path}: a page in HTML is written there; give a name that ends in .html")
+
+
+def write_page(path: Path, text: str) -> None:
+    check_page(path)
+    write_text(path, text)
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file at once, in UTF-8 and with the lines' ends as they are."""
     write_bytes(path, text.encode("utf-8"))

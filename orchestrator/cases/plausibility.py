@@ -63,7 +63,8 @@ RULES = (
 """Rules of the machines' data. The FMUs refuse the same data in any tool; here the error names the line, before any FMU
 is started."""
 
-RESISTANCES = (("transformer.R_t", "transformer.X_t"), ("filter.R_c", "filter.X_c"), ("machine.X_d1", "machine.X_q1"))
+RESISTANCES = (("transformer.R_t", "transformer.X_t"), ("filter.R_c", "filter.X_c"), ("machine.X_d1", "machine.X_q1"),
+               ("machine.X_q", "machine.X_d"))  # fmt: skip
 """Resistances and reactances, each with a larger one that it should not exceed."""
 
 

@@ -14,7 +14,7 @@ from orchestrator.cli.terminal import keep_json, make_console, print_json, print
 from orchestrator.cli.verdict import add_details_argument
 from orchestrator.errors import InputError
 from orchestrator.oscillations.view import Sources, opinions_table, sources_table
-from orchestrator.safe_files import write_text
+from orchestrator.safe_files import write_page
 
 _SHOWN = 5
 
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     if options.html:
         if options.contest:
             raise InputError("--html: it is the page of one record; give RUN in the place of --contest")
-        write_text(options.html, found[0].html())
+        write_page(options.html, found[0].html())
     if options.json:
         print_json(records if options.contest else records[0])
         return 0

@@ -10,7 +10,7 @@ from orchestrator.errors import InputError
 from orchestrator.explore.files import whole_page
 from orchestrator.explore.worker import Desk
 from orchestrator.points.points import CountReport
-from orchestrator.safe_files import write_text
+from orchestrator.safe_files import check_page, write_text
 from orchestrator.sweep.axes import Vary, resolve
 
 _MOST = 400  # of the grid's points: the page holds all their modes
@@ -20,6 +20,7 @@ def save_page(
     path: Path, case: Case, desk: Desk, beginning: Mapping[str, Any], varied: Sequence[Vary], report: CountReport
 ) -> None:
     """Compute the modes over the grid, and write the page; a scenario's other values are those it begins with."""
+    check_page(path)
     name, values = str(beginning["scenario"]), dict(beginning["values"])
     prepared = [case.scenario(name, values).prepared]
     axes = [resolve(vary, prepared) for vary in varied]

@@ -17,7 +17,6 @@ from orchestrator.units import read_value
 _LABELS = ("time", "name")
 _ANOTHER_UNIT = 25.0  # times smaller than the case's own is a whole column of powers that is asked about
 _LEFT = 0.05  # part of the case's load that is asked about where points leave it to the slack
-_MEANT = ("1", "1.0")  # factors of generation that leave it to the slack by intention
 
 
 @dataclass(frozen=True)
@@ -106,8 +105,9 @@ def questions_about(
     feeding = [unit for unit in elements.units if unit not in elements.balancing]
     fed = {unit: own_power(f"{unit}.{ACTIVE}", elements, prepared) or 0.0 for unit in feeding}
     load = load_of(elements.loads, prepared.system.components[elements.grid])
+    # a factor of 1 for generation leaves it to the slack by intention
     leaves = {point.name: _left(point, prepared, elements, fed, load) for row, point in zip(rows, points, strict=True)
-              if (row.get("generation") or "").strip() not in _MEANT}  # fmt: skip
+              if float(row.get("generation") or 0) != 1}  # fmt: skip
     worst = max(leaves, key=lambda name: abs(leaves[name]), default="")
     more = leaves.get(worst, 0.0)
     if abs(more) > _LEFT * abs(load):

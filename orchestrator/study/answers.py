@@ -9,6 +9,7 @@ from rich.text import Text
 
 from orchestrator.analysis.modes import Mode
 from orchestrator.analysis.stability import Cause
+from orchestrator.coupling.events import Forcing
 from orchestrator.errors import RunInterruptedError
 from orchestrator.report.tables import COLOURS, first_few, make_table, short
 from orchestrator.results.mode_json import eigenvalue_json
@@ -111,8 +112,13 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     if result.stable_in_simulation is None:
         return ScenarioAnswer(title, None, "not known", mode, "not judged throughout; the findings say where and why")
-    if by_modes.good is None or not result.modes.prepared.events:
+    if by_modes.good is None:
         return by_modes
+    if not result.modes.prepared.events:
+        return replace(by_modes, remark="; ".join(filter(None, ("no event disturbs it", by_modes.remark))))
+    if forced := [str(e) for e in result.modes.prepared.events if isinstance(e, Forcing) and (e.end or end) >= end]:
+        remark = f"keeps synchronism until {end:g} s; whether it settles shows once the forcing is over: {forced[0]}"
+        return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     rest = f", before the events at {later}" if later else ""
     rest += f"; {by_modes.remark}" if by_modes.remark else ""
     said = f"keeps synchronism and settles until {end:g} s{rest}"

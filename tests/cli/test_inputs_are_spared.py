@@ -125,3 +125,20 @@ def test_what_was_computed_stays_beside_a_file_that_is_in_its_way(tmp_path):
     for text in ("new", "newer"):
         put(tmp_path, text, modes=text)
     assert (tmp_path / "modes.csv").read_text() == "newer"
+
+
+def test_a_page_goes_where_pages_go(gfor, study, tmp_path):
+    gfor(*study, "--out", "r")
+    before = (tmp_path / "own.toml").read_text()
+    code, _, err = gfor("report", "r", "--out", "own.toml")
+    assert (code, "give a name that ends in .html" in err) == (2, True), err
+    assert (tmp_path / "own.toml").read_text() == before
+
+
+def test_a_case_that_was_edited_since_is_told_in_a_report(gfor, study, tmp_path):
+    gfor(*study, "--out", "r")
+    assert "not as they were" not in gfor("report", "r")[2]
+    with (tmp_path / "own.toml").open("a") as file:
+        file.write("# another one\n")
+    assert "not as they were when results were made of them: own.toml (of r)" in gfor("report", "r")[2]
+    assert "make the results again" in (tmp_path / "r/report.html").read_text()

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import orchestrator as gfor_api
-from orchestrator.study.after_events import switched
+from orchestrator.study.after_events import left_changed
 from tests.screening.five_machines import five_machines
 
 pytestmark = pytest.mark.filterwarnings("ignore::orchestrator.api.scenario.UnusualDataWarning")
@@ -55,4 +55,4 @@ def test_a_fault_that_opens_nothing_leaves_the_system_as_it_was(gfor, case):
     _, found = run(gfor, case, "--fault", "bus_14, 60 ms, from 0.5 s")
     assert "after_events" not in found["answer"]
     scenario = gfor_api.load(case).scenario("base", fault=FAULT)
-    assert switched(scenario.prepared) == {"grid.line_13_14.connected": False}
+    assert left_changed(scenario.prepared) == {"grid.line_13_14.connected": False}

@@ -20,7 +20,7 @@ from orchestrator.report.html.elements import Figures, document, held_data, para
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, ResultsWarning
-from orchestrator.safe_files import write_text
+from orchestrator.safe_files import file_hash, write_page
 
 USED = (
     "run, modes, screen, sweep, site, design, sensitivities, interactions, certify, scr, fmu check, fmu nyquist, "
@@ -41,7 +41,7 @@ def write_report(
     ``against``: an older page, or an older folder of results, of which it says what changed since.
     ``short``: the first page and where all comes from, without the chapters."""
     target = path or (folder if folder.is_dir() else folder.parent) / "report.html"
-    write_text(target, page(list(dict.fromkeys([folder, *others])), against, title, short=short))
+    write_page(target, page(list(dict.fromkeys([folder, *others])), against, title, short=short))
     return target
 
 
@@ -50,6 +50,8 @@ def page(places: Sequence[Path], against: Path | None = None, title: str | None 
     chapters = [chapter for chapter, _ in told]
     if differ := _of_several_studies(chapters):
         warnings.warn(differ, ResultsWarning, stacklevel=2)
+    if changed := _changed_since(chapters):
+        warnings.warn(changed, ResultsWarning, stacklevel=2)
     headings = [heading for _, content in told for heading, _ in content]
     content = [
         (heading if headings.count(heading) == 1 else f"{heading} ({_name(chapter.source)})", text)
@@ -69,7 +71,7 @@ def page(places: Sequence[Path], against: Path | None = None, title: str | None 
     found = "".join(map(sections.findings, runs))
     of_all = {"question": "Are these results of one study?", "source": "", "answer": f"NO: {differ}"}
     answers = held_data("answers", [*[of_all] * bool(differ), *_answers(chapters)])  # for `changes` of a later page
-    above = paragraphs(False, [differ]) if differ else ""
+    above = "".join(paragraphs(False, [text]) for text in (differ, changed) if text)
     return document(title, kind, above + first_page(chapters) + picture + found + answers, content)
 
 
@@ -132,6 +134,15 @@ def _of_several_studies(chapters: Sequence[Chapter]) -> str:
         alike.setdefault(", and ".join(f"{kind} in {few(at, 2)}" for kind, at in by.items()), []).append(what)
     said += [f"{few(names, 1)}: {text}" for text, names in alike.items()]
     return f"{'; '.join(said)}; figures are not comparable as one study" if said else ""
+
+
+def _changed_since(chapters: Sequence[Chapter]) -> str:
+    """Files that results were made from and that are here, by the same path, with another content by now."""
+    made_of = {one.source: _origin(one.source).get("inputs", {}) for one in chapters}
+    found = {name: source for source, inputs in made_of.items() for name, content in inputs.items()
+             if Path(name).is_file() and file_hash(Path(name)) != content}  # fmt: skip
+    names = few((f"{name} (of {source})" for name, source in found.items()), 3)
+    return f"not as they were when results were made of them: {names}; make the results again" if names else ""
 
 
 def _unlike(told: Mapping[str, Sequence[tuple[str, str]]]) -> Iterator[tuple[str, dict[str, list[str]]]]:
