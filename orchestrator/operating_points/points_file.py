@@ -124,7 +124,8 @@ def _left(
     nearer to the slack's own share than to all of it. ``others``: units beside the slack's, and what each feeds."""
     wanted, given = _drawn(point, prepared, elements) - load, 0.0
     for unit, power in others.items():
-        if unit in point.out:
+        switches = f"{unit}.connected", f"{elements.grid}.{unit}.connected"
+        if unit in point.out or any(point.values.get(switch) is False for switch in switches):
             wanted += power
         elif f"{unit}.P_0" in point.values or f"{unit}.S_n" in point.values:
             rating = prepared.system.components[unit].number("S_n")

@@ -56,3 +56,14 @@ def test_a_fault_that_opens_nothing_leaves_the_system_as_it_was(gfor, case):
     assert "after_events" not in found["answer"]
     scenario = gfor_api.load(case).scenario("base", fault=FAULT)
     assert left_changed(scenario.prepared) == {"grid.line_13_14.connected": False}
+
+
+def test_settling_is_not_judged_while_something_is_forced(gfor, case):
+    _, found = run(gfor, case, "--fault", "bus_14, 60 ms, from 0.5 s", "--force", "sg1 0.8 Hz 0.1 %", stop="8")
+    assert found["answer"]["stable"] is None
+    assert "sg1.governor.delta_P_ref: forced until then, so settling is not judged" in found["answer"]["remark"]
+
+
+def test_a_run_without_events_says_so(gfor, case):
+    _, found = run(gfor, case)
+    assert found["answer"]["remark"].startswith("no event disturbs it")
