@@ -78,7 +78,7 @@ _SHOWN = 200  # characters of a value that are shown
 
 def faults_of(stated: Mapping[str, Any], again: Mapping[str, Any]) -> Iterator[str]:
     """Sentences on what is stated and does not come out; rows are compared by their names."""
-    taken = TAKEN if _of_one_program(stated, again) else TAKEN | WORDS
+    taken = TAKEN if of_one_program(stated, again) else TAKEN | WORDS
     rows = "points" if "points" in again else "rows"
     whole = [{k: v for k, v in c.items() if k not in (rows, *WRITTEN_LAST)} for c in (stated, again)]
     for place, text in differences(whole[0], whole[1], taken):
@@ -100,7 +100,7 @@ def _name(row: Mapping[str, Any]) -> str:
     return f"row {row['row']}" if "row" in row else f"X_L = {row['X_L']:g} pu"
 
 
-def _of_one_program(*records: Content) -> bool:
+def of_one_program(*records: Content) -> bool:
     one, other = ([(r.get("environment") or {}).get(key) for key in ("gfor-cosim", "Commit")] for r in records)
     return one == other and None not in one
 

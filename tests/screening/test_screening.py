@@ -183,6 +183,8 @@ def questions(path, prepared, elements):
         ("load_3.in_service", "0", "less"),
         ("sg1.in_service", "0", "more"),
         ("load,generation", "0.9,1", ""),
+        ("load,generation", "0.9,1.00", ""),
+        ("sg1.connected", "false", "more"),
         ("load,sg1.P_mw", "0.9,800", ""),
         ("load,sg1.P_mw", "0.9,1350", "less"),
         ("load,sg1.S_n", "0.9,1490", "less"),
