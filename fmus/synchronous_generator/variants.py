@@ -41,7 +41,6 @@ class Variant:
 
 
 AC4A = Variant("ac4a", ac4a, IEEE118, IEEEG1_STAMP)  # the generators of the IEEE 118-bus case
-
 ST1 = Variant("st1", st1, SG2, IEEEG1_NTS631)  # SG2 of the two-area case
 
 ST4B = Variant("st4b", st4b, SG1, IEEEG1_NTS631)

@@ -9,7 +9,6 @@ from fmus.toolchain.model import NodalEquations
 from fmus.toolchain.symbols import Expr, Function, Scalar, Vector, symbols, symbols_in
 
 Complex = tuple[Scalar, Scalar]  # real and imaginary part
-
 LARGEST_REST = 1e-6  # part of its terms that a row of Y·v = i may leave over; with more, no voltage is finite
 
 

@@ -45,7 +45,6 @@ _CAUSALITIES = {
 _OURS = f"VendorAnnotations/Tool[@name='{TOOL}']"
 _RATED = {variable.name: variable for variable in RATED}
 _LONGEST_WHY = 200  # characters of a range's reason that are taken from a file
-
 _SCALARS = "ModelVariables/ScalarVariable"  # where FMI 2.0 has its variables
 _OTHER_KINDS = {"ModelExchange": "for Model Exchange", "ScheduledExecution": "for Scheduled Execution"}
 

@@ -28,7 +28,6 @@ from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.symbols import Expr, fmax
 
 _MOST = 1e9  # no upper limit of V_E [pu]
-
 _LEAST = 1e-3  # smallest V_E [pu] that the rectifier's loading is divided by
 
 
