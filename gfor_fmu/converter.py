@@ -41,12 +41,8 @@ class Converter:
 
 def grid_forming_converter() -> Model:
     """Average EMT-type model of a droop-controlled grid-forming converter, stiff DC side (the paper's Fig. 1)."""
-    m = ModelBuilder(
-        "gfor",
-        "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (EMT-type average model)",
-        kind="converter",
-        usual=FORMING,
-    )
+    title = "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (EMT-type average model)"
+    m = ModelBuilder("gfor", title, kind="converter", usual=FORMING)
     port = device_port(m, S_n=S_N, P_0=P_0)
     converter = declare_converter(m, port)
     declare_port_outputs(m, port, converter.current)

@@ -19,12 +19,8 @@ from gfor_fmu.usual import FORMING
 
 def grid_forming_converter_phasor() -> Model:
     """Droops and POD controllers of `grid_forming_converter` behind an algebraic electrical side."""
-    m = phasor_builder(
-        "gfor_phasor",
-        "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (phasor type)",
-        kind="converter",
-        usual=FORMING,
-    )
+    title = "Grid-forming converter with P-f and Q-V droop, POD-P and POD-Q (phasor type)"
+    m = phasor_builder("gfor_phasor", title, kind="converter", usual=FORMING)
     port = device_port(m, S_n=S_N, P_0=P_0)
     electrical = declare_filter_data(m, port)
     P, Q = m.algebraic("P"), m.algebraic("Q")
@@ -42,12 +38,8 @@ def grid_forming_converter_phasor() -> Model:
     declare_phasor_outputs(m, port, emf, impedance)
     i_s = i_g + _capacitor_current(electrical, u)
     declare_converter_outputs(m, Converter(i_g.rotated(droop.theta), control, u.magnitude(), i_s.magnitude()))
-    m.output(
-        "current_limit",
-        _of_limit(m, electrical, i_s),
-        "1",
-        "Current in parts of its limit; above 1 the current limit, which is not represented, would act",
-    )
+    text = "Current in parts of its limit; above 1 the current limit, which is not represented, would act"
+    m.output("current_limit", _of_limit(m, electrical, i_s), "1", text)
     return m.build()
 
 

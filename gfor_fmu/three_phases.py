@@ -21,12 +21,8 @@ V_N = 230.0  # default rated voltage [kV, line to line, rms]
 
 def grid_forming_converter_abc() -> Model:
     """The converter of `grid_forming_converter` behind a three-phase port in volts and amperes."""
-    m = ModelBuilder(
-        "gfor_abc",
-        "Grid-forming converter with instantaneous phase voltages and currents (EMT-type)",
-        kind="converter",
-        usual=FORMING,
-    )
+    title = "Grid-forming converter with instantaneous phase voltages and currents (EMT-type)"
+    m = ModelBuilder("gfor_abc", title, kind="converter", usual=FORMING)
     rating = declare_rating(m, S_N)
     V_n = m.declare(replace(port_variables.V_N, start=V_N))
     angle_0 = m.parameter(

@@ -6,9 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Numbers = NDArray[np.float64]  # real numbers, of any shape
-
 Matrix = NDArray[np.float64]  # real numbers in rows and columns
-
 Complex = NDArray[np.complex128]  # complex numbers, of any shape
-
 Vector = NDArray[Any]  # real or complex numbers

@@ -10,7 +10,6 @@ from orchestrator.spelling import spelled
 
 NOT_MET = 3  # exit code where a requirement is not met, or is not known to be
 INTERRUPTED = 130  # exit code after Ctrl-C
-
 TERMINATED = 143  # exit code after SIGTERM
 
 

@@ -19,12 +19,8 @@ extrapolated bus voltage matter."""
 
 def gfl_l2ep() -> Model:
     """Average EMT-type model: the grid-following converter of the four-VSC benchmark."""
-    m = ModelBuilder(
-        "gfl_l2ep",
-        "Grid-following converter of L2EP in the four-VSC benchmark (EMT type)",
-        kind="converter",
-        usual=FOLLOWING,
-    )
+    title = "Grid-following converter of L2EP in the four-VSC benchmark (EMT type)"
+    m = ModelBuilder("gfl_l2ep", title, kind="converter", usual=FOLLOWING)
     port = device_port(m, S_n=S_N, P_0=P_0)
     found = following_converter(m, port, port.v)
     declare_port_outputs(m, port, found.into_bus.rotated(found.frame.theta))
@@ -34,12 +30,8 @@ def gfl_l2ep() -> Model:
 
 def gfl_l2ep_phasor() -> Model:
     """The same equations at a network of admittances: the benchmark's phasor model keeps di/dt of its transformer."""
-    m = phasor_builder(
-        "gfl_l2ep_phasor",
-        "Grid-following converter of L2EP in the four-VSC benchmark (phasor type)",
-        kind="converter",
-        usual=FOLLOWING,
-    )
+    title = "Grid-following converter of L2EP in the four-VSC benchmark (phasor type)"
+    m = phasor_builder("gfl_l2ep_phasor", title, kind="converter", usual=FOLLOWING)
     port = device_port(m, S_n=S_N, P_0=P_0)
     master = declare_master_step(m)
     seen = extrapolated_voltage(m, port, master)

@@ -26,11 +26,6 @@ class Line:
     X_C: float = 0.0
 
     @property
-    def is_equivalent(self) -> bool:
-        """Whether it stands for a part of a network that was reduced, and is no line itself: R or X is negative."""
-        return self.R < 0 or self.X < 0
-
-    @property
     def has_ratio(self) -> bool:
         """Whether an ideal ratio stands at the from side."""
         return self.tap != 1.0 or self.shift != 0.0
@@ -54,7 +49,6 @@ LAWS = {"impedance": Zip(z=1.0), "current": Zip(i=1.0), "power": Zip(p=1.0)}  # 
 IMPEDANCE = LAWS["impedance"]
 
 LOW_VOLTAGE = 0.7  # default of the voltage [pu] below which a load with a share of constant power is an impedance
-
 LEAST_LOW_VOLTAGE = 0.3  # least of that voltage [pu]: a constant power draws more than three times its current there
 
 

@@ -39,7 +39,6 @@ PHASOR_RECOVERY_TIME, SHORTEST_PHASOR_RECOVERY = 1e-2, 4e-3
 """The same for phasor networks, whose explicit steps are up to 2 ms long."""
 
 LONGEST_RECOVERY = 1.0  # largest τ [s]
-
 FREQUENCY_TIME = 0.02  # default time constant [s] of the frequency that a load feels: one period at 50 Hz
 
 

@@ -2,20 +2,18 @@
 
     (Y + Σ y)·v = Σ y·e          solved directly from the newest emfs whenever an output is read: there is no state
 
-The matrix is data, which the kernel factorises anew where a parameter or an admittance changes. Only a native FMU has
-the solution written out, operation by operation.
+The matrix is data, which the kernel factorises anew where a parameter or an admittance changes.
 
 Elements, parameters and outputs are those of `grid`. Constant-impedance loads, ratios and open lines behave as
 described there."""
 
-from functools import partial
 from math import pi
 
 from fmus.grid import elements
 from fmus.grid.fault import declare_fault_outputs, fault_admittance
 from fmus.grid.load_laws import FollowingLoad, declare_following_load, following_load_equations
 from fmus.grid.network import Line, Network, Port
-from fmus.grid.nodal import Admittances, add_admittance, solve, solved_as_data
+from fmus.grid.nodal import Admittances, add_admittance
 from fmus.grid.three_winding import add_windings, declare_winding_powers, declare_windings
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
@@ -29,10 +27,8 @@ LEAST_CONDUCTANCE = 1e-12
 voltage is 0 and not 0/0."""
 
 
-def phasor_grid(network: Network, *, as_data: bool = True) -> Model:
-    """Build the model of a network; parameters are named after its elements, as in `grid`.
-
-    ``as_data``: whether the kernel solves for the voltages, or the solution is written out."""
+def phasor_grid(network: Network) -> Model:
+    """Build the model of a network; parameters are named after its elements, as in `grid`."""
     m = phasor_builder(network.name, f"Phasor network {network.name} at rated frequency", kind="network")
     following: list[FollowingLoad] = []
     omega_b: Expr | None = None
@@ -62,7 +58,7 @@ def phasor_grid(network: Network, *, as_data: bool = True) -> Model:
     transformers = [declare_windings(m, data) for data in network.transformers]
     for transformer in transformers:
         add_windings(Y, transformer)
-    _settle(m, network, buses, Y, as_data=as_data)
+    _settle(m, buses, Y)
     for following_load in following:
         following_load_equations(m, following_load)
     drawn = [_drawn(line, values, buses) for line, values in zip(network.lines, lines, strict=True)]
@@ -75,17 +71,13 @@ def phasor_grid(network: Network, *, as_data: bool = True) -> Model:
     return m.build()
 
 
-def _settle(
-    m: ModelBuilder, network: Network, buses: dict[str, elements.Bus], Y: Admittances, *, as_data: bool
-) -> None:
-    """Give every bus its voltage."""
-    currents = {name: bus.injected for name, bus in buses.items()}
-    if as_data:
-        voltages = solved_as_data(m, Y, currents, partial(phasor_grid, network, as_data=False))
-    else:  # X_C may be set above X in the FMU, and the branch is an equivalent then
-        voltages = solve(Y, currents, checked=any(line.is_equivalent or line.X_C for line in network.lines))
-    for name, bus in buses.items():
-        bus.v = voltages[name]
+def _settle(m: ModelBuilder, buses: dict[str, elements.Bus], Y: Admittances) -> None:
+    """Give every bus its voltage, for which the kernel solves."""
+    place = {name: k for k, name in enumerate(Y)}
+    matrix = {(place[name], place[other]): (y.re, y.im) for name, row in Y.items() for other, y in row.items()}
+    voltages = m.nodes(matrix, [(bus.injected.re, bus.injected.im) for bus in buses.values()])
+    for bus, (re, im) in zip(buses.values(), voltages, strict=True):
+        bus.v = Phasor(re, im)
 
 
 def _declare_source(

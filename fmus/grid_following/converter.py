@@ -29,12 +29,8 @@ class Signals:
 
 def grid_following_converter() -> Model:
     """Average EMT-type model of a grid-following converter with a stiff DC side."""
-    m = ModelBuilder(
-        "gfl",
-        "Grid-following converter with PLL, current control and P, Q or voltage control (EMT type)",
-        kind="converter",
-        usual=FOLLOWING,
-    )
+    title = "Grid-following converter with PLL, current control and P, Q or voltage control (EMT type)"
+    m = ModelBuilder("gfl", title, kind="converter", usual=FOLLOWING)
     port = device_port(m, S_n=S_N, P_0=P_0)
     f = declare_filter(m, port)
     seen, tau = _declare_measurement(m, f)
@@ -56,12 +52,8 @@ def declare_signals(m: ModelBuilder, signals: Signals) -> None:
     m.output("omega", signals.frame.w, "pu", "Frequency that the PLL sees", base="f_n")
     m.output("u", signals.u, "pu", "Voltage magnitude at the filter capacitor", base="S_n")
     m.output("i_s", signals.i_s, "pu", "Current magnitude in the converter", base="S_n")
-    m.output(
-        "current_demand",
-        signals.limited.share,
-        "1",
-        "Current that the outer control asks for, in parts of the limit; above 1 the limit acts",
-    )
+    text = "Current that the outer control asks for, in parts of the limit; above 1 the limit acts"
+    m.output("current_demand", signals.limited.share, "1", text)
 
 
 def _declare_measurement(m: ModelBuilder, f: Filter) -> tuple[QdState, Expr]:

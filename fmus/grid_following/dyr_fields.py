@@ -21,7 +21,6 @@ FIELDS: dict[str, tuple[str, ...]] = {
 """Fields behind the identifier of the machine, in the file's order, by PSS/E's name of the record."""
 
 PLANT = "REPCA1"  # the plant's controller, of which nothing can be taken over
-
 X_S = 0.5  # reactance [pu, S_n] by which `gfl_phasor` states its voltage control; any gives the same integrator
 
 _FLAGS = {"PFFLAG", "VFLAG", "QFLAG", "PFLAG", "PQFLAG"}

@@ -19,12 +19,8 @@ from fmus.toolchain.symbols import Expr
 
 def grid_following_converter_phasor() -> Model:
     """PLL and outer control of `grid_following_converter` behind an algebraic electrical side."""
-    m = phasor_builder(
-        "gfl_phasor",
-        "Grid-following converter with PLL and P, Q or voltage control (phasor type)",
-        kind="converter",
-        usual=FOLLOWING,
-    )
+    title = "Grid-following converter with PLL and P, Q or voltage control (phasor type)"
+    m = phasor_builder("gfl_phasor", title, kind="converter", usual=FOLLOWING)
     port = device_port(m, S_n=S_N, P_0=P_0)
     f = declare_filter_data(m, port)
     master = declare_master_step(m)

@@ -98,12 +98,8 @@ USUAL = usual_beside(__file__)
 
 def regfm_a1_phasor() -> Model:
     """The droop-controlled grid-forming inverter of the WECC, phasor type."""
-    m = phasor_builder(
-        "regfm_a1_phasor",
-        "Droop-controlled grid-forming inverter REGFM_A1 of the WECC (phasor type)",
-        kind="converter",
-        usual=USUAL,
-    )
+    title = "Droop-controlled grid-forming inverter REGFM_A1 of the WECC (phasor type)"
+    m = phasor_builder("regfm_a1_phasor", title, kind="converter", usual=USUAL)
     port = device_port(m, S_n=S_N, P_0=P_0)
     RL = m.parameter("RL", 0.0, "pu", "Coupling resistance", base="S_n", minimum=0, source="chosen here")
     XL = m.parameter("XL", 0.15, "pu", "Coupling reactance", base="S_n", minimum=0.01, source=SPECIFICATION)

@@ -56,11 +56,8 @@ def static_generation() -> Model:
 
 def static_generation_phasor() -> Model:
     """The same for a network of admittances: the emf is the bus voltage that it sees, and what its current adds."""
-    m = phasor_builder(
-        "static_generation_phasor",
-        "Static generation: a constant current at a constant power factor (phasor type)",
-        kind="load",
-    )
+    title = "Static generation: a constant current at a constant power factor (phasor type)"
+    m = phasor_builder("static_generation_phasor", title, kind="load")
     port = device_port(m, S_n=S_N, P_0=P_0)
     X = m.parameter("X", 0.5, "pu", "Reactance of the port, across which the current is fed", base="S_n", minimum=0.01)
     R = m.parameter("R", 0.0, "pu", "Resistance of the port", base="S_n", minimum=0.0)

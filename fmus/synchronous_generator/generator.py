@@ -13,15 +13,7 @@ from fmus.synchronous_generator.machine import (
 )
 from fmus.synchronous_generator.stabilization.norm631 import pss2a
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
-from fmus.synchronous_generator.variants import (
-    AC4A,
-    ST1,
-    ST4B,
-    Governor,
-    Stabilizer,
-    Variant,
-    declare_generator_outputs,
-)
+from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Governor, Stabilizer, Variant, declare_machine_outputs
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
 from fmus.toolchain.port import DevicePort, declare_port_outputs, device_port
@@ -65,5 +57,5 @@ def with_controls(
     P_m = governor(m, g.w, g.start.T_e)
     machine_equations(m, g, port, E_fd, P_m)
     declare_port_outputs(m, port, g.current.rotated(g.delta))
-    declare_generator_outputs(m, g, v_t, E_fd, P_m)
+    declare_machine_outputs(m, g, v_t, E_fd, P_m)
     return m.build()

@@ -5,9 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fmus.synchronous_generator.excitation.alternators import ac1a, ac4a
 from fmus.synchronous_generator.excitation.common import Exciter
-from fmus.synchronous_generator.excitation.dc1a import dc1a, ieeet1
+from fmus.synchronous_generator.excitation.rotating import ac1a, ac4a, dc1a, ieeet1
 from fmus.synchronous_generator.excitation.static import sexs, st1a, st4b
 from fmus.synchronous_generator.excitation.without_regulator import external, manual
 from fmus.synchronous_generator.machine import FluxDeclaration, Machine
@@ -29,7 +28,8 @@ from fmus.toolchain.port import DevicePort
 from fmus.toolchain.symbols import Expr
 
 MachinePart = Callable[[ModelBuilder, DevicePort, Expr, FluxDeclaration], Machine]
-"""Declares a machine at its port: builder, port, rating [MVA], declaration of the stator's fluxes."""
+"""Declares a machine: builder, port with the operating point, rating [MVA], and how the stator's fluxes are declared:
+as states, or as signals that a model without stator transients closes."""
 
 NONE = "none"  # the stabiliser of a generator that has none
 

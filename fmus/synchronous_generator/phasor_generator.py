@@ -17,15 +17,7 @@ from fmus.synchronous_generator.declarations import MACHINE
 from fmus.synchronous_generator.excitation.common import Exciter, Regulated
 from fmus.synchronous_generator.machine import Machine, declare_machine, rotor_equations, terminal_power
 from fmus.synchronous_generator.turbines.without_limits import ieeeg1
-from fmus.synchronous_generator.variants import (
-    AC4A,
-    ST1,
-    ST4B,
-    Governor,
-    Stabilizer,
-    Variant,
-    declare_generator_outputs,
-)
+from fmus.synchronous_generator.variants import AC4A, ST1, ST4B, Governor, Stabilizer, Variant, declare_machine_outputs
 from fmus.toolchain.frames import Phasor
 from fmus.toolchain.model import Model
 from fmus.toolchain.model_builder import ModelBuilder
@@ -68,7 +60,7 @@ def with_controls(
     P_m = governor(m, g.w, g.start.T_e)
     rotor_equations(m, g, port, E_fd, P_m)
     declare_phasor_port(m, g, port, emf)
-    declare_generator_outputs(m, g, v_t, E_fd, P_m)
+    declare_machine_outputs(m, g, v_t, E_fd, P_m)
     return m.build()
 
 

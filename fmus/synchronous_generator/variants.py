@@ -41,14 +41,13 @@ class Variant:
 
 
 AC4A = Variant("ac4a", ac4a, IEEE118, IEEEG1_STAMP)  # the generators of the IEEE 118-bus case
-
 ST1 = Variant("st1", st1, SG2, IEEEG1_NTS631)  # SG2 of the two-area case
 
 ST4B = Variant("st4b", st4b, SG1, IEEEG1_NTS631)
 """SG1 of the two-area case, and with PSS2A SG1 of the grid code's two-area system."""
 
 
-def declare_generator_outputs(m: ModelBuilder, machine: Machine, v_t: Expr, E_fd: Expr, P_m: Expr) -> None:
+def declare_machine_outputs(m: ModelBuilder, machine: Machine, v_t: Expr, E_fd: Expr, P_m: Expr) -> None:
     """Declare what a generator shows beside its port.
 
     ``machine``: gives speed, angle and torque; ``v_t``: voltage magnitude at the terminal [pu, S_n]; ``E_fd``: field

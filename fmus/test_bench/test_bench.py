@@ -15,11 +15,8 @@ from fmus.toolchain.symbols import Expr
 
 def test_bench() -> Model:
     """Source, impedance, bus, load and fault in the network frame, per unit on 100 MVA."""
-    m = ModelBuilder(
-        "test_bench",
-        "Test bench: a programmable source behind a settable impedance, and a load (EMT type)",
-        kind="network",
-    )
+    title = "Test bench: a programmable source behind a settable impedance, and a load (EMT type)"
+    m = ModelBuilder("test_bench", title, kind="network")
     f_n = m.parameter("f_n", 50.0, "Hz", "Rated frequency", minimum=1.0, maximum=400.0)
     omega_b = 2 * pi * f_n
     v_0, i_0 = _operating_point(m)

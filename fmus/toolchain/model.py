@@ -1,8 +1,5 @@
 """A model: its variables and its equations ẋ = f(x, u, p), y = g(x, u, p), with the initial state."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -22,13 +19,12 @@ class NodalEquations:
 
     ``plan``: order and fill of the factorisation of Y; ``values``: (u, p, c) → real parts of the elements of Y in the
     plan's order, then their imaginary parts; ``currents``: (x, u, p, c) → real parts of i by bus, then imaginary parts;
-    ``given``: numbers of the inputs that Y depends on; ``written_out``: makes the same model without such equations."""
+    ``given``: numbers of the inputs that Y depends on."""
 
     plan: Plan
     values: Function
     currents: Function
     given: tuple[int, ...]
-    written_out: Callable[[], Model]
 
 
 @dataclass(frozen=True)
@@ -69,11 +65,6 @@ class Model:
         """Whether a Python-backed FMU has its functions compiled, where a compiler is there. It takes seconds, which a
         model that is new most times it is asked for does not have: it is a tape, with the same results."""
         return self.kind != "network" and not self.of_parts
-
-    @property
-    def written_out(self) -> Model:
-        """The same model as functions of (x, u, p, c) alone, whose network is solved operation by operation."""
-        return self if self.nodal is None else self.nodal.written_out()
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:

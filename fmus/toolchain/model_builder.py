@@ -2,7 +2,7 @@
 
 A quantity is declared where it is used, and the equations read like the block diagram."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -161,10 +161,10 @@ class ModelBuilder:
         self._algebraic.append((signal, value))
 
     def nodes(
-        self, elements: Mapping[tuple[int, int], Complex], currents: Sequence[Complex], written_out: Callable[[], Model]
+        self, elements: Mapping[tuple[int, int], Complex], currents: Sequence[Complex]
     ) -> list[tuple[Expr, Expr]]:
         """Let the kernel solve complex nodal equations Y·v = i as data; returns real and imaginary part of each v."""
-        self._nodes = Nodes(elements, currents, written_out)
+        self._nodes = Nodes(elements, currents)
         return self._nodes.voltages
 
     def require(self, positive: Scalar, rule: str) -> None:

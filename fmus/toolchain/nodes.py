@@ -1,15 +1,14 @@
 """Nodal equations Y·v = i of a large network, as they are written: elements of Y and currents as expressions."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from fmus.toolchain.elimination_plan import plan_pattern
-from fmus.toolchain.model import Model, NodalEquations
+from fmus.toolchain.model import NodalEquations
 from fmus.toolchain.symbols import Expr, Function, Scalar, Vector, symbols, symbols_in
 
 Complex = tuple[Scalar, Scalar]  # real and imaginary part
-
 LARGEST_REST = 1e-6  # part of its terms that a row of Y·v = i may leave over; with more, no voltage is finite
 
 
@@ -20,8 +19,6 @@ class Nodes:
     # of Y by row and column, those of the diagonal included; functions of parameters and inputs.
     elements: Mapping[tuple[int, int], Complex]
     currents: Sequence[Complex]  # one for each row; functions of states, inputs and parameters
-    # makes the same model without such equations, for those who need it as one function.
-    written_out: Callable[[], Model]
 
     @cached_property
     def symbols(self) -> list[Expr]:
@@ -43,7 +40,7 @@ class Nodes:
         number = {symbol: k for k, symbol in enumerate(u)}
         given = sorted(number[symbol] for symbol in symbols_in(values.outputs[0]) if symbol in number)
         currents = Function("nodal_currents", [x, u, p, c], [_parts(self.currents)])
-        return NodalEquations(plan, values, currents, tuple(given), self.written_out)
+        return NodalEquations(plan, values, currents, tuple(given))
 
 
 def _parts(entries: Sequence[Complex]) -> list[Expr]:

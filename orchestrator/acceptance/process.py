@@ -80,8 +80,6 @@ class FmuProcess:
     def alive(self) -> bool:
         return self._ended is None
 
-    # -- questions and answers -------------------------------------------------------------------
-
     def talk(self, call: str, instance: int, command: str, *arguments: Any) -> Any:
         """Have something done that needs more than numbers."""
         if self._ended is not None:
@@ -181,8 +179,6 @@ class FmuProcess:
         time = self.time + (max(0, self.box.run.done) * self.box.head.step if call == "fmi2DoStep" else 0.0)
         return f"{call}, at t = {time:.6g} s"
 
-    # -- how it ended ----------------------------------------------------------------------------
-
     def _tampered(self, seen: str) -> ProcessEndedError:
         return self._end(ProcessFault.TAMPERING, f"it wrote into the memory between the processes: {seen}")
 
@@ -230,8 +226,6 @@ class HostedComponent(RemoteCalls):
     def _typed(self, form: Callable[..., Form], answer: Any, *wanted: Any) -> Form:
         return self._process.typed(form, answer, *wanted)
 
-    # -- numbers ---------------------------------------------------------------------------------
-
     def run(self, into: RealBatch, rows: Numbers, out: RealBatch, steps: int, time: float, step_size: float) -> Numbers:
         """Step several times; rows of inputs before each, what was read after each.
 
@@ -259,8 +253,6 @@ class HostedComponent(RemoteCalls):
 
     def _do_step(self, _pointer: int, time: float, step_size: float, _no_set_state: int) -> int:
         return self._process.run(self.number, _NONE, _EMPTY, _NONE, 1, time, step_size)[0]
-
-    # -- all else --------------------------------------------------------------------------------
 
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NoReturn:
         raise ComponentError(

@@ -73,14 +73,11 @@ class BlockArnoldi:
         near = self.accuracy[:larger]
         return bool((near <= ROUGH).all()) and not any(map(wanted, np.flatnonzero(near > TOLERANCE).tolist()))
 
-    def most_often(self, larger: int) -> int:
-        among = self.values[:larger]
-        apart = np.abs(among[:, None] - among[None, :])
-        return int((apart <= _EQUAL * np.abs(among)).sum(axis=1).max(initial=0))
-
     def is_complete(self, larger: int) -> bool:
         """Whether none of the largest values is there so often that there may be more of it."""
-        return self.most_often(larger) < self._width
+        among = self.values[:larger]
+        apart = np.abs(among[:, None] - among[None, :])
+        return bool((apart <= _EQUAL * np.abs(among)).sum(axis=1).max(initial=0) < self._width)
 
     def _extend(self) -> None:
         first, last = self._done, self._done + self._width

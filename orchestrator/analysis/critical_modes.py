@@ -13,17 +13,9 @@ import scipy.linalg
 import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
+from orchestrator.analysis import modes as spectra
 from orchestrator.analysis.block_arnoldi import MOST, TOLERANCE, BlockArnoldi
 from orchestrator.analysis.linear_model import LinearModel
-from orchestrator.analysis.modes import (
-    ELECTROMECHANICAL_HZ,
-    Mode,
-    damping_ratio,
-    find_modes,
-    least_damped_first,
-    make_mode,
-    to_continuous,
-)
 from orchestrator.analysis.threads import one_thread
 from orchestrator.arrays import Vector
 from orchestrator.errors import AnalysisError
@@ -67,10 +59,10 @@ _UNSTABLE_MARGIN = 0.1  # how far into instability the region reaches: to this n
 
 def find_critical_modes(
     model: LinearModel,
-    lowest_hz: float = ELECTROMECHANICAL_HZ[0],
-    highest_hz: float = ELECTROMECHANICAL_HZ[1],
+    lowest_hz: float = spectra.ELECTROMECHANICAL_HZ[0],
+    highest_hz: float = spectra.ELECTROMECHANICAL_HZ[1],
     damping: float = 0.2,
-) -> list[Mode]:
+) -> list[spectra.Mode]:
     """Modes of a frequency range with less than a given damping, least damped first.
 
     ``model``: step map or continuous matrix, of any size.
@@ -83,18 +75,18 @@ def find_critical_modes(
             "the frequencies must rise from above 0, and the damping ratio lie between 0 and 0.9"
         )
     if len(model.names) <= DENSE:
-        found = find_modes(model, lowest_hz, highest_hz)
+        found = spectra.find_modes(model, lowest_hz, highest_hz)
     else:
         beyond = 1 + _SMALLEST  # a cell does not own its upper edges
         found = _search(model, 2 * np.pi * lowest_hz, 2 * np.pi * highest_hz * beyond, damping * beyond)
     wanted = (m for m in found if lowest_hz <= m.frequency_hz <= highest_hz)
-    return least_damped_first(m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping)
+    return spectra.least_damped_first(m for m in wanted if -_UNSTABLE_MARGIN <= m.damping_ratio <= damping)
 
 
 def nearest_eigenvalue(model: LinearModel, wanted: complex) -> complex:
     """The eigenvalue λ [rad/s] nearest to a given one, from the sparse equations alone."""
     if len(model.names) <= DENSE:
-        values, _ = to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
+        values, _ = spectra.to_continuous(np.linalg.eigvals(model.A).astype(complex), model.step_size)
         return complex(values[np.argmin(np.abs(values - wanted))])
     values = Search(model, wanted).nearest(2, _KEPT_FOR_ONE)
     return complex(values[np.argmin(np.abs(values - wanted))])
@@ -134,7 +126,7 @@ class _Cell:
 
     def holds(self, value: complex) -> bool:
         """Whether a point lies in the cell, which includes its lower edges but not the upper ones."""
-        return self.low <= value.imag < self.high and self.least <= damping_ratio(value) < self.most
+        return self.low <= value.imag < self.high and self.least <= spectra.damping_ratio(value) < self.most
 
     def halves(self) -> tuple["_Cell", "_Cell"]:
         """Cut across the longer side."""
@@ -145,9 +137,9 @@ class _Cell:
         return replace(self, most=between), replace(self, least=between)
 
 
-def _search(model: LinearModel, lowest: float, highest: float, damping: float) -> list[Mode]:
+def _search(model: LinearModel, lowest: float, highest: float, damping: float) -> list[spectra.Mode]:
     """Cover the region with discs. If a disc is too small, find more eigenvalues around its point, or cut the cell."""
-    modes: list[Mode] = []
+    modes: list[spectra.Mode] = []
     stretch = _SHORT_STRETCH if model.is_searched_in_blocks else _STRETCH
     edges = np.geomspace(lowest, highest, 1 + int(np.ceil(np.log(highest / lowest) / np.log(stretch)))).tolist()
     waiting = [_Cell(low, high, -_UNSTABLE_MARGIN, damping) for low, high in pairwise(edges)]
@@ -216,8 +208,8 @@ class Search:
             count *= 2
         return None
 
-    def modes(self, chosen: Sequence[int]) -> list[Mode]:
-        return [make_mode(value, left, right, self._model.names) for value, left, right in self.pairs(chosen)]
+    def modes(self, chosen: Sequence[int]) -> list[spectra.Mode]:
+        return [spectra.make_mode(value, left, right, self._model.names) for value, left, right in self.pairs(chosen)]
 
     def pairs(self, chosen: Sequence[int]) -> list[tuple[complex, Vector, Vector]]:
         """Eigenvalue, left and right eigenvector of some of the eigenvalues of the last search."""
@@ -277,7 +269,7 @@ class Search:
         return float(np.abs(np.exp(circle * self._model.step_size) - self.sigma).max())
 
     def _to_lambda(self, nu: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return to_continuous(self.sigma + 1 / nu, self._model.step_size)[0]
+        return spectra.to_continuous(self.sigma + 1 / nu, self._model.step_size)[0]
 
     @property
     def _not_converging(self) -> AnalysisError:

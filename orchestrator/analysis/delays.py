@@ -36,10 +36,6 @@ class WireLink:
     delay: float  # [s]
     is_cut: bool  # whether nothing of the signal arrives
 
-    @property
-    def is_ideal(self) -> bool:
-        return not (self.delay or self.is_cut)
-
 
 @dataclass(frozen=True)
 class DelayLine:
@@ -58,7 +54,7 @@ class DelayLine:
 def links_of(master: Master) -> dict[Endpoint, WireLink]:
     """The connections of a system that matter to its linear model, by their target."""
     links = {target: WireLink(plan.name, plan.delay, plan.is_cut) for target, plan in master.system.wires.items()}
-    return {target: link for target, link in links.items() if not link.is_ideal}
+    return {target: link for target, link in links.items() if link.delay or link.is_cut}
 
 
 def delay_line(delay: float, step_size: float) -> DelayLine:

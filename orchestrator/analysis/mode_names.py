@@ -23,7 +23,6 @@ LEFT_OVER = 0.5
 measure on."""
 
 _TRIED = 4  # up to this number of names, all ways to give them to the modes that fit best are tried
-
 Measure = Callable[[Mode], float]  # how well a mode fits to a name, from 0 to 1
 
 

@@ -19,7 +19,6 @@ _EVEN, _FLOOR = 0.1, 1e-2
 """An element's answers up and down may differ by this part of it, and of this rate [1/s]: beyond, a limit is near."""
 
 _OF_ROW = 1e-3  # part of an answer's largest slope that counts as this rate: |v| is curved, and a gain makes it large
-
 _MANY = 100  # from this number of states and inputs on, variables are perturbed together
 _HOLDS, _ROUNDING = 1e-3, 1e-9
 """A perturbation in all directions at once may differ by the first part of its answer from the sum of the single

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from orchestrator.cases.parameter_files import ParameterFile
 
 Time = float | str  # A time: a number of seconds, or text with a unit such as ``"200 us"``
-
 Paths = str | Path | Iterable[str | Path]  # one path, or several
 
 _CASE_VALUE = re.compile(r"[^.\s]+\.\S+")

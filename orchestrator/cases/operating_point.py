@@ -42,10 +42,11 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     if draft.dispatch is not None:
         slack = _reference(draft, units, slack, table.grid)
     undecided = list(undecided_units(draft, units, slack))
+    returning = {event.unit for event in draft.given.events if isinstance(event, UnitReconnectionTable)}
     try:
         flow = start_from_power_flow(
             draft.system, draft.network, table.grid, units, slack, _reactive_limits(draft),
-            keep_limits=table.reactive_limits is True, returning=_returning(draft), dispatch=draft.dispatch,
+            keep_limits=table.reactive_limits is True, returning=returning, dispatch=draft.dispatch,
             active=draft.active_limits,
         )  # fmt: skip
     except InputError as error:
@@ -56,10 +57,6 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
     draft.found.questions += [*_limit_questions(draft, flow), *_voltage_questions(draft, flow)]
     draft.found.questions += _leftover(draft, flow) if slack == intact else []  # else what it fed before is shared
     return flow
-
-
-def _returning(draft: Draft) -> set[str]:
-    return {event.unit for event in draft.given.events if isinstance(event, UnitReconnectionTable)}
 
 
 def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:

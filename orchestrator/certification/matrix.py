@@ -54,10 +54,6 @@ class MatrixCell:
         return narrowest(self.margins)
 
     @property
-    def without_figure(self) -> list[CriterionMargin]:
-        return [m for m in self.margins if not m.accepted and m.margin is None]
-
-    @property
     def failed(self) -> list[CriterionMargin]:
         """Criteria that are not met, least margin first; those without a figure before all."""
         bad = [m for m in self.margins if not m.accepted]
@@ -149,7 +145,8 @@ def in_words(cell: MatrixCell) -> list[str]:
         return [cell.verdict]
     if cell.figures is not None:
         return [cell.verdict, *cell.figures]
-    lines = [cell.verdict, *(f"{m.place}: {m.criterion}" for m in cell.without_figure)]
+    without_figure = (m for m in cell.margins if not m.accepted and m.margin is None)
+    lines = [cell.verdict, *(f"{m.place}: {m.criterion}" for m in without_figure)]
     if (least := cell.narrowest) is not None:
         lines.append(f"{margin_text(least.margin)} {least.place}: {least.criterion}")
     return lines

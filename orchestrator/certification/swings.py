@@ -120,15 +120,9 @@ def swing_test(times: Numbers, signal: Numbers, start: float, *, drop_first: boo
         accepted = abs(ratio) < LARGEST_RATIO
         sign = "<" if accepted else "≥"
         return SwingTest(dropped, swings, ratio, accepted, f"ΔP5M5/ΔP1M1 = {ratio:.3f} {sign} {LARGEST_RATIO}")
-    quiet = _quiet_since(points, times, start)
-    if quiet is None:
+    quiet = points[-1].time if points else start
+    if times[-1] - quiet <= SLOWEST_PERIOD:
         return SwingTest(dropped, swings, None, False, "the record ends before the fifth swing; make it longer")
     count = {0: "no swing", 1: "one swing"}.get(len(swings), f"{len(swings)} swings")
     reason = f"died out after {count}: from {quiet:.1f} s on no turn above {RESOLUTION:.1%} of the signal's range"
     return SwingTest(dropped, swings, 0.0, True, reason)
-
-
-def _quiet_since(points: list[Extremum], times: Numbers, start: float) -> float | None:
-    """Time of the last turn, if a whole period of the slowest judged mode follows it in the record; else None."""
-    last = points[-1].time if points else start
-    return last if times[-1] - last > SLOWEST_PERIOD else None

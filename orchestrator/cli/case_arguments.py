@@ -32,12 +32,8 @@ def add_case_arguments(
     add_trust_argument(parser)
     option(parser, "--step", "H", "communication step [s], e.g. 1e-4 or '200 us'", read=seconds)
     if schedule:
-        add_schedule_argument(parser)
+        add_options(parser, "schedule", schedules=SCHEDULES)
         add_options(parser, "sharing", rules=[str(rule) for rule in SharingRule])
-
-
-def add_schedule_argument(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, "schedule", schedules=SCHEDULES)
 
 
 def add_trust_argument(parser: argparse.ArgumentParser) -> None:

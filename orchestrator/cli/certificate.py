@@ -31,7 +31,7 @@ from orchestrator.cli.arguments import asked_by, choose_executor
 from orchestrator.cli.certify_sensitivities import find_needs
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.study import Progressing
-from orchestrator.cli.terminal import make_console, make_errors, print_json, said_stages
+from orchestrator.cli.terminal import make_console, make_errors, print_json, print_parts, said_stages
 from orchestrator.errors import InputError
 from orchestrator.fmi.port import BoundDescription
 from orchestrator.report.tables import PlainTable, make_table, short
@@ -52,8 +52,7 @@ def show(found: Certificate, files: Sequence[Path], folder: Path, console: Conso
         _show_damping_test(found, found.damping, console)
     else:
         console.print(_verdicts(found), "")
-        for text in _remarks(found):
-            console.print(escape(text), soft_wrap=True, highlight=False)
+        print_parts(console, map(escape, _remarks(found)))
         console.print(_criteria(found), "")
     console.print(escape(f"Report in {folder}: {', '.join(f.name for f in files)}"), soft_wrap=True)
 
@@ -101,8 +100,7 @@ def _criteria(found: Certificate) -> PlainTable:
 
 
 def _show_damping_test(found: Certificate, test: DampingTest, console: Console) -> None:
-    for text in _misfits(p.findings for p in found.results.values()):
-        console.print(escape(text), soft_wrap=True, highlight=False)
+    print_parts(console, map(escape, _misfits(p.findings for p in found.results.values())))
     table = make_table(f"Damping test, {test.signal} watched", "X_L [pu]", "least damped [Hz]", "ξ [%]",
                        "the same without", "ΔP5M5/ΔP1M1", "in the signal: ξ [%]", "", left=0)  # fmt: skip
     for v in found.verdicts:

@@ -16,6 +16,7 @@ from orchestrator.certification.codes.what_it_takes import CHANGE, confirm_chang
 from orchestrator.cli.arguments import add_options, choose_executor
 from orchestrator.cli.interrupted import saying_how_it_goes_on
 from orchestrator.cli.study import Progressing
+from orchestrator.cli.terminal import print_parts
 from orchestrator.errors import InputError
 from orchestrator.results.lock import held
 
@@ -64,8 +65,7 @@ def find_needs(
     if not options.json:
         for need in needs:
             console.print(needs_record.needs_table(need))
-            for text in needs_record.remarks_of(need):
-                console.print(escape(text), soft_wrap=True, highlight=False)
+            print_parts(console, map(escape, needs_record.remarks_of(need)))
             if options.confirm:
                 console.print(escape(needs_record.confirmed_text(need)), soft_wrap=True, highlight=False)
             console.print("")

@@ -7,7 +7,7 @@ from rich.markup import escape
 from orchestrator.analysis.identification import IdentifiedMode
 from orchestrator.api.comparison import compare
 from orchestrator.cli.arguments import add_kept_argument, add_options
-from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, saying_warnings
+from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, print_parts, saying_warnings
 from orchestrator.report.tables import make_table
 
 
@@ -32,10 +32,7 @@ def run(options: argparse.Namespace) -> int:
         for c in found
     ]  # fmt: skip
     table = make_table(f"A: {options.first}\nB: {options.second}", *columns, rows=rows)
-    console = make_console()
-    console.print(table)
-    for text in found.remarks:
-        console.print(escape(text), soft_wrap=True, highlight=False)
+    print_parts(make_console(), [table, *map(escape, found.remarks)])
     return 0
 
 

@@ -25,12 +25,6 @@ from orchestrator.points.store import PointStore, any_kept
 from orchestrator.results.origin import as_typed
 
 
-def add_points_arguments(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("over operating points")
-    add_request_arguments(group, PointsDesignRequest)
-    add_executor_arguments(group)
-
-
 def run_over_points(options: argparse.Namespace, path: Path) -> int:
     several = {"controllers": tuple(options.controller), "components": tuple(options.component),
                "modes": () if ALL in options.mode else tuple(options.mode)}  # fmt: skip
@@ -51,7 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "design 2")
     add_verdict_argument(parser)
     option(parser, "--out", "FILE.toml", "parameter file (default: <case>_<controller>.toml, here)", read=Path)
-    add_points_arguments(parser)
+    over_points = parser.add_argument_group("over operating points")
+    add_request_arguments(over_points, PointsDesignRequest)
+    add_executor_arguments(over_points)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ from rich.markup import escape
 
 from orchestrator.api.identification import ambient, identify
 from orchestrator.cli.arguments import add_kept_argument, add_options
-from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, saying_warnings
+from orchestrator.cli.terminal import keep_json, make_console, make_errors, print_json, print_parts, saying_warnings
 from orchestrator.errors import InputError
 from orchestrator.report.tables import eigenvalue_text, make_table
 
@@ -39,10 +39,7 @@ def run(options: argparse.Namespace) -> int:
         shown = ("trend", "-") if found.is_trend(m) else figures
         rows.append((eigenvalue_text(m.eigenvalue), *shown, f"{m.amplitude:.3g}"))
     table = make_table(title, *columns, left=0, rows=rows)
-    console = make_console()
-    console.print(table)
-    for text in found.remarks:
-        console.print(escape(text), soft_wrap=True, highlight=False)
+    print_parts(make_console(), [table, *map(escape, found.remarks)])
     return 0
 
 
@@ -61,7 +58,6 @@ def _ambient(options: argparse.Namespace) -> int:
              f"{r.damping_percent:.1f} ± {r.damping_error_percent:.1f}", f"{100 * r.share:.0f} %", r.alarm)
             for r in found.table().itertuples()]  # fmt: skip
     columns = ("Window [s]", "f [Hz]", "Damping [%]", "Of variance", "Alarm")
-    console = make_console()
-    console.print(make_table(f"{found.label} in noise (stochastic subspace, 95 % intervals)", *columns, rows=rows))
-    console.print(escape(found.sentence), soft_wrap=True, highlight=False)
+    table = make_table(f"{found.label} in noise (stochastic subspace, 95 % intervals)", *columns, rows=rows)
+    print_parts(make_console(), [table, escape(found.sentence)])
     return 0

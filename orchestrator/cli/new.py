@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from orchestrator.cases.new_case import WantedCase, read_converter, sources_of, write_case
 from orchestrator.cli.arguments import add_options
-from orchestrator.cli.terminal import make_console
+from orchestrator.cli.terminal import make_console, print_parts
 from orchestrator.errors import InputError, ResultsError
 from orchestrator.fmi.vendor_files import is_vendor_file
 from orchestrator.safe_files import write_text
@@ -41,8 +41,8 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--out {error}") from error
     console = make_console()
     names = ", ".join(prepared.name for prepared in made.scenarios)
-    for line in (f"{wanted.out}: scenarios {names}. Assumed:", *(f"- {line}" for line in made.assumed)):
-        console.print(escape(line), soft_wrap=True, highlight=False)
+    lines = f"{wanted.out}: scenarios {names}. Assumed:", *(f"- {line}" for line in made.assumed)
+    print_parts(console, map(escape, lines))
     for prepared in made.scenarios:
         if prepared.name in ("base", "converter"):
             running(in_service(prepared)).close()  # what cannot start is told at once

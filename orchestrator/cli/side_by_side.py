@@ -27,7 +27,6 @@ from orchestrator.study.run import RunResult
 Outcome = RunResult | BaseException
 
 Report = Callable[[int, int], None]  # told how many steps are done, of how many
-
 _PATIENCE = 20.0  # how long a copy that was told to end is waited for [s]
 
 

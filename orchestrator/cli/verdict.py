@@ -9,6 +9,7 @@ from rich.markup import escape
 from orchestrator.analysis.modes import ELECTROMECHANICAL_HZ
 from orchestrator.analysis.stability import Stability
 from orchestrator.cli.arguments import switch
+from orchestrator.cli.terminal import print_parts
 from orchestrator.report.tables import COLOURS, VerdictSentence
 from orchestrator.study import tables
 from orchestrator.study.answers import ScenarioAnswer, answers_table, outside
@@ -23,9 +24,7 @@ def print_stability(
     console: Console, verdicts: Mapping[str, Stability], outside: Mapping[str, str] | None = None
 ) -> None:
     """The verdict on all, and then on each by its title; what lies outside a frequency range behind it."""
-    for line in stability_lines(verdicts, outside or {}):
-        console.print(line, soft_wrap=True, highlight=False)
-    console.print("")
+    print_parts(console, [*stability_lines(verdicts, outside or {}), ""])
 
 
 def stability_lines(verdicts: Mapping[str, Stability], outside: Mapping[str, str]) -> list[str]:
@@ -56,8 +55,7 @@ def print_answers(
 ) -> None:
     ranges = [r.hidden.frequency_range for r in results if r.hidden is not None]
     console.print(answers_table(answers, ranges[0] if ranges else ELECTROMECHANICAL_HZ))
-    for sentence in beside:
-        console.print(escape(sentence), soft_wrap=True, highlight=False)
+    print_parts(console, map(escape, beside))
     if rest := outside(results):
         console.print(escape(rest), style="dim", soft_wrap=True, highlight=False)
     console.print("")

@@ -26,7 +26,6 @@ _GAIN, _MOVED, _SLOWEST = 400.0, 0.02, 0.3
 
 _TRUE = 1e-6  # A reduction whose modes are not those of the system to this part is not taken
 _SEEN = (0.05, 4.0)  # modes between these frequencies [Hz] are kept however little they move
-
 Setting = Mapping["PodPlace", PodSetting]  # the setting of each loop that is closed; the others stay open
 
 

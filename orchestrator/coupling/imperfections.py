@@ -99,10 +99,6 @@ class WirePlan:
         """All delays that it has or may get [s]."""
         return [i.seconds for i in (*self.permanent.values(), *self.later) if isinstance(i, Delay)]
 
-    @property
-    def noises(self) -> list[Noise]:
-        return [i for i in (*self.permanent.values(), *self.later) if isinstance(i, Noise)]
-
 
 def described(plans: Mapping[Any, WirePlan]) -> list[str]:
     return [f"{plan.name}: {imperfection}" for plan in plans.values() for imperfection in plan.permanent.values()]

@@ -14,11 +14,7 @@ if TYPE_CHECKING:
 
 
 class ObservedRun(Protocol):
-    """What an observer sees of a run; the master is one.
-
-    ``index``, ``time``: Number of communication steps done, and the time [s] reached.
-    ``y``: All coupled outputs, shape (n,), as last exchanged; their names are ``output_names``.
-    ``tracks``: Where each of them went, step by step, since an observer last looked."""
+    """What an observer sees of a run; the master is one."""
 
     @property
     def index(self) -> int:
@@ -29,8 +25,7 @@ class ObservedRun(Protocol):
         """Present time [s]."""
 
     @property
-    def components(self) -> Mapping[str, Component]:
-        """The components by name."""
+    def components(self) -> Mapping[str, Component]: ...
 
     @property
     def output_names(self) -> tuple[str, ...]:
@@ -38,11 +33,11 @@ class ObservedRun(Protocol):
 
     @property
     def y(self) -> NDArray[np.float64]:
-        """The coupled outputs."""
+        """All coupled outputs, shape (n,), as last exchanged."""
 
     @property
     def tracks(self) -> Tracks:
-        """Where each coupled output went since it was last looked at."""
+        """Where each coupled output went, step by step, since an observer last looked."""
 
     def exchange(self) -> None:
         """Hand every component the newest outputs of its partners."""

@@ -1,10 +1,11 @@
 """What the inner loop steps, and what it offers: the forms that the loop in C and the one in Python share."""
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.coupling.wire_bank import WireBank, WireValues
 from orchestrator.errors import NotFiniteError
 from orchestrator.fmi.component import Component, RealBatch
 
@@ -31,62 +32,7 @@ class Exchange:
         return any(fed.intersection(self.component.description.feedthrough(name)) for name in self.outputs.names)
 
 
-class Stepped(Protocol):
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def one_thread(self) -> str | None: ...
-
-    @property
-    def pointer(self) -> Any: ...
-
-    @property
-    def set_real(self) -> Any: ...
-
-    @property
-    def get_real(self) -> Any: ...
-
-    @property
-    def do_step(self) -> Any: ...
-
-    def check(self, status: int, call: str, time: float | None = None) -> None: ...
-
-    def step(self, time: float, step_size: float) -> None: ...
-
-
-class Batch(Protocol):
-    @property
-    def names(self) -> tuple[str, ...]: ...
-
-    @property
-    def values(self) -> NDArray[np.float64]:
-        """The values, shape (n,)."""
-
-    @property
-    def arguments(self) -> tuple[Any, ...]: ...
-
-    @property
-    def component(self) -> Stepped: ...
-
-
-class Turn(Protocol):
-    @property
-    def component(self) -> Stepped: ...
-
-    @property
-    def inputs(self) -> Batch: ...
-
-    @property
-    def outputs(self) -> Batch: ...
-
-    @property
-    def window(self) -> slice:
-        """Where its outputs stand."""
-
-    @property
-    def delivered(self) -> NDArray[np.int64]:
-        """Where what it takes stands."""
+Turn = Exchange | WireBank
 
 
 class Loop(Protocol):
@@ -110,5 +56,5 @@ class Loop(Protocol):
         """End the threads that were started for it."""
 
 
-def not_finite(outputs: Batch, index: int, time: float) -> NotFiniteError:
+def not_finite(outputs: RealBatch | WireValues, index: int, time: float) -> NotFiniteError:
     return NotFiniteError(outputs.component.name, outputs.names[index], float(outputs.values[index]), time)

@@ -238,8 +238,8 @@ def whole_steps(seconds: float, step_size: float, where: str) -> int:
 
 
 def _check_bandwidths(plan: WirePlan, step_size: float) -> None:
-    for noise in plan.noises:
-        if noise.bandwidth is not None and noise.bandwidth >= 0.5 / step_size:
+    for noise in (*plan.permanent.values(), *plan.later):
+        if isinstance(noise, Noise) and noise.bandwidth is not None and noise.bandwidth >= 0.5 / step_size:
             raise InputError(
                 f"connection {plan.name}: noise up to {noise.bandwidth:g} Hz does not fit a communication step of "
                 f"{step_size:g} s, which shows {0.5 / step_size:g} Hz at most; leave the bandwidth out for white noise"

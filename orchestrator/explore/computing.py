@@ -16,7 +16,6 @@ from orchestrator.errors import ErrorKind
 Answer = dict[str, Any]
 
 Asker = tuple[str, str]  # a page, and the kind of its question
-
 LONGEST = 3600.0  # a computation that takes longer is ended [s]
 _RESTART = 3.0  # to start the process anew takes about so long [s]
 _TO_LEAVE = 3.0  # until a process that was asked to end is killed [s]

@@ -35,9 +35,7 @@ from orchestrator.spelling import as_options
 from orchestrator.study.modes import modes_of
 
 _CHANGE = 2e-3  # of the parameter, in parts of its value, or of 1 where that is 0
-
 _FAR = 0.05  # an eigenvalue that moves by more than this part of itself is no longer known to be the same
-
 _WIDER = 1.5  # the range in which changed modes are looked for, beyond that which is shown
 
 

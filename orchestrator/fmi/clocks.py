@@ -27,11 +27,6 @@ class FmiClock:
     def periodic(self) -> bool:
         return self.variability in ("constant", "fixed", "tunable")
 
-    @property
-    def needs_another(self) -> bool:
-        """Whether it ticks only when a clock of somebody else does."""
-        return self.variability == "triggered" and self.causality == "input"
-
 
 def clocks_of(root: ElementTree.Element) -> tuple[FmiClock, ...]:
     types = {t.get("name"): t for t in root.iterfind("TypeDefinitions/ClockType")}

@@ -45,7 +45,6 @@ _CAUSALITIES = {
 _OURS = f"VendorAnnotations/Tool[@name='{TOOL}']"
 _RATED = {variable.name: variable for variable in RATED}
 _LONGEST_WHY = 200  # characters of a range's reason that are taken from a file
-
 _SCALARS = "ModelVariables/ScalarVariable"  # where FMI 2.0 has its variables
 _OTHER_KINDS = {"ModelExchange": "for Model Exchange", "ScheduledExecution": "for Scheduled Execution"}
 
@@ -194,7 +193,8 @@ def platforms_of(path: Path) -> tuple[str, ...]:
 
 def parse_description(path: Path, text: bytes, names: Sequence[str] = ()) -> FmuDescription:
     root = _root(path, text)
-    version = _fmi_version(root)
+    version = root.get("fmiVersion", "unknown")
+    version = "3.0" if re.fullmatch(r"3\.0(\.\d+)?", version) else version
     if version not in VERSIONS:
         raise UnsupportedFmuError(
             f"{path}: it is an FMU of FMI {version[:20]}",
@@ -260,11 +260,6 @@ def _root(path: Path, text: bytes) -> ElementTree.Element:
         return ElementTree.fromstring(text)
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two of its encoding
         raise FmuFileError(f"{path}: modelDescription.xml is not XML: {error}; export it again") from error
-
-
-def _fmi_version(root: ElementTree.Element) -> str:
-    version = root.get("fmiVersion", "unknown")
-    return "3.0" if re.fullmatch(r"3\.0(\.\d+)?", version) else version
 
 
 def _describe(

@@ -23,7 +23,6 @@ _IN_RAD = 2.0  # above it the frequencies are in rad/s, which show 2.9 to 6.4
 _LEFT_OUT = 0.1  # to either side of 0: dq and qd were left out
 _COIL = 0.3  # least likeness to a coil from which on it tells
 _FEW = 8  # points from which on it tells
-
 _CLEAR = 0.35  # most that an admittance may miss the relation by: resonances between coarse rows miss it by more
 _SURE = 0.2  # most that both miss a relation by, in their geometric mean, where it tells without a coil
 _TOPS = (_TOP, 2.5, np.inf)  # parts of the highest frequency from which on such a one is looked for

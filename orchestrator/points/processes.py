@@ -58,7 +58,8 @@ class Processes:
         """Compute the waiting tasks. If a worker dies, end early and return the tasks that were being computed."""
         under_way: dict[Future[Result], int] = {}
         suspects: list[int] = []
-        pool, whole = self._running_pool(), False
+        self._pool = self._pool or self._new_pool(self.workers)
+        pool, whole = self._pool, False
         self._at_work = True
         try:
             while waiting or under_way:
@@ -89,11 +90,6 @@ class Processes:
             else:
                 suspects.append(index)
         return sorted(suspects)
-
-    def _running_pool(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            self._pool = self._new_pool(self.workers)
-        return self._pool
 
     def _new_pool(self, workers: int) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(workers, mp_context=self._context, initializer=_start_worker)

@@ -10,7 +10,6 @@ from orchestrator.ssp.names import FMU_TYPE, PARAMETER_MAPPING_TYPE, PARAMETER_S
 from orchestrator.ssp.parameter_sets import SspValue, read_parameter_mapping, read_parameter_set
 
 Owner = tuple[str, ...]  # path of a component or system below the top system; the top system is ()
-
 Node = tuple[Owner, str]  # A connector of an owner, or its variable where it has no such connector
 
 _SENDING_INSIDE = ("input", "parameter")

@@ -22,9 +22,7 @@ from orchestrator.errors import AnalysisError, CosimError, InputError
 from orchestrator.study.modes import running
 
 MULTIPLES = (0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 10.0, 20.0, 50.0)  # steps that are tried, in parts of the case's own
-
 TRIED: tuple[ScheduleName, ...] = ("gauss-seidel", "midpoint", "newton")  # schedules that are tried where none is named
-
 LEAST_DAMPED = 6  # so many modes are compared, least damped first
 SWINGING = 0.5  # largest damping ratio of a compared mode
 _COUPLING_FACTOR, _COUPLING_RATE = 2.0, 1.0

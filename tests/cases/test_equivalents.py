@@ -16,6 +16,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.coupling.master import Master
 from orchestrator.errors import CaseError
 from tests.support.kernels import in_python, taped, vector
+from tests.support.written_out import written_out
 
 CASE = """\
 name = "pair"
@@ -146,7 +147,7 @@ def test_a_pivot_that_vanishes_gives_no_wrong_voltage(how, beside, solved):
     )  # fmt: skip
     network = Network("n", ("m", "a", "b", "c", "d"), lines, (), (Port("g", "a"),), phasors=True)
     model = phasor_grid.phasor_grid(network)
-    model = model.written_out if how == "code" else model
+    model = written_out(model, checked=True) if how == "code" else model
     at = model.value_references
     for kernel in (taped(model), in_python(model)):
         z = vector(model)

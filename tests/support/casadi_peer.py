@@ -21,7 +21,7 @@ def _column(values):
 
 class _Function:
     def __init__(self, name, inputs, outputs):
-        self.inputs, self.outputs = inputs, outputs
+        self.name, self.inputs, self.outputs = name, inputs, outputs
         self._function = ca.Function(name, [_column(v) for v in inputs], [_column(v) for v in outputs])
         self.instructions = range(self._function.n_instructions())
 
@@ -72,6 +72,7 @@ def made():
     from fmus.grid.phasor_grid import phasor_grid
     from fmus.grid.two_area import TWO_AREA_PHASOR
     from fmus.toolchain.catalogue import build_model, model_names, needs_arguments
+    from tests.support.written_out import written_out
 
     lines = (
         Line("l1", "a", "b", X=0.1, R=0.01, B=0.02),
@@ -79,9 +80,9 @@ def made():
     )
     loads = (Load("power", "c", 50.0, 10.0, active=Zip(p=0.5, i=0.5), k_pf=1.0), Load("plain", "b", 20.0, 5.0))
     network = Network("chain", ("a", "b", "c"), lines, loads, (Port("unit", "a"),), faults=("b",))
-    written_out = {NETWORK: grid(network), "two_area_phasor_grid": phasor_grid(TWO_AREA_PHASOR, as_data=False)}
-    names = {name for name in model_names() if not needs_arguments(name)} - {*written_out}
-    return {name: build_model(name) for name in sorted(names)} | written_out
+    peers = {NETWORK: grid(network), "two_area_phasor_grid": written_out(phasor_grid(TWO_AREA_PHASOR))}
+    names = {name for name in model_names() if not needs_arguments(name)} - {*peers}
+    return {name: build_model(name) for name in sorted(names)} | peers
 
 
 def functions(model):

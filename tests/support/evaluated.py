@@ -6,6 +6,7 @@ import numpy as np
 
 from fmus.toolchain.model import Model
 from tests.support.jacobians import jacobians
+from tests.support.written_out import written_out
 
 
 class Evaluated:
@@ -14,7 +15,7 @@ class Evaluated:
     def __init__(self, model: Model, values: Mapping[str, float] | None = None):
         values = dict(values or {})
         assert set(values) <= {v.name for v in model.parameters}
-        self.model = model = model.written_out  # functions of (x, u, p, c) alone
+        self.model = model = written_out(model)  # functions of (x, u, p, c) alone
         self.p = np.array([float(values.get(v.name, v.start)) for v in model.parameters])
         self.c, self.x = (np.array(v).ravel() for v in model.initialise(self.p))
 

@@ -9,6 +9,7 @@ from fmus.toolchain.model import Model
 from orchestrator.cases.case import Case
 from orchestrator.cases.prepare import PreparedScenario
 from tests.support.jacobians import jacobians
+from tests.support.written_out import written_out
 
 
 def network_of(case: Case, scenario: str, overrides: dict | None = None) -> Network:
@@ -37,7 +38,7 @@ def _parts(prepared: PreparedScenario, network: Network | None) -> dict:
     for name, plan in prepared.system.components.items():
         own = network is not None and plan.description.model_name == network.name
         model = build_model("grid", network=network) if own else build_model(plan.description.model_name)
-        model = model.written_out  # functions of (x, u, p, c) alone
+        model = written_out(model)  # functions of (x, u, p, c) alone
         p = np.array([float(plan.parameters.get(v.name, v.start)) for v in model.parameters])
         c, x = model.initialise(p)
         parts[name] = (model, p, c, x)

@@ -3,11 +3,12 @@
 from itertools import product
 
 from fmus.toolchain.symbols import Expr, Function, jacobian
+from tests.support.written_out import written_out
 
 
 def jacobians(model):
     """Exact A, B, C, D of the continuous model as a function of (x, u, p, c)."""
-    model = model.written_out
+    model = written_out(model)
     known = model.derivatives.inputs
     blocks, shapes = [], []
     for values in (model.derivatives.outputs[0], model.outputs_function.outputs[0]):

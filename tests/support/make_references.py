@@ -14,6 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from fmus.toolchain.catalogue import build_model
+from tests.support.written_out import written_out
 
 ROOT = Path(__file__).parents[2]
 STEP_TIME, STOP_TIME, INTERVAL = 0.01, 0.3, 0.002
@@ -111,7 +112,7 @@ REFERENCES = (
 
 def integrate(reference: Reference) -> tuple[list[str], np.ndarray]:
     """Column names and rows: time, inputs held from that time on, outputs."""
-    model = build_model(reference.model).written_out
+    model = written_out(build_model(reference.model))
     p = np.array([reference.parameters.get(v.name, v.start) for v in model.parameters])
     c, x = model.initialise(p)
     names = [v.name for v in model.outputs]

@@ -22,6 +22,7 @@ from orchestrator.fmi.component import RealBatch
 from orchestrator.fmi.description import read_description
 from orchestrator.fmi.loaded import LoadedComponent
 from tests.support.kernels import KERNELS, compiled, tape_library, taped, vector
+from tests.support.written_out import written_out
 
 NAMES = [name for name in model_names() if not needs_arguments(name)]
 _HEAD = 24  # bytes before those that the checksum is of
@@ -36,7 +37,7 @@ def bits(values):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_tape_has_the_bits_of_compiled_code(name):
     """At random parameters, inputs and states, through steps, with parameters that change between them."""
-    model = build_model(name).written_out
+    model = written_out(build_model(name))
     by_code, by_tape, random = compiled(model), taped(model), np.random.default_rng(3)
     first, nu, nx = len(model.parameters) + len(model.calculated), len(model.inputs), len(model.states)
     step = model.parameters[0].start

@@ -15,10 +15,7 @@ from fmus.toolchain.symbols import Expr
 
 
 def classical(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
-    """Declare the machine.
-
-    ``port``: gives the operating point; ``S_n``: rating [MVA]; ``stator_flux``: declares the stator's fluxes: as
-    states, or as signals that a model without stator transients closes."""
+    """Declare the machine."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
         X_1 = common.scale * reactance(m, "X_d1", 0.3, "Transient reactance X'_d")

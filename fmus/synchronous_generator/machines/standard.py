@@ -175,10 +175,7 @@ def gensal(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclar
 
 
 def genrou(m: ModelBuilder, port: DevicePort, S_n: Expr, stator_flux: FluxDeclaration) -> Machine:
-    """Declare the machine of sixth order, one with a round rotor. Its subtransient flux saturates both axes.
-
-    ``port``: gives the operating point; ``S_n``: rating [MVA]; ``stator_flux``: declares the stator's fluxes: as
-    states, or as signals that a model without stator transients closes."""
+    """Declare the machine of sixth order, one with a round rotor. Its subtransient flux saturates both axes."""
     common = declare_common(m, S_n)
     with m.scope("machine"):
         X_l, X_2, d = _d_axis(m, common)

@@ -22,7 +22,6 @@ RANGES = {
 """Bounds of the voltage [pu] by kind."""
 
 JUMPS = {"jump": (26.0, 70.0), "small jump": (10.0, 24.0)}  # bounds of a phase jump's size [°], of either sign, by kind
-
 Segment = tuple[complex, float]  # A factor on the voltage, and for how long [s]
 
 

@@ -34,7 +34,6 @@ _DIP, _DIP_LASTS, _CYCLE = 0.05, 0.15, 0.02
 _ANSWERS = 1.0  # time [s] after which its answer at another rating is taken
 _SEEN = 0.01  # least answer [pu, S_n] that is compared
 _OTHERWISE = 0.1  # part of an answer by which it may differ at another rating
-
 _STAYS = 0.25  # part by which a current in a dip may miss the limit of another rating, and be that limit
 
 

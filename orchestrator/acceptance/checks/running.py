@@ -20,7 +20,6 @@ _LOADED = 4.0  # how many times as long a run may take as it computes, on a mach
 _HELD, _ROUNDS = 50, 4  # steps for which inputs stay; how often they change before it is looked at the clock
 
 _WANDERS = 0.5  # part of its current's range by which that may differ a round of inputs later
-
 _LOOK = 2.5  # simulated time [s] from one look at its memory to the next
 LONGEST = 60.0  # simulated time [s] after which enough was seen
 LEAST_STEPS = 20  # an FMU that ends by itself before that many steps has shown nothing

@@ -18,7 +18,6 @@ from orchestrator.fmi.description import FmuDescription
 from orchestrator.fmi.port import START, BoundDescription
 
 Stimulus = Callable[[float], Numbers]  # time [s] → the inputs' deviations from where they start
-
 STEPS_IN_A_ROUND = 4096  # random inputs, after which they come again
 PORT_STEP = 1e-4  # communication step [s] at which converters are coupled
 
@@ -85,8 +84,6 @@ class Subject:
         if self.port:
             return PORT_STEP
         return min(1e-3, described.stop_time / 1000) if described.stop_time else 1e-3
-
-    # -- instances -------------------------------------------------------------------------------
 
     def open(self, name: str = "fmu") -> HostedComponent:
         return HostedComponent(name, self.process())
@@ -166,8 +163,6 @@ class Subject:
     def random(self, purpose: str) -> np.random.Generator:
         """Random numbers for one purpose: equal ones whenever they are asked for."""
         return np.random.default_rng((self.seed, crc32(purpose.encode())))
-
-    # -- stimuli ---------------------------------------------------------------------------------
 
     @property
     def amplitudes(self) -> Numbers:

@@ -16,7 +16,6 @@ _LEVELS = 4  # A signal with more values than that does not switch
 _ALIKE = 0.05  # difference of all else at the moments of switching, of its range, beyond what one step moves it
 _DWELL = 0.1  # relative difference of the times between two switchings
 _STEPS = 2.0  # how many of the longer steps a time between two switchings may differ by
-
 Interval = tuple[Numbers, float]  # what was read after every step, from the start on, and the step [s]
 
 

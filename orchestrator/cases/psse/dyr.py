@@ -119,7 +119,7 @@ def _followed(
     """Models of the machines that are grid-following converters; ``problems`` takes what speaks against one."""
     found = {}
     for key, own in of.items():
-        if is_following(own, left):
+        if any(record.name in FIELDS and record.name not in left for record in own):
             try:
                 parameters, replaced = followed(own, left)
             except InputError as error:
@@ -208,11 +208,6 @@ def remedy_for(name: str, *, approximate: bool) -> str:
 
 
 # -- WECC's grid-following converters: as the phasor converter at the user's word, else refused ------
-
-
-def is_following(records: Sequence[DynamicRecord], left: Collection[str]) -> bool:
-    """Whether some of a machine's records, but for those that are left out, can be approximated."""
-    return any(record.name in FIELDS and record.name not in left for record in records)
 
 
 def followed(

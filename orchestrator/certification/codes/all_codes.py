@@ -24,7 +24,6 @@ CLEARED = tuple(range(1, 2 * len(RATIOS), 2))
 """Numbers of the events with which the faults of the steps are cleared: the power is asked for after each of them."""
 
 LEAST_INERTIA = 2.5  # least inertia constant [s]: ERCOT, model quality tests, revision 24
-
 STRENGTH = 10.0  # short-circuit ratio of the rows of codes that ask for riding through: they name no grid
 AFTER = 5.0  # how long a ride-through is looked at after the last step [s]
 
@@ -36,7 +35,6 @@ PRC_DIPS = ((0.2, 0.32), (0.45, 1.2), (0.65, 3.0), (0.85, 6.0))
 resources other than wind."""
 
 PRC_SWELL = (1.15, 1.0)  # voltage within the band above 1.10 [pu], and its time [s]
-
 NOGRR_ZERO = (0.0, 0.15)  # no voltage [pu], and its time [s]
 NOGRR_LEVELS = (0.2, 0.45, 0.65, 0.85)  # voltages of the dips between 0 and 0.9 [pu]
 NOGRR_SWELLS = ((1.15, 1.0), (1.175, 0.5), (1.2, 0.2))  # highest voltage of each band [pu], and its time [s]
