@@ -17,7 +17,7 @@ _BETTER = 0.3  # of what fewer leave, from which on more are the better account
 _ALIKE = 2.0  # times what exponentials leave, up to which sines are as good an account: two modes leave far less
 _LARGEST = 3.0  # power of one beside that of all, beyond which they cancel each other and explain nothing
 _STEADY = 0.25  # change of the logarithm of an amplitude over the record up to which it is that of a sine
-_SEEN = 0.02  # part of the power from which on one counts
+_SEEN = 0.01  # part of the power from which on one counts
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ def doubt(kind: str, times: Numbers, z: Numbers, values: Numbers, frequency: flo
     z, t = z[some] / np.linalg.norm(z[some], axis=0), times[some]
     one, two, three = (_explained(t, z, frequency, count, free=True) for count in (1, 2, 3))
     found = one
-    for more in (two, three):
-        found = more if more.left < _BETTER * found.left else found
+    for more, fewer in ((two, one), (three, two)):
+        found = more if more.left < _BETTER * fewer.left else found
     apart, strong = np.abs(found.frequencies - frequency), found.powers >= min(_SEEN, found.powers.max())
     near = strong & (apart <= max(1 / (t[-1] - t[0]), apart[strong].min()))
     steady = np.abs(found.changes[near]) < _STEADY
-    close = found is not one and found.left < _LEFT
+    close = strong.sum() > 1 and found.left < _LEFT
     if kind == "forced":
         return f"beside others close by ({found}) it decays or grows" if close and not steady[0] else ""
     sines, more = (_explained(t, z, frequency, count, free=False) for count in (2, 3))
