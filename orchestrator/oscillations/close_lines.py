@@ -15,9 +15,9 @@ _SKIRT = 3.0  # power close beside the lines as a multiple of that further off: 
 _NOTHING = 1e-4  # left by sines without noise, beside which a skirt is what the fit itself leaves
 _BETTER = 0.3  # of what fewer leave, from which on more are the better account
 _ALIKE = 2.0  # times what exponentials leave, up to which sines are as good an account: two modes leave far less
-_LARGEST = 3.0  # power of one beside that of all, beyond which they cancel each other and explain nothing
+_LARGEST = 4.0  # power of one beside that of all, beyond which they cancel each other and explain nothing
 _STEADY = 0.25  # change of the logarithm of an amplitude over the record up to which it is that of a sine
-_SEEN = 0.01  # part of the power from which on one counts
+_SEEN = 0.01  # power beside that of all from which on one is told
 
 
 @dataclass(frozen=True)
@@ -41,19 +41,19 @@ def doubt(kind: str, times: Numbers, z: Numbers, values: Numbers, frequency: flo
     found = one
     for more, fewer in ((two, one), (three, two)):
         found = more if more.left < _BETTER * fewer.left else found
-    apart, strong = np.abs(found.frequencies - frequency), found.powers >= min(_SEEN, found.powers.max())
-    near = strong & (apart <= max(1 / (t[-1] - t[0]), apart[strong].min()))
+    apart = np.abs(found.frequencies - frequency)
+    near = apart <= max(1 / (t[-1] - t[0]), apart.min())
     steady = np.abs(found.changes[near]) < _STEADY
-    close = strong.sum() > 1 and found.left < _LEFT
+    close = len(apart) > 1 and found.left < _LEFT
     if kind == "forced":
-        return f"beside others close by ({found}) it decays or grows" if close and not steady[0] else ""
+        return f"apart from others close by ({found}) it decays or grows" if close and not steady[0] else ""
     sines, more = (_explained(t, z, frequency, count, free=False) for count in (2, 3))
     sines = more if more.left < _BETTER * sines.left else sines
     if sines.powers.max() < _LARGEST and sines.left < min(_LEFT, one.left, max(_ALIKE * found.left, _NOTHING)):
-        beside = np.median([skirt(times, x, sines.frequencies) for x in values.T])
+        beside = np.median([skirt(times, x, sines.frequencies.tolist()) for x in values.T])
         if sines.left < _NOTHING or beside < _SKIRT:
             return f"steady sines at close frequencies ({sines}) would explain it as well"
-    return f"beside others close by ({found}) it is steady" if close and steady.any() else ""
+    return f"apart from others close by ({found}) it is steady" if close and steady.any() else ""
 
 
 def most_explained(t: Numbers, z: Numbers, offsets: Numbers, count: int) -> tuple[Numbers, float]:
@@ -83,10 +83,10 @@ def _explained(times: Numbers, z: Numbers, frequency: float, count: int, *, free
     x = least_squares(lambda x: solved(x)[0].view(float).ravel(), start, method="lm", max_nfev=300).x
     rest, sizes = solved(x)
     powers = (np.abs(sizes) ** 2).mean(axis=1)
-    order = np.argsort(-powers)
-    changes = x[count:][order] if free else np.zeros(count)
+    seen = [k for k in np.argsort(-powers) if powers[k] >= min(_SEEN, powers.max())]
+    changes = x[count:][seen] if free else np.zeros(len(seen))
     left = float(np.vdot(rest, rest).real / z.shape[1])
-    return _Lines(frequency + x[:count][order] / span, changes, powers[order], left)
+    return _Lines(frequency + x[:count][seen] / span, changes, powers[seen], left)
 
 
 def skirt(times: Numbers, values: Numbers, lines: Sequence[float]) -> float:

@@ -79,8 +79,8 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     figures = Evidence("not known", damping, spread, kurtosis, coherence, beside, periods, shocked, ())
     kind, reasons = _judged(figures, change, pair, found)
     if kind != "not known":
-        late = slice(half, len(t) - half)
-        other = doubt(kind, t[late], np.column_stack(envelopes), signals.values[used][late][:, columns], f)
+        shown = signals.values[used][half : len(t) - half, columns]
+        other = doubt(kind, late, np.column_stack(envelopes), shown, f)
         kind, reasons = ("not known", [f"{reasons[0]}, but {other}"]) if other else (kind, reasons)
     return replace(figures, kind=kind, reasons=tuple(reasons))
 
