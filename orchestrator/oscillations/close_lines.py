@@ -16,7 +16,7 @@ _NOTHING = 1e-4  # left by sines without noise, beside which a skirt is what the
 _BETTER = 0.3  # of what fewer leave, from which on more are the better account
 _ALIKE = 2.0  # times what exponentials leave, up to which sines are as good an account: two modes leave far less
 _LARGEST = 4.0  # power of one beside that of all, beyond which they cancel each other and explain nothing
-_STEADY = 0.25  # change of the logarithm of an amplitude over the record up to which it is that of a sine
+_STEADY = 0.25  # change of the logarithm of an amplitude over the record up to which it may be a sine's; up to half, is
 _SEEN = 0.01  # power beside that of all from which on one is told
 
 
@@ -43,17 +43,17 @@ def doubt(kind: str, times: Numbers, z: Numbers, values: Numbers, frequency: flo
         found = more if more.left < _BETTER * fewer.left else found
     apart = np.abs(found.frequencies - frequency)
     near = apart <= max(1 / (t[-1] - t[0]), apart.min())
-    steady = np.abs(found.changes[near]) < _STEADY
+    change = np.abs(found.changes[near])
     close = len(apart) > 1 and found.left < _LEFT
     if kind == "forced":
-        return f"apart from others close by ({found}) it decays or grows" if close and not steady[0] else ""
+        return f"apart from others close by ({found}) it decays or grows" if close and change[0] > 0.5 * _STEADY else ""
     sines, more = (_explained(t, z, frequency, count, free=False) for count in (2, 3))
     sines = more if more.left < _BETTER * sines.left else sines
     if sines.powers.max() < _LARGEST and sines.left < min(_LEFT, one.left, max(_ALIKE * found.left, _NOTHING)):
         beside = np.median([skirt(times, x, sines.frequencies.tolist()) for x in values.T])
         if sines.left < _NOTHING or beside < _SKIRT:
             return f"steady sines at close frequencies ({sines}) would explain it as well"
-    return f"apart from others close by ({found}) it is steady" if close and steady.any() else ""
+    return f"apart from others close by ({found}) it is steady" if close and change.min() < _STEADY else ""
 
 
 def most_explained(t: Numbers, z: Numbers, offsets: Numbers, count: int) -> tuple[Numbers, float]:
