@@ -1,55 +1,92 @@
-"""Whether what looks like one mode is several steady sines whose frequencies a record hardly tells apart."""
+"""What stands close beside a line of a spectrum, where a record hardly tells their frequencies apart."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from orchestrator.arrays import Numbers, Vector
+from orchestrator.arrays import Numbers
 from orchestrator.oscillations.detection import phasors
 
 _REACH = 4.0  # widths of a line, 1/T, around its frequency; one further off is found by itself
-_LEFT = 0.03  # part of the power that sines may leave: planted ones 0.005; of a mode in noise 0.07 without a skirt
+_LEFT = 0.03  # part of the power that close lines may leave: planted ones 0.005; of a mode in noise 0.07
 _SKIRT = 3.0  # power close beside the lines as a multiple of that further off: beside planted ones 0.6 to 1.1
 _NOTHING = 1e-4  # left by sines without noise, beside which a skirt is what the fit itself leaves
-_BETTER = 0.2  # of what one exponential leaves, from which on sines are the better account
-_ALIKE = 2.0  # times what two leave, up to which sines are as good a one: two modes that ring down leave far less
+_BETTER = 0.3  # of what fewer leave, from which on more are the better account
+_ALIKE = 2.0  # times what exponentials leave, up to which sines are as good an account: two modes leave far less
+_LARGEST = 4.0  # power of one beside that of all, beyond which they cancel each other and explain nothing
+_STEADY = 0.25  # change of the logarithm of an amplitude over the record up to which it may be a sine's; up to half, is
+_SEEN = 0.01  # power beside that of all from which on one is told
 
 
-def close_lines(t: Numbers, z: Vector, times: Numbers, values: Numbers, frequency: float) -> list[float]:
-    """Frequencies of two or three sines [Hz] that explain a signal and its envelope z over 0 <= t <= 1, or none."""
-    one, two = (min(_fitted(t, z, count, [rate] * count)[1] for rate in (-1.0, 1.0)) for count in (1, 2))
-    most = min(_LEFT, _BETTER * one, max(_ALIKE * two, _NOTHING))
-    for count in (2, 3):
-        offsets, left = _fitted(t, z, count)
-        lines = [frequency + float(x) / (times[-1] - times[0]) for x in sorted(offsets)]
-        if left < most and (left < _NOTHING or skirt(times, values, lines) < _SKIRT):
-            return lines
-    return []
+@dataclass(frozen=True)
+class _Lines:
+    """Exponentials, or sines, that together explain the envelopes of several signals; the strongest first."""
+
+    frequencies: Numbers  # [Hz]
+    changes: Numbers  # of the logarithms of their amplitudes over the record
+    powers: Numbers
+    left: float  # part of the power that they leave
+
+    def __str__(self) -> str:
+        return ", ".join(map("{:.3f}".format, sorted(self.frequencies))) + " Hz"
 
 
-def most_explained(t: Numbers, z: Vector, offsets: Numbers, count: int) -> tuple[Numbers, float]:
-    """Which of many frequencies together explain most of z, and which part of its power."""
+def doubt(kind: str, times: Numbers, z: Numbers, values: Numbers, frequency: float) -> str:
+    """Why what looks forced, or a mode, in signals and their envelopes z, shape (n, m), may not be; "" if nothing."""
+    some = slice(None, None, max(1, len(z) // 64))
+    z, t = z[some] / np.linalg.norm(z[some], axis=0), times[some]
+    one, two, three = (_explained(t, z, frequency, count, free=True) for count in (1, 2, 3))
+    found = one
+    for more, fewer in ((two, one), (three, two)):
+        found = more if more.left < _BETTER * fewer.left else found
+    apart = np.abs(found.frequencies - frequency)
+    near = apart <= max(1 / (t[-1] - t[0]), apart.min())
+    change = np.abs(found.changes[near])
+    close = len(apart) > 1 and found.left < _LEFT
+    if kind == "forced":
+        return f"apart from others close by ({found}) it decays or grows" if close and change[0] > 0.5 * _STEADY else ""
+    sines, more = (_explained(t, z, frequency, count, free=False) for count in (2, 3))
+    sines = more if more.left < _BETTER * sines.left else sines
+    if sines.powers.max() < _LARGEST and sines.left < min(_LEFT, one.left, max(_ALIKE * found.left, _NOTHING)):
+        beside = np.median([skirt(times, x, sines.frequencies.tolist()) for x in values.T])
+        if sines.left < _NOTHING or beside < _SKIRT:
+            return f"steady sines at close frequencies ({sines}) would explain it as well"
+    return f"apart from others close by ({found}) it is steady" if close and change.min() < _STEADY else ""
+
+
+def most_explained(t: Numbers, z: Numbers, offsets: Numbers, count: int) -> tuple[Numbers, float]:
+    """Which of many frequencies together explain most of signals z, shape (n, m), and which part of their power."""
     waves = np.exp(2j * np.pi * np.outer(t, offsets))
     chosen = np.array([*combinations(range(len(offsets)), count)])
     gram, seen = waves.conj().T @ waves, (waves.conj().T @ z)[chosen]
-    solved = np.linalg.solve(gram[chosen[:, :, None], chosen[:, None, :]], seen[..., None])[..., 0]
-    power = (seen.conj() * solved).real.sum(axis=1)
+    solved = np.linalg.solve(gram[chosen[:, :, None], chosen[:, None, :]], seen)
+    power = (seen.conj() * solved).real.sum(axis=(1, 2))
     return offsets[chosen[power.argmax()]], float(power.max() / np.vdot(z, z).real)
 
 
-def _fitted(t: Numbers, z: Vector, count: int, rates: Sequence[float] = ()) -> tuple[Numbers, float]:
-    """Frequencies of sines, or with first rates of exponentials, and the part of the power that they leave."""
-    from scipy.optimize import minimize  # noqa: PLC0415 - slow to import
+def _explained(times: Numbers, z: Numbers, frequency: float, count: int, *, free: bool) -> _Lines:
+    """Of exponentials, or of sines, those that leave least."""
+    from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import
 
-    def left(x: Numbers) -> float:
-        waves = np.exp(np.outer(t, 2j * np.pi * x[:count] + (x[count:] if rates else 0.0)))
-        rest = z - waves @ np.linalg.lstsq(waves, z, rcond=None)[0]
-        return float(np.vdot(rest, rest).real / np.vdot(z, z).real)
+    t, span = np.linspace(0, 1, len(z)), times[-1] - times[0]
+
+    def solved(x: Numbers) -> tuple[Numbers, Numbers]:
+        waves = np.exp(np.outer(t, 2j * np.pi * x[:count] + (np.clip(x[count:], -50, 50) if free else 0)))
+        waves /= np.linalg.norm(waves, axis=0)
+        sizes = np.linalg.lstsq(waves, z, rcond=None)[0]
+        return z - waves @ sizes, sizes
 
     first, _ = most_explained(t, z, np.arange(-_REACH, _REACH + 0.01, 0.25), count)
-    best = minimize(left, [*first, *rates], method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-6, "maxfev": 700})
-    return best.x[:count], float(best.fun)
+    start = [*first, *[-1.0] * count * free]
+    x = least_squares(lambda x: solved(x)[0].view(float).ravel(), start, method="lm", max_nfev=300).x
+    rest, sizes = solved(x)
+    powers = (np.abs(sizes) ** 2).mean(axis=1)
+    seen = [k for k in np.argsort(-powers) if powers[k] >= min(_SEEN, powers.max())]
+    changes = x[count:][seen] if free else np.zeros(len(seen))
+    left = float(np.vdot(rest, rest).real / z.shape[1])
+    return _Lines(frequency + x[:count][seen] / span, changes, powers[seen], left)
 
 
 def skirt(times: Numbers, values: Numbers, lines: Sequence[float]) -> float:

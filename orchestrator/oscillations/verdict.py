@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from orchestrator.arrays import Numbers
-from orchestrator.oscillations.close_lines import close_lines, most_explained, skirt
+from orchestrator.oscillations.close_lines import doubt, most_explained, skirt
 from orchestrator.oscillations.detection import Signals, SpectralLine, envelope, find_oscillations, phasors, signals_of
 from orchestrator.oscillations.location import DEF, DYNAMIC_MODE, QV_PHASE, Opinion, felt_beyond, opinions
 from orchestrator.oscillations.measurements import Measurements
@@ -67,9 +67,10 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
         wave = np.real(z * np.exp(2j * np.pi * f * late))
         kurtosis = (wave**4).mean() / (wave**2).mean() ** 2
         spread = size.std() / size.mean()
-        some, span = np.unique(np.linspace(0, len(z) - 1, 64).astype(int)), late[-1] - late[0]
-        envelopes.append(((late[some] - late[0]) / span, z[some], late, signals.values[used, k][half : len(t) - half]))
-        pair = most_explained(*envelopes[-1][:2], np.arange(-2, 2.01, 0.125), 2)[1] if spread > _RESTLESS else 0.0
+        envelopes.append(z)
+        some = z[:: max(1, len(z) // 64), None]
+        at = np.linspace(0, 1, len(some))
+        pair = most_explained(at, some, np.arange(-2, 2.01, 0.125), 2)[1] if spread > _RESTLESS else 0.0
         seen.append([spread, kurtosis, abs(z.mean()) / size.mean(), slope, change, pair])
     beside = float(np.median([skirt(t, signals.values[used, k], [f]) for k in columns]))
     spread, kurtosis, coherence, slope, change, pair = np.median(seen, axis=0).tolist()
@@ -77,11 +78,10 @@ def evidence_of(signals: Signals, found: SpectralLine) -> Evidence:
     shocked = _disturbed(signals, found)
     figures = Evidence("not known", damping, spread, kurtosis, coherence, beside, periods, shocked, ())
     kind, reasons = _judged(figures, change, pair, found)
-    if kind == "mode":
-        lines = [close for one in envelopes if (close := close_lines(*one, f))]
-        if 2 * len(lines) > len(columns):
-            said = ", ".join(map("{:.3f}".format, lines[0]))
-            kind, reasons = "not known", [f"steady sines at close frequencies ({said} Hz) would explain it as well"]
+    if kind != "not known":
+        shown = signals.values[used][half : len(t) - half, columns]
+        other = doubt(kind, late, np.column_stack(envelopes), shown, f)
+        kind, reasons = ("not known", [f"{reasons[0]}, but {other}"]) if other else (kind, reasons)
     return replace(figures, kind=kind, reasons=tuple(reasons))
 
 

@@ -321,6 +321,30 @@ def test_forcings_at_close_frequencies_in_several_units_are_no_mode(sines):
     assert all(one.source is None for one in found)
 
 
+CLOSE = {  # frequency [Hz], rate [1/s], amplitude, phase; the kind of the line at the first, and what its reason says
+    "two modes": ([(0.486, -0.0178, 0.0171, 2.47), (0.552, -0.0313, 0.006, 4.24)], 30, "0.486, 0.552 Hz"),
+    "a sine beside a mode": ([(1.1952, 0, 0.0097, 5.74), (1.2252, -0.1336, 0.0188, 3.84)], 40, "1.195, 1.225 Hz"),
+    "three sines": ([(1.2966, 0, 0.0074, 5.09), (1.2604, 0, 0.0071, 2.85), (1.2275, 0, 0.015, 1.23)], 60,
+                    "1.227, 1.260, 1.297 Hz"),
+    "two sines": ([(0.6025, 0, 0, 0), (0.6, 0, 0.02, 0), (0.605, 0, 0.02, 1.5)], 60, "(0.600, 0.605 Hz)"),
+    "a sine and the mode that it excited": ([(0.8, 0, 0.02, 0), (0.745, -0.2, 0.006, 2)], 60, None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CLOSE)
+def test_what_a_line_is_beside_its_close_neighbours(name):
+    parts, length, said = CLOSE[name]
+    t, places = np.arange(0, length, 0.04), []
+    noise = 1e-6 * np.random.default_rng(1).standard_normal((3, 4, len(t)))
+    for unit, size, own in zip("ABC", (1.0, 0.5, -0.8), noise, strict=True):
+        z = size * sum(a * np.exp((rate + 2j * np.pi * f) * t + 1j * phase) for f, rate, a, phase in parts)
+        shown = own + np.array([0.2 * z.real, 0.3 * z.imag, z.real, 0.4 * (z * np.exp(1j)).real])
+        places.append(Site(unit, "unit", unit, 1 + shown[0], shown[1], 3 + shown[2], 0.5 + shown[3]))
+    evidence = at(locate(made_ready(name, t, places)), parts[0][0]).evidence
+    assert evidence.kind == ("not known" if said else "forced")
+    assert said is None or said in evidence.reasons[0]
+
+
 def test_noise_of_loads_alone_forces_nothing():
     for name in ("two_area", "ieee39"):
         found = locate(record(name, {}, loads=0.002, measuring=5e-5, times=times_of(60.0)))
