@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from orchestrator.analysis.modes import Mode
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.cases.schema import Value
-from orchestrator.errors import CosimError
+from orchestrator.errors import AnalysisError, CosimError
 from orchestrator.study.modes import ModesResult, compute_modes
 
 
@@ -22,17 +22,20 @@ def left_changed(prepared: PreparedScenario) -> Mapping[str, Value]:
 
 
 def modes_after(prepared: PreparedScenario, frequency_range: tuple[float, float]) -> ModesResult | str | None:
-    """The modes from a power flow with what the events leave changed; the reason where there are none, None where
-    nothing is."""
+    """The modes from a power flow with what the events leave changed; the reason where there are none beside a switch
+    that is left, else None. Units share what loads and references change, which no power flow tells."""
     values = left_changed(prepared)
     if not values or prepared.beside is None:
         return None
+    is_switched = any(isinstance(value, bool) for value in values.values())
     try:
+        if moved := [key for key in values if key.endswith(".scale") or ".delta_" in key]:
+            raise AnalysisError(f"units share what {moved[0]} changes by what their controls do")
         after = prepared.beside(prepared.name, False, values, prepared.stop_time)
         return compute_modes(after, frequency_range) if after else None
     except CosimError as error:
         reason = ": ".join(line.strip(" -:") for line in str(error).splitlines()[:2])
-        return f"the modes after the events are not known: {reason}"
+        return f"the modes after the events are not known: {reason}" if is_switched else None
 
 
 def least_damped(after: ModesResult | str | None) -> Mode | None:

@@ -5,7 +5,8 @@ import json
 import pytest
 
 import orchestrator as gfor_api
-from orchestrator.study.after_events import left_changed
+from orchestrator.study.after_events import left_changed, modes_after
+from orchestrator.study.modes import ModesResult
 from tests.screening.five_machines import five_machines
 
 pytestmark = pytest.mark.filterwarnings("ignore::orchestrator.api.scenario.UnusualDataWarning")
@@ -67,3 +68,16 @@ def test_settling_is_not_judged_while_something_is_forced(gfor, case):
 def test_a_run_without_events_says_so(gfor, case):
     _, found = run(gfor, case)
     assert found["answer"]["remark"].startswith("no event disturbs it")
+
+
+LOAD = '[[events]]\ntype = "load_change"\ntime = "0.5 s"\ncomponent = "grid"\nload = "load_11"\nscale = 1.5\n'
+TRIP = '[[events]]\ntype = "line_trip"\ntime = "0.5 s"\nline = "line_13_14"\n'
+
+
+@pytest.mark.parametrize(
+    ("events", "kind"), [(LOAD, type(None)), (TRIP, ModesResult), (LOAD + TRIP, str)], ids=("load", "trip", "both")
+)
+def test_who_feeds_a_load_that_changed_is_for_the_run_to_show(case, events, kind):
+    case.write_text(f"{case.read_text()}\n{events}")
+    after = modes_after(gfor_api.load(case).scenario("base").prepared, (0.1, 2.0))
+    assert isinstance(after, kind), after
