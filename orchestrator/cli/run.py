@@ -45,7 +45,7 @@ from orchestrator.results.storage import save_dataset
 from orchestrator.safe_files import PARTIAL, made_folder
 from orchestrator.study import beside
 from orchestrator.study.all_modes import all_ours
-from orchestrator.study.answers import EarlyEnd
+from orchestrator.study.answers import EarlyEnd, of_run
 from orchestrator.study.files import save_run, save_study, summary_of
 from orchestrator.study.like import run_like
 from orchestrator.study.run import RunResult
@@ -154,7 +154,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
         return code
     calls.over = True
     kept.end(whole=True)
-    unsound = options.fail_unstable and not all(r.stable_in_simulation and not r.unstable_after for r in results)
+    unsound = options.fail_unstable and not all(r.stable_in_simulation and of_run(r).good for r in results)
     return int(unsound) or exit_code(options, [r.modes.stability for r in results])
 
 

@@ -54,10 +54,7 @@ class ScenarioFolder:
         try:
             about = {"scenario": self.place.name} | ({} if ended_early is None else {ENDED_EARLY: ended_early})
             write_manifest(self.path, self.run, _files(self.path), about=about)
-            for name in _of_others(self.place):
-                if not (new := self.path / name).exists():
-                    new.parent.mkdir(parents=True, exist_ok=True)
-                    copy2(self.place / name, new)
+            _keep_others(self.place, self.path, self.run)
             flush(self.path)
             _exchange(self.path, self.place, self.run)
         except OSError as error:
@@ -72,10 +69,21 @@ def require_results(place: Path) -> None:
                          "there now; give another --out, or move it")  # fmt: skip
 
 
-def _of_others(folder: Path) -> list[str]:
-    """Files that the folder's manifest does not list; none where it lists nothing that can be read."""
-    own = _readable(folder)
-    return [name for name in _files(folder) if name not in own.files] if own else []
+def _keep_others(old: Path, new: Path, run: str) -> None:
+    """Copy what a folder's manifest does not list; where the new one has a file of that name, beside it."""
+    own = _readable(old)
+    for path in sorted(old.rglob("*")):
+        name = path.relative_to(old).as_posix()
+        place = new / name
+        if name == MANIFEST or (own and name in own.files):
+            continue
+        if path.is_dir() and not path.is_symlink():
+            if not any(path.iterdir()):
+                place.mkdir(parents=True, exist_ok=True)
+        elif own or not place.exists():
+            place = place.with_name(f"{place.name}.before-{run}") if place.exists() else place
+            place.parent.mkdir(parents=True, exist_ok=True)
+            copy2(path, place, follow_symlinks=False)
 
 
 def _exchange(new: Path, place: Path, run: str) -> None:
@@ -93,7 +101,7 @@ def _exchange(new: Path, place: Path, run: str) -> None:
                 raise
             rmtree(old, ignore_errors=True)
     flush(place.parent)
-    if old.is_dir():
+    if old.is_dir() and not old.is_symlink():
         rmtree(old, ignore_errors=True)
     else:
         old.unlink(missing_ok=True)

@@ -13,9 +13,10 @@ from orchestrator.coupling.events import Forcing
 from orchestrator.errors import RunInterruptedError
 from orchestrator.report.tables import COLOURS, first_few, make_table, short
 from orchestrator.results.mode_json import eigenvalue_json
-from orchestrator.study.after_events import least_damped
+from orchestrator.study.after_events import least_damped, left_changed
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
+from orchestrator.watch.confirmation import PERIODS
 
 _LONGEST = 120  # of a remark [characters]; the whole text stands among the details
 
@@ -121,10 +122,22 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
         names = ", ".join(dict.fromkeys(f"{e.component}.{e.variable}" for e in forced))
         remark = f"keeps synchronism until {end:g} s; {names}: forced until then, so settling is not judged"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
+    if (wanted := _seen_from(result, mode)) > end:
+        remark = f"what the events leave is too short to be seen to settle: --stop {wanted:.3g}"
+        return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     rest = f", before the events at {later}" if later else ""
     rest += f"; {by_modes.remark}" if by_modes.remark else ""
     said = f"keeps synchronism and settles until {end:g} s{rest}"
     return ScenarioAnswer(title, True, "stable", mode, short(said, _LONGEST))
+
+
+def _seen_from(result: RunResult, mode: Mode | None) -> float:
+    """Time from which on a growth shows where no modes of what the events leave are known [s]; 0 where they are, or
+    nothing is left changed."""
+    prepared = result.modes.prepared
+    if isinstance(result.after, ModesResult) or mode is None or not left_changed(prepared):
+        return 0.0
+    return max(event.time for event in prepared.events) + PERIODS / mode.frequency_hz
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:

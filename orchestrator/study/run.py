@@ -151,7 +151,7 @@ def _run(
     watch = Watch(prepared, recording)
     statistics = None
     failure: CosimError | None = None
-    after = None if federation else modes_after(prepared, frequency_range)
+    after = modes_after(prepared, frequency_range)
     with running(prepared, federation, threads) as master:
         protections = {name: found for name, c in master.components.items() if (found := protections_of(c))}
         reasons = [text for c in master.components.values() if (text := obstacle_of(c) or obstacle(c))]

@@ -81,3 +81,12 @@ def test_who_feeds_a_load_that_changed_is_for_the_run_to_show(case, events, kind
     case.write_text(f"{case.read_text()}\n{events}")
     after = modes_after(gfor_api.load(case).scenario("base").prepared, (0.1, 2.0))
     assert isinstance(after, kind), after
+
+
+def test_a_change_whose_modes_are_not_known_is_no_verdict_of_a_short_run(gfor, case):
+    case.write_text(f"{case.read_text()}\n{LOAD}")
+    short, found = run(gfor, case, stop="2")
+    assert (short, found["answer"]["stable"]) == (1, None)
+    assert "too short to be seen to settle: --stop 3.6" in found["answer"]["remark"]
+    whole, found = run(gfor, case, stop="6")
+    assert (whole, found["answer"]["stable"]) == (0, True)

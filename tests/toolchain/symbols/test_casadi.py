@@ -3,6 +3,7 @@
 import pickle
 import subprocess
 import sys
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -21,7 +22,8 @@ def ours():
 @pytest.fixture(scope="module")
 def theirs(tmp_path_factory):
     file = tmp_path_factory.mktemp("peer") / "answers"
-    subprocess.run([sys.executable, casadi_peer.__file__, file], check=True)
+    command = [sys.executable, "-m", casadi_peer.__name__, str(file)]  # apart, from which it finds the tests' support
+    subprocess.run(command, check=True, cwd=Path(__file__).parents[3])
     return pickle.loads(file.read_bytes())
 
 
