@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import Any
 
 from rich.table import Table
@@ -123,7 +124,7 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
         remark = f"keeps synchronism until {end:g} s; {names}: forced until then, so settling is not judged"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     if (wanted := _seen_from(result, mode)) > end:
-        remark = f"what the events leave is too short to be seen to settle: --stop {wanted:.3g}"
+        remark = f"the run is too short to show whether what the events leave settles: --stop {wanted:g}"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))
     rest = f", before the events at {later}" if later else ""
     rest += f"; {by_modes.remark}" if by_modes.remark else ""
@@ -137,7 +138,7 @@ def _seen_from(result: RunResult, mode: Mode | None) -> float:
     prepared = result.modes.prepared
     if isinstance(result.after, ModesResult) or mode is None or not left_changed(prepared):
         return 0.0
-    return max(event.time for event in prepared.events) + PERIODS / mode.frequency_hz
+    return ceil(10 * (max(event.time for event in prepared.events) + PERIODS / mode.frequency_hz)) / 10
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:

@@ -97,7 +97,7 @@ def _runs(draw: np.random.Generator, longest: float) -> Iterator[list[Disturbanc
             for bounds, least, most in (((1.12, 1.2), 0.6, 1.0), ((1.12, 1.16), 2.2, 3.5), ((0.8, 0.9), 1.0, 2.5)):
                 (words, voltage), lasts = dip(*bounds), round(draw.uniform(least, most), 3)
                 before, long = ((voltage, lasts),), f"{words} for {lasts:g} s"
-                (words, to), (turned, by) = dip(0.1, 0.35), jump(50, 70)
+                (words, to), (turned, by) = dip(0.1, 0.35), kinds[0]
                 yield [Disturbance(f"{words} after the {long}", to, 0.1, before=before)]
                 yield [Disturbance(f"{turned} in the {long}", voltage * by, 0.1, before=before)]
             words, to = dip(0.1, 0.35)
@@ -177,6 +177,10 @@ def _disturbed(
     return None
 
 
+def _is_turned_alike(one: Disturbance, other: Disturbance) -> bool:
+    return abs(one.factor / abs(one.factor) - other.factor / abs(other.factor)) < 1e-9
+
+
 def _blocked(before: complex, current: Complex, h: float) -> tuple[float, bool]:
     """The longest time without current that ends, and whether there is none in the end."""
     some = np.flatnonzero(np.abs(current) > _BLOCKED)
@@ -208,11 +212,11 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     seen += "; it is a machine, whose current nothing limits" if machine and declared is None else ""
     if unsaid and worst.mean > NO_LIMIT:
         return failed("limits", "no current limit", seen, **figures)
-    early, late = (
-        [a.early for a in answers if a.event.factor.imag and bool(a.event.before) is b] for b in (False, True)
-    )
-    if not machine and max(late, default=0.0) > _UNEVEN * max(early, default=np.inf):
-        says = f"{max(late):.3g} pu in a phase jump's third cycle in a voltage that lasts, {max(early):.3g} pu without"
+    turned = [a for a in answers if a.event.factor.imag]
+    late = max((a for a in turned if a.event.before), key=lambda a: a.early, default=None)
+    alike = [a.early for a in turned if late and not a.event.before and _is_turned_alike(a.event, late.event)]
+    if not machine and late and alike and late.early > _UNEVEN * max(alike):
+        says = f"{late.early:.3g} pu in a phase jump's third cycle in a voltage that lasts, {max(alike):.3g} pu without"
         return failed("limits", "no current limit", f"{says}; {seen}", **figures)
     bolted = max((a.mean for a in answers if a.event.factor == 0), default=worst.mean)
     deep = max((a for a in answers if 0 < abs(a.event.factor) < _HEALTHY), key=lambda a: a.mean, default=worst)
