@@ -36,8 +36,9 @@ _HEALTHY = 0.9  # voltage [pu] at which a device has to stay on
 _CYCLE = 0.02  # time [s] over which a current is averaged: what heats the semiconductors and what protection sees
 
 _UNEVEN, _MUCH = 1.6, 2.2
-"""Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only; the
-first also of a jump in a voltage that lasts."""
+"""Current in a dip, in parts of that in a dip to no voltage and in pu, from which a limit acts in some dips only."""
+
+_IN_VOLTAGE = 1.4  # the same of a jump in a voltage that lasts, in parts of that without; 1.2 where nothing limits both
 
 _BACK = 0.3  # distance of the current from where it was [pu, S_n] from which the next one hits a new instance
 _AT_LEAST = 14  # runs, however long they take: at all times, dips that stay, after what lasts, with imported power
@@ -215,7 +216,7 @@ def _judged(subject: Subject, answers: list[Answer], refused: list[str], left_ou
     turned = [a for a in answers if a.event.factor.imag]
     late = max((a for a in turned if a.event.before), key=lambda a: a.early, default=None)
     alike = [a.early for a in turned if late and not a.event.before and _is_turned_alike(a.event, late.event)]
-    if not machine and late and alike and late.early > _UNEVEN * max(alike):
+    if not machine and late and alike and late.early > _IN_VOLTAGE * max(alike):
         says = f"{late.early:.3g} pu in a phase jump's third cycle in a voltage that lasts, {max(alike):.3g} pu without"
         return failed("limits", "no current limit", f"{says}; {seen}", **figures)
     bolted = max((a.mean for a in answers if a.event.factor == 0), default=worst.mean)
