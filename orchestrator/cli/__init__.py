@@ -124,7 +124,8 @@ def _origin(words: Sequence[str], files: Mapping[str, Path]) -> dict[str, Any]:
     hashes = {name: sha256_of(path) for name, path in files.items()}
     for path in (word for before, word in pairwise(["", *words]) if before.removeprefix("--") not in origin.WRITTEN):
         hashes |= {f"{path}/{name}": of for name, of in inputs_behind(Path(path)).items()}
-    return {"command": shlex.join(["gfor", *words]), "code": code_hash(), "inputs": hashes}
+    command = shlex.join(["gfor", *words])
+    return {"command": command, "directory": str(Path.cwd()), "code": code_hash(), "inputs": hashes}
 
 
 def _failed(error: CosimError | SetupError | OSError) -> int:

@@ -10,7 +10,7 @@ WRITTEN = ("out", "into", "html", "save", "scan", "junit")  # options that name 
 _BESIDE = {".toml": (".csv", ".json"), ".cfg": (".dat",)}  # endings of what is written beside a file
 
 said: list[Callable[[], dict[str, Any]]] = []
-"""The ``command`` in force, with the hashes of the ``code`` and of the ``inputs``; from Python without a command."""
+"""The ``command`` in force, its ``directory``, hashes of ``code`` and ``inputs``; from Python without a command."""
 
 
 def as_typed() -> str:

@@ -142,3 +142,13 @@ def test_a_case_that_was_edited_since_is_told_in_a_report(gfor, study, tmp_path)
         file.write("# another one\n")
     assert "not as they were when results were made of them: own.toml (of r)" in gfor("report", "r")[2]
     assert "make the results again" in (tmp_path / "r/report.html").read_text()
+
+
+def test_another_file_of_that_name_where_a_report_is_made_is_no_input(gfor, study, tmp_path, monkeypatch):
+    gfor(*study, "--out", "r")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    (tmp_path / "elsewhere/own.toml").write_text("another")
+    assert "not as they were" not in gfor("report", "../r")[2]
+    (tmp_path / "own.toml").write_text("edited")
+    assert "own.toml (of ../r)" in gfor("report", "../r")[2]

@@ -137,10 +137,15 @@ def _of_several_studies(chapters: Sequence[Chapter]) -> str:
 
 
 def _changed_since(chapters: Sequence[Chapter]) -> str:
-    """Files that results were made from and that are here, by the same path, with another content by now."""
-    made_of = {one.source: _origin(one.source).get("inputs", {}) for one in chapters}
-    found = {name: source for source, inputs in made_of.items() for name, content in inputs.items()
-             if Path(name).is_file() and file_hash(Path(name)) != content}  # fmt: skip
+    """Files that results were made from and that have another content by now, in the place where they were."""
+    found = {}
+    for source in dict.fromkeys(one.source for one in chapters):
+        inputs, home = (made := _origin(source)).get("inputs", {}), Path(made.get("directory", ""))
+        homes = [home, *(home / Path(name).parent for name in inputs if name.endswith(".toml"))] if home.name else []
+        for name, content in inputs.items():
+            there = [file for one in homes if (file := one / name).is_file()]
+            if there and all(file_hash(file) != content for file in there):
+                found[name] = source
     names = few((f"{name} (of {source})" for name, source in found.items()), 3)
     return f"not as they were when results were made of them: {names}; make the results again" if names else ""
 
