@@ -35,8 +35,9 @@ def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
     case = SimpleNamespace(
         table=SimpleNamespace(analysis=SimpleNamespace(modes={}), models=kind, emt=KindTable(step_size=1e-4))
     )
-    prepared = SimpleNamespace(title="S", subject="S", events=[t for t in events if t < 5], stop_time=5.0, case=case,
-                               not_reached=[t for t in events if t >= 5])  # fmt: skip
+    passing = [SimpleNamespace(time=t, changes=dict) for t in events if t < 5]  # leaves nothing changed
+    prepared = SimpleNamespace(title="S", subject="S", events=passing, stop_time=5.0, case=case,
+                               system=SimpleNamespace(components={}), not_reached=[t for t in events if t >= 5])  # fmt: skip
     modes = SimpleNamespace(
         prepared=prepared, modes=[mode], hidden=None, named={}, unnamed={}, misfits={},
         swing_of=lambda _: (["sg1"], ["sg2"]),
