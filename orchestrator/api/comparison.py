@@ -1,5 +1,6 @@
 """Two runs side by side."""
 
+import json
 import warnings
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from orchestrator.api.identification import opened
 from orchestrator.api.results import Run
 from orchestrator.asked import Names, names
 from orchestrator.cases.given import Time, moment
-from orchestrator.errors import InputError
+from orchestrator.errors import InputError, few
 from orchestrator.results.manifest import ResultsWarning
 from orchestrator.results.recorded import in_memory
 from orchestrator.study.comparison import compare as compare_signal
@@ -52,6 +53,7 @@ def compare(
     (first, label_a), (second, label_b) = opened(a, "a"), opened(b, "b")
     labels = (label_a, label_b) if label_a != label_b else (f"a ({label_a})", f"b ({label_b})")
     _warn_of_different_ends(first, second, labels)
+    _warn_of_other_files(first, second, labels)
     if (cases := [run.attrs.get("case_file") for run in (first, second)])[0] != cases[1] and None not in cases:
         told = [f"{label} of {run.attrs['case']}" for label, run in zip(labels, (first, second), strict=True)]
         text = f"the runs are of two case files ({', '.join(told)}): what differs may be the networks"
@@ -80,6 +82,13 @@ def compare(
         if mode is not None and mode.doubts
     ]
     return RunComparison(labels, signals_compared, [*([times.remark] if times.remark else []), *remarks])
+
+
+def _warn_of_other_files(first: xr.Dataset, second: xr.Dataset, labels: tuple[str, str]) -> None:
+    one, two = (json.loads(run.attrs.get("inputs", "{}")) for run in (first, second))
+    if other := [name for name in one if one[name] != two.get(name, one[name]) and not name.endswith(".fmu")]:
+        text = f"{labels[0]} and {labels[1]} are of files that differ: {few(other, 3)}"
+        warnings.warn(text, ResultsWarning, stacklevel=3)
 
 
 def _warn_of_different_ends(first: xr.Dataset, second: xr.Dataset, labels: tuple[str, str]) -> None:

@@ -46,7 +46,7 @@ from orchestrator.safe_files import PARTIAL, made_folder
 from orchestrator.study import beside
 from orchestrator.study.all_modes import all_ours
 from orchestrator.study.answers import EarlyEnd, of_run
-from orchestrator.study.files import save_run, save_study, summary_of
+from orchestrator.study.files import files_of_study, save_run, save_study, summary_of
 from orchestrator.study.like import run_like
 from orchestrator.study.run import RunResult
 from orchestrator.study.run_request import RunRequest
@@ -89,7 +89,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     """Run the scenarios; each is written as soon as it is done."""
     require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
     mend(folder)
-    check_free(folder, "case.toml", scenarios[0].prepared.case.content)
+    check_free(folder, files_of_study(scenarios[0].prepared.case))
     for scenario in scenarios:
         require_results(folder / scenario.name)
     if options.resume is None:

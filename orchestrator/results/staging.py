@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -169,13 +169,16 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
         rmtree(path, ignore_errors=True)
 
 
-def check_free(folder: Path, name: str, content: bytes) -> None:
-    """Refuse a file that is to be written where somebody else's is, before anything is computed for it."""
-    if _is_foreign(folder, name, hashlib.sha256(content).hexdigest()):
-        raise foreign(folder / name, "give another --out, or move it")
+def check_free(folder: Path, contents: Mapping[str, bytes | None]) -> None:
+    """Refuse files that are to be written where somebody else's are, before anything is computed for them.
+
+    ``contents``: by name; None where it is not known yet."""
+    for name, content in contents.items():
+        if _is_foreign(folder, name, None if content is None else hashlib.sha256(content).hexdigest()):
+            raise foreign(folder / name, "give another --out, or move it")
 
 
-def _is_foreign(folder: Path, name: str, content: str) -> bool:
+def _is_foreign(folder: Path, name: str, content: str | None) -> bool:
     """Whether a file that is there is read by the command, or of somebody else, and other than the new one."""
     path = folder / name
     return path.is_file() and (path.resolve() in inputs or not _is_listed(folder, name)) and sha256_of(path) != content

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from orchestrator.cases.definition import CaseDefinition
 from orchestrator.cases.flow_figures import power_flow_json
 from orchestrator.cases.prepare import PreparedScenario
 from orchestrator.errors import RunInterruptedError
@@ -68,6 +69,17 @@ def write_modes(
         save_json(modes_json(results, weights, beside), staging / "modes.json")
         flows = sorted(path.name for path in staging.glob("power_flow_*.csv"))
     return ["modes.csv", "participation.csv", "mode_shapes.csv", "modes.json", *flows, *plots]
+
+
+def files_of_study(case: CaseDefinition) -> dict[str, bytes | None]:
+    """What `save_study` writes, by name, with what is known of it before."""
+    names = [f"{table.name}.png" for table in case.table.plots] + [
+        "eigenvalues.png",
+        "participation.png",
+        "summary.json",
+    ]
+    tables = [f"{name}.csv" for name in ("step_size", "modes", "participation", "mode_shapes")]
+    return {"case.toml": case.content, **dict.fromkeys([*names, *tables])}
 
 
 def save_study(

@@ -127,11 +127,11 @@ class ParameterLimit:
             return f"{holding} over the whole range, {self.key} from {start} to {stop}{strained}{worst}"
         what = self.until.failing if self.kind is Ending.FAILS else str(self.kind)
         if self.holds_at is None:
-            return f"{what} already at the start, {self.key} = {at}{self._again()}{mode}{why}"
+            return f"{what} already at the start, {self.key} = {at}{self._again('at')}{mode}{why}"
         up_to = f"{holding} up to {self.key} = {self._value(self.holds_at)}{self._dip()}{strained}"
         if self.kind is Ending.FAILS:
             return f"{up_to}, {what} at {at}{self._again()}{mode}"
-        return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{why}"
+        return f"{what} from {self.key} = {at} on, which is no limit of stability; {up_to}{self._again()}{why}"
 
     def _dip(self) -> str:
         """The least damping on the way, where it is less than at both ends."""
@@ -141,9 +141,9 @@ class ParameterLimit:
             return ""
         return f" (on the way {least['damping_percent']:.2f} % at {self._value(least['value'])})"
 
-    def _again(self) -> str:
+    def _again(self, how: str = "again at") -> str:
         shown = few(map(self._value, self.again), 2)
-        return f" ({self.until.holding} again at {shown}: the range is not of one piece)" if self.again else ""
+        return f" ({self.until.holding} {how} {shown}: the range is not of one piece)" if self.again else ""
 
     @property
     def remarks(self) -> list[str]:

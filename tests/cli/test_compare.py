@@ -61,6 +61,13 @@ def test_runs_of_two_cases_are_told(tmp_path, gfor):
     assert "two case files" not in gfor("signal", "compare", one, same)[2]
 
 
+def test_runs_of_a_network_that_was_edited_between_are_told(tmp_path, gfor):
+    made_of = [json.dumps({"own.raw": "1a", "own.dyr": content, f"{content}.fmu": content}) for content in "abb"]
+    one, other, same = (save(tmp_path / f"r{k}", -0.3 + 4j, inputs=text) for k, text in enumerate(made_of))
+    assert "of files that differ: own.dyr" in " ".join(gfor("signal", "compare", one, other)[2].split())
+    assert "differ" not in gfor("signal", "compare", other, same)[2]
+
+
 def test_the_modes_of_a_signal(runs, capsys):
     assert main(["signal", "identify", str(runs[0]), "a.omega", "--start", "1", "--json"]) == 0
     mode, *_ = json.loads(capsys.readouterr().out)

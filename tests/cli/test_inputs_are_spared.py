@@ -66,7 +66,7 @@ def study(tmp_path, monkeypatch):
     return "run", "own.toml", "--scenario", "dip", "--stop", "0.02"
 
 
-@pytest.mark.parametrize("place", ["dip", "dip/notes.txt", "case.toml"])
+@pytest.mark.parametrize("place", ["dip", "dip/notes.txt", "case.toml", "modes.csv"])
 def test_what_no_run_has_made_is_not_replaced_by_one(gfor, study, tmp_path, place):
     """A folder or a file with a scenario's name, and another case beside which results are put."""
     path = tmp_path / place
@@ -84,7 +84,8 @@ def test_a_run_that_is_repeated_leaves_the_files_of_others(gfor, study, tmp_path
         code, _, err = gfor(*study, "--out", ".")
         assert code == 0, err
         (tmp_path / "dip/notes").mkdir(exist_ok=True)
-        (tmp_path / "dip/notes/mine.txt").write_text("mine")
+        for name in ("dip/notes/mine.txt", "dip/manifest.csv", "dip/plan.part-2"):
+            (tmp_path / name).write_text("mine")
     assert (tmp_path / "dip/notes/mine.txt").read_text() == "mine"
     assert "notes/mine.txt" not in read_manifest(tmp_path / "dip").files
 

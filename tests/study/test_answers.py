@@ -37,7 +37,8 @@ def result(findings=(), stable=True, events=(1.0,), failure=None, kind=None):
     )
     passing = [SimpleNamespace(time=t, changes=dict) for t in events if t < 5]  # leaves nothing changed
     prepared = SimpleNamespace(title="S", subject="S", events=passing, stop_time=5.0, case=case,
-                               system=SimpleNamespace(components={}), not_reached=[t for t in events if t >= 5])  # fmt: skip
+                               not_reached=[t for t in events if t >= 5])  # fmt: skip
+    prepared.system = SimpleNamespace(components={})
     modes = SimpleNamespace(
         prepared=prepared, modes=[mode], hidden=None, named={}, unnamed={}, misfits={},
         swing_of=lambda _: (["sg1"], ["sg2"]),
