@@ -54,10 +54,6 @@ def compare(
     labels = (label_a, label_b) if label_a != label_b else (f"a ({label_a})", f"b ({label_b})")
     _warn_of_different_ends(first, second, labels)
     _warn_of_other_files(first, second, labels)
-    if (cases := [run.attrs.get("case_file") for run in (first, second)])[0] != cases[1] and None not in cases:
-        told = [f"{label} of {run.attrs['case']}" for label, run in zip(labels, (first, second), strict=True)]
-        text = f"the runs are of two case files ({', '.join(told)}): what differs may be the networks"
-        warnings.warn(text, ResultsWarning, stacklevel=2)
     begin = RINGS_FROM if start is None else moment(start, "start")
     ends = [(label, float(run["time"][-1])) for run, label in zip((first, second), labels, strict=True)]
     short = [(label, end) for label, end in ends if end <= begin]
@@ -85,6 +81,10 @@ def compare(
 
 
 def _warn_of_other_files(first: xr.Dataset, second: xr.Dataset, labels: tuple[str, str]) -> None:
+    if (cases := [run.attrs.get("case_file") for run in (first, second)])[0] != cases[1] and None not in cases:
+        told = [f"{label} of {run.attrs['case']}" for label, run in zip(labels, (first, second), strict=True)]
+        text = f"the runs are of two case files ({', '.join(told)}): what differs may be the networks"
+        warnings.warn(text, ResultsWarning, stacklevel=3)
     one, two = (json.loads(run.attrs.get("inputs", "{}")) for run in (first, second))
     if other := [name for name in one if one[name] != two.get(name, one[name]) and not name.endswith(".fmu")]:
         text = f"{labels[0]} and {labels[1]} are of files that differ: {few(other, 3)}"

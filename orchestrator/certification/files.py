@@ -10,6 +10,7 @@ from typing import Any
 from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.case_file import BINDING, FMU
 from orchestrator.certification.certificate import Certificate
+from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.codes.record import code_json, code_responses
 from orchestrator.certification.figures import damping_json, damping_responses
 from orchestrator.certification.form import case_files
@@ -45,7 +46,7 @@ def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
 def spare_another(folder: Path, code: str) -> None:
     """Refuse a folder with a certificate by another code, which this one would replace."""
     try:
-        there = read_record(folder / JSON).get("code", "nts631")
+        there = read_record(folder / JSON).get("code", NTS631)
     except (OSError, ValueError, AttributeError):
         return
     if there != code:

@@ -12,9 +12,8 @@ from orchestrator.cli.terminal import make_console, print_json, print_parts
 from orchestrator.errors import CosimError, InputError
 from orchestrator.operating_points.points_file import folder_of, settings_in
 from orchestrator.report.tables import make_table
-from orchestrator.results.staging import new_run_id, staged
+from orchestrator.results.staging import check_free, new_run_id, staged
 from orchestrator.results.storage import save_table
-from orchestrator.safe_files import spare_input
 
 TABLE = "points.csv"
 
@@ -28,7 +27,7 @@ def by_point(
     """Rows of what is found at each point, shown and kept; one that fails says why, and the others go on.
 
     Raises an `InputError` where all of them fail."""
-    spare_input(folder / TABLE)
+    check_free(folder, {TABLE: None})
     rows: list[dict[str, Any]] = []
     lost = 0
     for name, values in settings_in(options.points).items():

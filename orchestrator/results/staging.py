@@ -158,7 +158,7 @@ def staged(folder: Path, run: str, scenarios: Iterable[str] = ()) -> Iterator[Pa
         write_manifest(path, run, names, scenarios, _readable(folder))
         if taken:
             path.rename(folder / run)
-            raise foreign(folder / taken[0], f"the results are in {folder / run}")
+            raise _foreign(folder / taken[0], f"the results are in {folder / run}")
         for name in [*names, MANIFEST]:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             os.replace(path / name, folder / name)
@@ -175,7 +175,7 @@ def check_free(folder: Path, contents: Mapping[str, bytes | None]) -> None:
     ``contents``: by name; None where it is not known yet."""
     for name, content in contents.items():
         if _is_foreign(folder, name, None if content is None else hashlib.sha256(content).hexdigest()):
-            raise foreign(folder / name, "give another --out, or move it")
+            raise _foreign(folder / name, "give another --out, or move it")
 
 
 def _is_foreign(folder: Path, name: str, content: str | None) -> bool:
@@ -196,7 +196,7 @@ def _is_listed(folder: Path, name: str) -> bool:
     return False
 
 
-def foreign(path: Path, remedy: str) -> InputError:
+def _foreign(path: Path, remedy: str) -> InputError:
     why = "the command reads it" if path.resolve() in inputs else "no command has written it"
     return InputError(f"{path}: this file would be written over, and {why}; {remedy}")
 

@@ -14,7 +14,7 @@ from orchestrator.coupling.events import Forcing
 from orchestrator.errors import RunInterruptedError
 from orchestrator.report.tables import COLOURS, first_few, make_table, short
 from orchestrator.results.mode_json import eigenvalue_json
-from orchestrator.study.after_events import least_damped, left_changed
+from orchestrator.study.after_events import lasting_changes
 from orchestrator.study.modes import ModesResult
 from orchestrator.study.run import RunResult
 from orchestrator.watch.confirmation import PERIODS
@@ -81,11 +81,14 @@ def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str,
 
 def of_run(result: RunResult) -> ScenarioAnswer:
     """By what the run showed, and by the eigenvalues before its events and after them."""
-    after, answer = least_damped(result.after), _by_response(result)
-    if result.unstable_after and answer.good is not False and isinstance(result.after, ModesResult):
-        remark = short(f"the system that the events leave: {of_modes(result.after).remark}", _LONGEST)
+    answer = _by_response(result)
+    if not isinstance(result.after, ModesResult):
+        return answer
+    left = of_modes(result.after)
+    if left.good is False and answer.good is not False:
+        remark = short(f"the system that the events leave: {left.remark}", _LONGEST)
         answer = replace(answer, good=False, verdict="UNSTABLE", remark=remark)
-    return replace(answer, after=after)
+    return replace(answer, after=left.mode)
 
 
 def _by_response(result: RunResult) -> ScenarioAnswer:
@@ -136,7 +139,7 @@ def _seen_from(result: RunResult, mode: Mode | None) -> float:
     """Time from which on a growth shows where no modes of what the events leave are known [s]; 0 where they are, or
     nothing is left changed."""
     prepared = result.modes.prepared
-    if isinstance(result.after, ModesResult) or mode is None or not left_changed(prepared):
+    if isinstance(result.after, ModesResult) or mode is None or not lasting_changes(prepared):
         return 0.0
     return ceil(10 * (max(event.time for event in prepared.events) + PERIODS / mode.frequency_hz)) / 10
 

@@ -25,6 +25,7 @@ from orchestrator.study.mode_plots import plot_eigenvalues, plot_mode_shapes, pl
 from orchestrator.study.modes import ModesResult, modes_json
 from orchestrator.study.run import RunResult
 
+_TABLES = ("modes.csv", "participation.csv", "mode_shapes.csv")  # of `save_modes`
 _LEAST_PARTICIPATION = 1e-3  # smaller factors are left out of the files
 
 
@@ -68,18 +69,14 @@ def write_modes(
         plots = [path.name for path in save_modes(results, staging)]
         save_json(modes_json(results, weights, beside), staging / "modes.json")
         flows = sorted(path.name for path in staging.glob("power_flow_*.csv"))
-    return ["modes.csv", "participation.csv", "mode_shapes.csv", "modes.json", *flows, *plots]
+    return [*_TABLES, "modes.json", *flows, *plots]
 
 
 def files_of_study(case: CaseDefinition) -> dict[str, bytes | None]:
-    """What `save_study` writes, by name, with what is known of it before."""
-    names = [f"{table.name}.png" for table in case.table.plots] + [
-        "eigenvalues.png",
-        "participation.png",
-        "summary.json",
-    ]
-    tables = [f"{name}.csv" for name in ("step_size", "modes", "participation", "mode_shapes")]
-    return {"case.toml": case.content, **dict.fromkeys([*names, *tables])}
+    """What `save_study` writes of every case, by name, with what is known of it before."""
+    plots = [f"{table.name}.png" for table in case.table.plots]
+    unknown = [*_TABLES, "step_size.csv", "summary.json", "eigenvalues.png", "participation.png", *plots]
+    return {"case.toml": case.content, **dict.fromkeys(unknown)}
 
 
 def save_study(

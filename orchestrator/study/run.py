@@ -84,11 +84,6 @@ class RunResult:
     after: ModesResult | str | None = None  # as `modes_after` has it
 
     @property
-    def unstable_after(self) -> bool:
-        """Whether the system that the events leave has a growing mode, whatever the run could show of it."""
-        return isinstance(self.after, ModesResult) and self.after.stability.stable is False
-
-    @property
     def went_unstable(self) -> list[Finding]:
         """The findings that no stable system gives, whatever its linear model says."""
         return [finding for finding in self.findings if finding.kind in UNSTABLE]

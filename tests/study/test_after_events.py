@@ -5,7 +5,7 @@ import json
 import pytest
 
 import orchestrator as gfor_api
-from orchestrator.study.after_events import left_changed, modes_after
+from orchestrator.study.after_events import lasting_changes, modes_after
 from orchestrator.study.modes import ModesResult
 from tests.screening.five_machines import five_machines
 
@@ -56,7 +56,7 @@ def test_a_fault_that_opens_nothing_leaves_the_system_as_it_was(gfor, case):
     _, found = run(gfor, case, "--fault", "bus_14, 60 ms, from 0.5 s")
     assert "after_events" not in found["answer"]
     scenario = gfor_api.load(case).scenario("base", fault=FAULT)
-    assert left_changed(scenario.prepared) == {"grid.line_13_14.connected": False}
+    assert lasting_changes(scenario.prepared) == {"grid.line_13_14.connected": False}
 
 
 def test_settling_is_not_judged_while_something_is_forced(gfor, case):
