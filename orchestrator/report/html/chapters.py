@@ -6,6 +6,7 @@ import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from html import escape
 from itertools import chain
 from math import pi
@@ -18,6 +19,7 @@ from orchestrator.errors import InputError, counted
 from orchestrator.report.html import studies
 from orchestrator.report.html.charts import Mark, bar_chart, complex_plane, legend
 from orchestrator.report.html.elements import colour, damping, table
+from orchestrator.report.html.origins import origin_of
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import read_manifest
 
@@ -41,6 +43,11 @@ class Chapter:
     page: str = ""
     title: str = ""
     bases: Sequence[Mapping[str, Any]] = ()  # what figures rest on: `PreparedScenario.basis`
+
+    @cached_property
+    def origin(self) -> dict[str, Any]:
+        """What the result says of itself, as `origin_of` has it."""
+        return origin_of(self.source)
 
 
 Content = Mapping[str, Any]

@@ -2,13 +2,10 @@
 
 import json
 import re
-import shlex
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import UTC, datetime
 from html import escape
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +15,7 @@ from orchestrator.report.html.chapters import Chapter, chapters_of, has_fault, o
 from orchestrator.report.html.chapters import sections as sections_of
 from orchestrator.report.html.elements import Figures, document, held_data, paragraphs, table
 from orchestrator.report.html.folder import SUMMARY, Results, read_results, sweeps_of
+from orchestrator.report.html.origins import given_in, made_of
 from orchestrator.report.tables import short
 from orchestrator.results.manifest import MANIFEST, ResultsWarning
 from orchestrator.safe_files import file_hash, write_page
@@ -120,7 +118,7 @@ def _of_several_studies(chapters: Sequence[Chapter]) -> str:
     models that differ; "" where none do."""
     files, models = dict[str, list[tuple[str, str]]](), dict[str, list[tuple[str, str]]]()
     for one in chapters:
-        inputs = _origin(one.source).get("inputs", {})
+        inputs = one.origin.get("inputs", {})
         shown = {name: name if Path(name).suffix in _RECORDS else Path(name).name for name in inputs}
         files[str(one.source)] = [(shown[name], str(content)) for name, content in inputs.items()]
         found = models.setdefault(str(one.source), [])
@@ -139,8 +137,8 @@ def _of_several_studies(chapters: Sequence[Chapter]) -> str:
 def _changed_since(chapters: Sequence[Chapter]) -> str:
     """Files that results were made from and that have another content by now, in the place where they were."""
     found = {}
-    for source in dict.fromkeys(one.source for one in chapters):
-        inputs, home = (made := _origin(source)).get("inputs", {}), Path(made.get("directory", ""))
+    for source, origin in _origins(chapters).items():
+        inputs, home = origin.get("inputs", {}), Path(origin.get("directory", ""))
         homes = [home, *(home / Path(name).parent for name in inputs if name.endswith(".toml"))] if home.name else []
         for name, content in inputs.items():
             there = [file for one in homes if (file := one / name).is_file()]
@@ -179,7 +177,6 @@ def _of_run(run: Results, figures: Figures) -> Sections:
 
 
 _RECORDS = {".nc", ".csv", ".cfg", ".dat"}  # of which each folder has one of the same name
-_OUTPUTS = {"--out", "--html"}
 _NOTHING = "nothing that is known of"
 _OPEN, _LONGEST = 4, 240  # what was not judged on the first page, and the characters of each
 
@@ -192,7 +189,7 @@ def first_page(chapters: Sequence[Chapter]) -> str:
         lost = [escape(notes.get(text) or short(text, _LONGEST)) for text in one.not_judged[:_OPEN]]
         more = f"<br>and {len(one.not_judged) - _OPEN} more" if len(one.not_judged) > _OPEN else ""
         answer = f'<span class="{shade}">{escape(one.answer)}</span>'
-        given = "".join(f"<br>{escape(text)}" for text in (str(one.source), _given(one.source)) if text)
+        given = "".join(f"<br>{escape(text)}" for text in (str(one.source), given_in(one.origin)) if text)
         asked = f'{escape(one.question)}<span class="soft">{given}</span>'
         rows.append([asked, answer, escape(short(one.sure, 2 * _LONGEST)), "<br>".join(lost or [_NOTHING]) + more])
     said = "".join(
@@ -201,53 +198,15 @@ def first_page(chapters: Sequence[Chapter]) -> str:
     return table("In short", ["Question", "Answer", "How sure", "Not judged"], rows, left=4) + said
 
 
+def _origins(chapters: Sequence[Chapter]) -> dict[Path, dict[str, Any]]:
+    return {one.source: one.origin for one in chapters}
+
+
 def origins(chapters: Sequence[Chapter]) -> str:
     """Of each result when it was made, by which version and code, from what, and the command that makes it again."""
-    rows = [[escape(cell) for cell in _made(source)] for source in dict.fromkeys(one.source for one in chapters)]
+    rows = [[escape(cell) for cell in made_of(source, origin)] for source, origin in _origins(chapters).items()]
     columns = ["Results", "Made", "Version", "Code", "Inputs (SHA-256)", "Command that makes them again"]
     return table("Where every chapter comes from", columns, rows, left=6)
-
-
-def _origin(source: Path) -> dict[str, Any]:
-    """What a result says of itself; empty where that was of another run into the same folder."""
-    folder = source if source.is_dir() else source.parent
-    own = _tables(source) if source.suffix == ".json" else {}
-    match own.get("made"):
-        case dict(said):
-            return said
-        case str(date):  # a certificate's
-            made_by = own.get("environment", {})
-            return {"date": date, "made_by": made_by, "sealed": own.get("files", {}),
-                    "code": made_by.get("Commit", ""), "command": f"gfor verify {folder}"}  # fmt: skip
-    content = _tables(folder / MANIFEST)
-    listed = content.get("files", {}).get(source.name)
-    return {} if listed and listed["run"] != content["run"] else content
-
-
-def _given(source: Path) -> str:
-    """What a command was given: case, scenario, values, files; without where its results went."""
-    words = shlex.split(_origin(source).get("command", ""))
-    shown = (word for before, word in pairwise(words) if before not in _OUTPUTS)
-    kept = (word for word in shown if word.partition("=")[0] not in {*_OUTPUTS, "--json"})
-    return shlex.join(["gfor", *kept]) if words else ""
-
-
-def _made(source: Path) -> list[str]:
-    content = _origin(source)
-    listed = content.get("inputs", content.get("sealed", {}))
-    versions = content.get("made_by", {}).get("gfor-cosim")
-    inputs = ", ".join(f"{name} {str(of)[:8]}" for name, of in listed.items() if of)
-    date = content.get("date") or f"{datetime.fromtimestamp(source.stat().st_mtime, UTC):%Y-%m-%d %H:%M} (the file's)"
-    figures = f"gfor-cosim {versions}" if versions else "", str(content.get("code", ""))[:12], inputs
-    return [str(source), date, *(text or "not recorded" for text in (*figures, content.get("command")))]
-
-
-def _tables(file: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 def changes(old: Path, before: Sequence[Chapter] | None, chapters: Sequence[Chapter]) -> str:
@@ -291,7 +250,7 @@ def _answers(chapters: Sequence[Chapter]) -> list[dict[str, str]]:
     return [
         {"question": one.question, "source": "" if one.source.is_dir() else one.source.name,
          "answer": one.answer + "".join(f"; not judged: {text}" for text in one.not_judged),
-         "given": _given(one.source),
+         "given": given_in(one.origin),
          "folder": (one.source if one.source.is_dir() else one.source.absolute().parent).name}
         for one in chapters
     ]  # fmt: skip
