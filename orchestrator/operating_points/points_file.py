@@ -107,7 +107,7 @@ def questions_about(
     load = load_of(elements.loads, prepared.system.components[elements.grid])
     # a factor of 1 for generation leaves it to the slack by intention
     leaves = {point.name: _left(point, prepared, elements, fed, load) for row, point in zip(rows, points, strict=True)
-              if float(row.get("generation") or 0) != 1}  # fmt: skip
+              if float((row.get("generation") or "").strip() or 0) != 1}  # fmt: skip
     worst = max(leaves, key=lambda name: abs(leaves[name]), default="")
     more = leaves.get(worst, 0.0)
     if abs(more) > _LEFT * abs(load):

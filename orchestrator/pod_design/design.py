@@ -145,9 +145,8 @@ class PodDesign:
     after: Surroundings
     broken: str | None  # the prohibited effect of the final setting on other modes; empty if there is no such effect
     margins: Margins | None
-    spoilt: (
-        str | None
-    )  # what `LARGER_GAIN` does to other modes, as ``broken``; None where it does not, or without margins
+    # what `LARGER_GAIN` does to other modes, as ``broken``; None where it does not, or without margins
+    spoilt: str | None
     # examined_before, examined: verdict over the whole spectrum without the controller and with the final setting.
     examined_before: Examination
     examined: Examination

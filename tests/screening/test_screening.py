@@ -184,6 +184,7 @@ def questions(path, prepared, elements):
         ("sg1.in_service", "0", "more"),
         ("load,generation", "0.9,1", ""),
         ("load,generation", "0.9,1.00", ""),
+        ("load,generation", "0.9, ", "less"),
         ("sg1.connected", "false", "more"),
         ("load,sg1.P_mw", "0.9,800", ""),
         ("load,sg1.P_mw", "0.9,1350", "less"),
