@@ -35,6 +35,8 @@ class StudyCheckpoints:
             if one.time is not None:
                 done = "it was done" if one.time >= prepared.stop_time else f"it goes on from t = {one.time:.6g} s"
                 _say(f"scenario {prepared.name!r}: {done}")
+            elif options.resume is not None:
+                _say(f"scenario {prepared.name!r}: nothing of it was kept, so it begins at t = 0")
         if options.resume is not None and options.given_anew:
             keep_request(folder, options)
 

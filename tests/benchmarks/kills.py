@@ -22,7 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from tests.cli.test_resume import WORDS, started, values_of, write_case
+from tests.cli.test_resume import WORDS, checkpoints_in, started, values_of, write_case
 
 STOP = 2.0
 TIMES = (0.5, 1.1, 1.1005, 1.3333, 1.6)
@@ -42,7 +42,7 @@ def ended(out: Path, code: int) -> str:
         return "when all was done" if (out / "summary.json").exists() else "before it began"
     if (out / "summary.json").exists() or list(out.glob(".part-*")):
         return "while results of all were written"
-    if not list(kept.glob("*.checkpoint")):
+    if not checkpoints_in(out):
         return "before the first checkpoint"
     if list(out.glob("*.part-*/trajectory.nc")):
         return "while results of a scenario were written"

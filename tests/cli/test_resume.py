@@ -101,10 +101,15 @@ def undisturbed(case, tmp_path_factory):
     return values_of(folder / "out"), time.monotonic() - begun
 
 
+def checkpoints_in(out):
+    """The whole ones: one that is being written has a hidden name until then, which ends in the same way."""
+    return list(out.glob(".checkpoints/[!.]*.checkpoint"))
+
+
 def stopped_at_random(process, folder, longest, number):
     """Wait for the first checkpoint, and a little longer; send the signal."""
     end = time.monotonic() + 120
-    while not list(folder.glob(".checkpoints/*.checkpoint")) and process.poll() is None and time.monotonic() < end:
+    while not checkpoints_in(folder) and process.poll() is None and time.monotonic() < end:
         time.sleep(0.01)
     time.sleep(random.uniform(0, 0.5 * longest))
     process.send_signal(number)
@@ -148,6 +153,20 @@ def test_a_killed_run_on_several_threads_goes_on_with_another_number_of_them(cas
     stopped_at_random(process, out, 0.1, signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL
     assert "it goes on from t = " in finished(tmp_path / "tmp", "--resume", out, "--threads", 2)
+    assert values_of(out) == values_of(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_a_run_killed_before_its_first_checkpoint_says_that_it_begins_anew(tmp_path):
+    words, out = ("infinite_bus", "--scenario", "dip"), tmp_path / "out"
+    process = started(tmp_path / "tmp", *words, "--out", out, "--checkpoint", "600")
+    while not (out / ".checkpoints" / "request.json").exists() and process.poll() is None:
+        time.sleep(0.001)
+    process.kill()
+    process.communicate(timeout=120)
+    error = finished(tmp_path / "tmp", "--resume", out)
+    assert "scenario 'dip': nothing of it was kept, so it begins at t = 0" in error
+    finished(tmp_path / "tmp", *words, "--out", tmp_path / "whole")
     assert values_of(out) == values_of(tmp_path / "whole")
 
 

@@ -15,7 +15,7 @@ from orchestrator.cli import run, side_by_side
 from orchestrator.cli.side_by_side import SideBySide, number_of_workers
 from orchestrator.errors import CaseError, ComponentError, CosimError, ErrorKind, InputError, NotFiniteError, Problem
 from orchestrator.fmi.interrupts import calls
-from tests.cli.test_resume import finished, started, values_of, write_case
+from tests.cli.test_resume import checkpoints_in, finished, started, values_of, write_case
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere scenarios run one after the other")
 
@@ -82,7 +82,7 @@ def _group(process):
 
 def both_under_way(process, out):
     end = time.monotonic() + 240
-    while len(list(out.glob(".checkpoints/*.checkpoint"))) < 2 and process.poll() is None and time.monotonic() < end:
+    while len(checkpoints_in(out)) < 2 and process.poll() is None and time.monotonic() < end:
         time.sleep(0.01)
     assert process.poll() is None, process.communicate()
 

@@ -16,6 +16,7 @@ from orchestrator.cli import run as command
 from orchestrator.coupling.observers import Progress
 from orchestrator.errors import InputError
 from orchestrator.results.lock import LOCK, held
+from tests.cli.test_resume import checkpoints_in
 
 fcntl = pytest.importorskip("fcntl", reason="Windows has no such lock")
 
@@ -31,7 +32,7 @@ def live(tmp_path):
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | {"TMPDIR": str(tmp_path)},
     )  # fmt: skip
     end = time.monotonic() + 120
-    while not list((tmp_path / "out").glob(".checkpoints/*.checkpoint")):
+    while not checkpoints_in(tmp_path / "out"):
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < end
         time.sleep(0.02)
@@ -54,7 +55,7 @@ def test_a_live_run_keeps_its_folder(gfor, live):
     process.send_signal(signal.SIGTERM)
     _, error = process.communicate(timeout=120)
     assert process.returncode == 143, error
-    assert list(out.glob(".checkpoints/*.checkpoint"))
+    assert checkpoints_in(out)
     with xr.open_dataset(out / "dip" / "trajectory.nc") as data:
         assert data.sizes["time"] > 10
     assert not (out / LOCK).exists()
