@@ -10,7 +10,7 @@ from orchestrator.api.progress import shown_progress
 from orchestrator.asked import path as path_of
 from orchestrator.certification.acceptance import run_checks
 from orchestrator.certification.compared import Verification
-from orchestrator.certification.files import JSON, read_record, save
+from orchestrator.certification.files import JSON, read_record, save, spare_another
 from orchestrator.certification.inside import check_target, laid_out, put_inside
 from orchestrator.certification.kinds import CertifyRequest, usual_folder
 from orchestrator.certification.verification import verified
@@ -57,6 +57,7 @@ def _certified(request: CertifyRequest) -> IssuedCertificate:
     if target is not None:
         check_target(file, target)
     place = made_folder(Path(request.folder or usual_folder(file.stem, request.code)), "folder")
+    spare_another(place, request.code, issue.request.fmu, issue.request.binding)
     with held(place), shown_progress(f"Certificate, {request.code}", shown=request.progress) as report:
         with closing(choose_executor(request.workers, None, [issue.parts.task.__module__])) as executor:
             found = issue.compute(executor, place, report)

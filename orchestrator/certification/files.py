@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.certification.acceptance import KEPT
-from orchestrator.certification.case_file import BINDING, FMU
+from orchestrator.certification.case_file import BINDING, CASE, FMU
 from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.codes.record import code_json, code_responses
@@ -16,13 +16,13 @@ from orchestrator.certification.figures import damping_json, damping_responses
 from orchestrator.certification.form import case_files
 from orchestrator.certification.report import page
 from orchestrator.errors import InputError
+from orchestrator.points.store import POINTS
 from orchestrator.report.pdf import print_pdf
+from orchestrator.results.staging import check_free
 from orchestrator.results.storage import save_netcdf
 from orchestrator.safe_files import file_hash, write_text
 
 HTML, JSON, RESPONSES, PDF = "certificate.html", "certificate.json", "responses.nc", "certificate.pdf"
-
-_FIGURES = f"{JSON}, its figures"
 
 
 def figures_of(c: Certificate) -> dict[str, Any]:
@@ -43,11 +43,14 @@ def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
     return [html, target, folder / RESPONSES, *printed]
 
 
-def spare_another(folder: Path, code: str) -> None:
-    """Refuse a folder with a certificate by another code, which this one would replace."""
+def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> None:
+    """Refuse a folder with a certificate by another code, or with files of others, which this one would replace."""
     try:
         there = read_record(folder / JSON).get("code", NTS631)
     except (OSError, ValueError, AttributeError):
+        if not (folder / POINTS).exists():  # none was begun there
+            written = {FMU: fmu.read_bytes(), **({BINDING: binding.read_bytes()} if binding else {})}
+            check_free(folder, written | ({CASE: None} if code == NTS631 else {}))
         return
     if there != code:
         raise InputError(f"{folder}: it holds a certificate by {there}, which one by {code} would replace; give "

@@ -147,7 +147,6 @@ def run_one(options: argparse.Namespace, device: Device) -> int:
         check_code_options(options, [device])
     folder = options.out or usual_folder(device.name, key)
     console = make_console(stderr=options.json)
-    spare_another(folder, key)
     if options.into:
         check_target(device.file, options.into)
     found, files = certified(options, device, key, folder, console)
@@ -183,6 +182,7 @@ def certified(
     request = issue.request
     details = read_details(options.details) if options.details else Details()
     acceptance = read_checks(options.check, request.fmu, request.binding) if options.check else None
+    spare_another(folder, key, request.fmu, request.binding)
     made_folder(folder, "--out")
     progress = Progressing(folder)
     with saying_how_it_goes_on(progress.how_it_goes_on), held(folder):

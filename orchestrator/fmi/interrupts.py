@@ -19,7 +19,6 @@ from types import FrameType
 from typing import Any
 
 _OURS = frozenset({"orchestrator", "fmus", "gfor_fmu"})
-_HANDLERS = frozenset({"orchestrator.fmi.interrupts"})
 
 _WAITS = frozenset(
     {"asyncio", "concurrent", "multiprocessing", "queue", "selectors", "socket", "ssl", "subprocess", "threading"}

@@ -86,7 +86,23 @@ def test_a_certificate_by_another_code_is_not_replaced(converter, tmp_path, gfor
     code, _, said = gfor_command("certify", converter, "--code", "ercot", "--no-check", "--out", tmp_path)
     assert code == 2
     assert "it holds a certificate by miso, which one by ercot would replace" in " ".join(said.split())
-    spare_another(tmp_path, "miso")
+    spare_another(tmp_path, "miso", converter, None)
+
+
+@pytest.mark.parametrize(("name", "code"), [("converter.fmu", "ercot"), ("case.toml", "nts631")])
+def test_files_of_others_in_the_folder_are_not_replaced(converter, tmp_path, gfor_command, name, code):
+    out = tmp_path / "own"
+    out.mkdir()
+    (out / name).write_text("mine")
+    found, _, said = gfor_command("certify", converter, "--code", code, "--no-check", "--out", out)
+    assert found == 2
+    assert f"{out / name}: this file would be written over, and no command has written it" in " ".join(said.split())
+    with pytest.raises(gfor.CosimError, match="no command has written it"):
+        gfor.certify(converter, code, folder=out, check=False)
+    assert (out / name).read_text() == "mine"
+    other = {"converter.fmu": "nts631", "case.toml": "ercot"}[name]
+    (out / name).write_bytes(converter.read_bytes())
+    spare_another(out, other, converter, None)  # the same FMU; a case that this code writes none over
 
 
 def test_a_second_code_joins_and_the_same_code_replaces_its_own(certified, converter, tmp_path, gfor_command):

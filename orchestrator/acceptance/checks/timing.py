@@ -14,7 +14,6 @@ from orchestrator.acceptance.checks.switching import switches_elsewhere
 from orchestrator.arrays import Numbers
 from orchestrator.errors import ComponentError
 
-_SMALL = 1e-6  # relative difference below which step sizes do not matter
 _BEYOND = 32.0  # times as much that twice the step may differ: a method of fourth order is 16 times as far off
 _LARGE = 0.1
 _CLEARLY = 0.15  # part of a difference that a shift may leave, and be its cause
