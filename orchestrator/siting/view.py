@@ -11,6 +11,7 @@ from typing import Any
 from rich.table import Table
 
 from orchestrator.analysis.modes import damping_percent
+from orchestrator.errors import few
 from orchestrator.late import pd
 from orchestrator.points.code import code_hash
 from orchestrator.report.html.elements import Figures, damping, document, table
@@ -30,7 +31,7 @@ from orchestrator.siting.study import DEVICE, DROOP, SiteResult, SupportShift
 TITLES = {"pod_p": "POD-P", "pod_q": "POD-Q", DROOP: "a droop"}
 _NONE = 1e-5  # damping [points] by 1 MW/Hz below which no bus reaches a mode: 1000 give a hundredth of a point
 
-_SHOWN = 12
+_SHOWN, _NAMED = 12, 4
 
 
 class Siting:
@@ -130,7 +131,10 @@ def _called(seen: SeenMode) -> str:
 
 def sureness(result: SiteResult) -> list[str]:
     before = result.intact.modes[0].mode.damping_percent
-    return [_confirmed(result, one, before) for one in result.confirmations] or ["not confirmed by coupled FMUs"]
+    bad = [f"{at.name} ({_called(at.modes[0])})" for at in result.worst_first if at.found.stability.stable is False]
+    said = [f"UNSTABLE without the device: {few(bad, _NAMED)}"] if bad else []
+    found = [_confirmed(result, one, before) for one in result.confirmations]
+    return [*said, *(found or ["not confirmed by coupled FMUs"])]
 
 
 def _confirmed(result: SiteResult, one: Confirmation, before: float) -> str:

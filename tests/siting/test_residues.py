@@ -13,7 +13,7 @@ from orchestrator.cases.case import load_case
 from orchestrator.siting import placing, residues
 from orchestrator.siting.placing import ideal_support
 from orchestrator.siting.study import SiteRequest, find_sites
-from orchestrator.siting.view import answer, remarks
+from orchestrator.siting.view import answer, remarks, sureness
 from orchestrator.study.modes import running
 from tests.screening.five_machines import five_machines
 
@@ -109,6 +109,14 @@ def test_a_mode_outside_of_the_range_is_named():
     found = sites("two_area_rms", "pod_p", confirm=0, frequencies=(0.1, 0.4))
     assert [seen.mode.frequency_hz < 0.4 for seen in found.intact.modes] == [True]
     assert any(text.startswith("not judged: 0.581 Hz, 10.6") for text in remarks(found)), remarks(found)
+
+
+def test_what_is_unstable_without_the_device_is_named_first():
+    found = find_sites(load_case("kundur"), SiteRequest("pod_p", scenario="tgr", confirm=0, outages="line_5_6"))
+    assert sureness(found)[0].startswith(
+        "UNSTABLE without the device: line_5_6 (inter-area, 0.643 Hz, -3.61 %), intact ("
+    )
+    assert not any("UNSTABLE" in text for text in sureness(sites("two_area_rms", "pod_p", confirm=0)))
 
 
 def test_the_json_has_a_shift_for_each_bus_and_mode(gfor, tmp_path):
