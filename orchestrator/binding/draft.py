@@ -166,8 +166,7 @@ def _rated_voltage(fmu: FmuDescription, ports: Iterable[Guess | None]) -> str:
     """V_n from a parameter of that name. Without such a parameter the user must fill it in if the port is in volts or
     amperes."""
     known = [v for v in fmu.variables.values() if v.causality == "parameter" and v.type == "Real" and v.start]
-    named = next((v for v in known if v.unit in hints.VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None)
-    if named is not None:
+    if named := next((v for v in known if v.unit in hints.VOLTS and _RATED_VOLTAGE.search(_last(v.name))), None):
         return f'V_n = "{named.start_number:g} {named.unit}"  # GUESS: start value of {_comment(named.name)}'
     units = {hints.likely_unit(v) for guess in ports if guess is not None for v in guess.variables}
     if units & {*hints.VOLTS, *hints.AMPERES}:

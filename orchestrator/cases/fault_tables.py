@@ -85,8 +85,7 @@ def _trip(draft: Draft, table: schema.ComponentTripTable, where: str) -> list[Ev
     name, components = table.component, draft.system.components
     own = _BREAKER in components[name].description.variables
     port = f"{name}.{_BREAKER}"
-    grid = next((other for other, plan in components.items() if port in plan.description.variables), None)
-    if grid is not None:
+    if grid := next((other for other, plan in components.items() if port in plan.description.variables), None):
         return [coupled.UnitSwitching(table.time, grid, name, connected=False, has_breaker=own)]
     if own:
         return [coupled.ParameterChange(table.time, name, _BREAKER, False)]

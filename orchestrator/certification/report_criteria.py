@@ -259,8 +259,7 @@ def _where(bad: list[PointVerdict]) -> str:
 
 
 def _least_and_growth(c: Certificate) -> Iterator[str]:
-    least = min((m for v in c.verdicts for m in v.modes), key=lambda m: m.damping_percent, default=None)
-    if least is not None:
+    if least := min((m for v in c.verdicts for m in v.modes), key=lambda m: m.damping_percent, default=None):
         yield f"Least damping of all judged modes: {damping(least.damping_percent)} % at {least.frequency_hz:.3f} Hz"
     growing = [c.results[WITH, v.X_L] for v in c.verdicts]
     if growing and all(p.modes is not None for p in growing):

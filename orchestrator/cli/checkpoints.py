@@ -59,8 +59,7 @@ class StudyCheckpoints:
 
     def of(self, name: str, recording: RecordingFolder, place: ScenarioFolder) -> Checkpoints | None:
         """Those of a scenario, which has what it recorded until then; None where none are wanted."""
-        found = self._of.get(name)
-        if found is not None:
+        if found := self._of.get(name):
             found.take_back(recording, [place.path / TRAJECTORY, place.place / TRAJECTORY], self.run)
         return found
 

@@ -177,8 +177,7 @@ class Federation(Closing):
 
     def _look_for_the_dead(self, name: str) -> None:
         """Raise if a federate has died: that is the reason of what the hub tells, and may come to light after it."""
-        process = self._processes.get(name)
-        if process is not None:
+        if process := self._processes.get(name):
             with suppress(subprocess.TimeoutExpired):
                 process.wait(_LOOK)
                 self._look(time.monotonic() + _LOOK)

@@ -80,8 +80,7 @@ def find_oscillations(signals: Signals) -> list[SpectralLine]:
         shown = {signal: size for signal, size in lines[k].items() if signal >= 0}
         frequency = refined(signals, [*shown] or [*range(count)], float(grid[k]))
         kept.append(frequency)
-        base = next((o for o in found if _multiple(frequency, o.frequency, length)), None)
-        if base is not None:
+        if base := next((o for o in found if _multiple(frequency, o.frequency, length)), None):
             order = round(frequency / base.frequency)
             base.harmonics[order] = _relative(signals, base, order)
         else:

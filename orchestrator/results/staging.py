@@ -207,9 +207,7 @@ def _readable(folder: Path) -> Manifest | None:
         found = read_manifest(folder)
     except InputError:
         return None
-    if found is None:
-        return None
-    return Manifest(folder, {n: f for n, f in found.files.items() if (folder / n).is_file()}, found.scenarios)
+    return found and Manifest(folder, {n: f for n, f in found.files.items() if (folder / n).is_file()}, found.scenarios)
 
 
 def _files(folder: Path) -> list[str]:

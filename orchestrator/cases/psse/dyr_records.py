@@ -61,8 +61,7 @@ def _record(file: str, line: int, tokens: Sequence[str]) -> DynamicRecord:
 
 
 def given_values(record: DynamicRecord, fields: Sequence[DyrField], known: Collection[str]) -> dict[str, float]:
-    following = next((text for text in record.values[2:] if text.upper() in known), None)
-    if following is not None:
+    if following := next((text for text in record.values[2:] if text.upper() in known), None):
         raise InputError(
             f"{record.place}: the record {record.name} has no slash at its end, and runs into the next, {following}"
         )
