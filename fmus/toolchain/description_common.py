@@ -106,8 +106,7 @@ def _write_units(root: Element, model: Model) -> None:
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(used):
         element = SubElement(definitions, "Unit", name=unit)
-        exponents = {key: f"{value:g}" for key, value in UNITS[unit].items()}
-        if exponents:
+        if exponents := {key: f"{value:g}" for key, value in UNITS[unit].items()}:
             SubElement(element, "BaseUnit", exponents)
 
 

@@ -33,8 +33,7 @@ def dll_description(
         canGetAndSetFMUstate="true" if trial.state in ("arrays", "library") else "false",
         canSerializeFMUstate="true" if trial.state == "arrays" else "false",
     )  # fmt: skip
-    units = sorted({v.unit for v in variables if v.unit and v.kind == "Real"})
-    if units:
+    if units := sorted({v.unit for v in variables if v.unit and v.kind == "Real"}):
         definitions = SubElement(root, "UnitDefinitions")
         for unit in units:
             element = SubElement(definitions, "Unit", name=unit)
@@ -57,8 +56,7 @@ def dll_description(
     for reference, variable in enumerate(variables):
         _write(listed, reference, variable)
     structure_element = SubElement(root, "ModelStructure")
-    known = _dependencies(variables, circuit)
-    if known:
+    if known := _dependencies(variables, circuit):
         parent = SubElement(structure_element, "Outputs")
         for index, follows in known.items():
             SubElement(parent, "Unknown", index=str(index), dependencies=" ".join(map(str, follows)))

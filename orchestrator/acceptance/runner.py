@@ -127,8 +127,7 @@ def check_fmu(
     before.
     Raises an `InputError` if there is no such file or no such check, or the binding is not TOML, not of its form or not
     filled in."""
-    unknown = [name for name in only if name not in CHECKS and name not in FILE_CHECKS]
-    if unknown:
+    if unknown := [name for name in only if name not in CHECKS and name not in FILE_CHECKS]:
         known = ", ".join([*FILE_CHECKS, *CHECKS])
         raise InputError(f"there is no check {', '.join(map(repr, unknown))}; there are: {known}")
     if "binding" in only and binding is None:

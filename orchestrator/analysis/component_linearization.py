@@ -158,8 +158,7 @@ def _from_inside(
     component = exchange.component
     check_operating_point(component, model)
     entries, exits = (*exchange.inputs.names, *inputs), (*exchange.outputs.names, *observed)
-    missing = [v for v in entries if v not in model.inputs] + [v for v in exits if v not in model.outputs]
-    if missing:
+    if missing := [v for v in entries if v not in model.inputs] + [v for v in exits if v not in model.outputs]:
         raise AnalysisError(
             f"component {component.name!r}: the linear model inside its FMU has no {', '.join(map(repr, missing))}; it "
             f"has the inputs {', '.join(model.inputs)} and the outputs {', '.join(model.outputs)}"

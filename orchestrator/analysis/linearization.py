@@ -94,8 +94,7 @@ def _line_names(blocks: Blocks, lines: Mapping[int, tuple[DelayLine, slice]]) ->
 def continuous(blocks: Blocks) -> LinearModel:
     """The same components, connected without any communication step: ẋ = A·x."""
     blocks.check_made_for(None)
-    silent = [name for name, c in blocks.components.items() if c.A_c is None]
-    if silent:
+    if silent := [name for name, c in blocks.components.items() if c.A_c is None]:
         raise AnalysisError(
             f"components {', '.join(silent)} do not give their derivatives, so no continuous model can be made"
         )

@@ -27,8 +27,7 @@ def check_operating_point(component: Component, model: EmbeddedModel) -> None:
         raise AnalysisError(f"{where} has other states than the FMU; build the FMU again with its model")
     variables = component.description.variables
     expected = {**model.states, **model.inputs, **model.outputs, **_parameters(component, model)}
-    unknown = [name for name in expected if name not in variables]
-    if unknown:
+    if unknown := [name for name in expected if name not in variables]:
         raise AnalysisError(f"{where} speaks of {unknown[0]!r}, which the FMU does not have; build both together")
     found = component.values(expected)
     far = {name: abs(found[name] - value) / max(1.0, abs(value)) for name, value in expected.items()}

@@ -258,8 +258,7 @@ class _Reader:
         """Each variable may be bound once, and the start values must give finite numbers."""
         used = [*port.voltage.variables, *port.current.variables, *port.settings]
         used += [m.variable for maps in port.start.values() for m in maps]
-        twice = sorted({name for name in used if used.count(name) > 1})
-        if twice:
+        if twice := sorted({name for name in used if used.count(name) > 1}):
             self._problems.append(Problem("", f"{', '.join(twice)}: bound more than once; a variable has one meaning"))
         if not all(math.isfinite(x) for x in (*port.voltage.matrix, *port.current.matrix)):
             self._problems.append(Problem("rating", "rating and bases give no finite factors; check their units"))

@@ -226,8 +226,7 @@ def _unit(info: VariableInfo, such_as: str) -> list[str]:
 def _value(variables: Sequence[VariableInfo], unit: str) -> list[str]:
     """Which value of an alternating quantity in V or A is meant."""
     text = " ".join(v.description for v in variables)
-    kind = hints.kind_of_voltage(text) if unit in hints.VOLTS else hints.kind_of_current(text)
-    if kind:
+    if kind := hints.kind_of_voltage(text) if unit in hints.VOLTS else hints.kind_of_current(text):
         return [f'value = "{kind}"  # GUESS: from the description']
     kinds = "line-to-line rms, phase rms or phase peak" if unit in hints.VOLTS else "rms or peak"
     return [f'value = "{REQUIRED}: {kinds}"']

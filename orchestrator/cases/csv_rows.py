@@ -38,8 +38,7 @@ def rows_of(path: Path, columns: Sequence[str]) -> list[Row]:
             reader = csv.DictReader(file, restval="")
             names = reader.fieldnames or ()
             _check_names(path, names)
-            missing = [c for c in columns if c not in names]
-            if missing:
+            if missing := [c for c in columns if c not in names]:
                 raise InputError(f"{path}: column {', '.join(missing)} is missing; it should hold {', '.join(columns)}")
             rows = [row | {PLACE: f"{path}, line {n}"} for n, row in enumerate(islice(reader, MOST_ROWS + 1), start=2)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -91,8 +91,7 @@ def check_connected(buses: Sequence[str], lines: Sequence[FlowLine], slack_bus: 
         found = neighbours[waiting.pop()] - reached
         waiting += found
         reached |= found
-    islands = [bus for bus in buses if bus not in reached]
-    if islands:
+    if islands := [bus for bus in buses if bus not in reached]:
         opened = [line.name for line in lines if not line.closed and {line.from_bus, line.to_bus} & set(islands)]
         remedy = f"close {', '.join(opened[:5])}, " if opened else ""
         raise InputError(

@@ -35,8 +35,7 @@ def plain(values: Mapping[str, Any] | None, argument: str = "values") -> dict[st
 
     if not isinstance(values, Mapping):
         raise InputError(f"{argument} = {values!r}; give values by name, such as {{'grid.X_L': 0.3}}")
-    wrong = [key for key in _keys(values) if not isinstance(key, str)]
-    if wrong:
+    if wrong := [key for key in _keys(values) if not isinstance(key, str)]:
         raise InputError(f"{argument}: {wrong[0]!r} is not a name; give values by name, such as {{'grid.X_L': 0.3}}")
     flat = flatten(values)
     if twice := given_twice(flat):

@@ -35,8 +35,7 @@ def read_matpower(path: Path) -> SourceTables:
         tables = _m_file(path) if path.suffix == ".m" else _mat_file(path)
     except Exception as error:  # both libraries let all kinds of errors through
         raise InputError(f"{path}: it cannot be read as a MATPOWER case: {error or type(error).__name__}") from error
-    missing = [name for name in ("baseMVA", *_COLUMNS) if tables.get(name) is None]
-    if missing:
+    if missing := [name for name in ("baseMVA", *_COLUMNS) if tables.get(name) is None]:
         raise InputError(f"{path}: it is not a MATPOWER case, because mpc.{', mpc.'.join(missing)} is missing")
     for name, columns in _COLUMNS.items():
         if (

@@ -36,8 +36,7 @@ def network_doubts(draft: Draft) -> Iterator[UnusualValue]:
 def _equivalents(draft: Draft, name: str, network: Network) -> Iterator[UnusualValue]:
     """Name the branches of a network of phasors that only a reduction can have made."""
     for quantity, what in (("R", "resistance"), ("X", "reactance")):
-        found = [line for line in network.lines if getattr(line, quantity) < 0]
-        if found:
+        if found := [line for line in network.lines if getattr(line, quantity) < 0]:
             shown = few((f"{line.name!r} ({getattr(line, quantity):g} pu)" for line in found), _SHOWN)
             text = (
                 f"{len(found)} of {len(network.lines)} branches have a negative {what}: {shown}; as equivalents "

@@ -132,8 +132,7 @@ def _limits(limits: Mapping[str, tuple[float, float]], units: Sequence[FlowUnit]
     found = {}
     for bus, both in limits.items():
         whole = sum(u.S_n for u in units if u.bus == bus)
-        feeding = sum(u.S_n for u in units if u.bus == bus and u.connected)
-        if feeding:
+        if feeding := sum(u.S_n for u in units if u.bus == bus and u.connected):
             least, most = (q * feeding / whole / SYSTEM_BASE_MVA for q in both)
             found[bus] = (least, most)
     return found

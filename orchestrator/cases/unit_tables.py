@@ -99,8 +99,7 @@ def unit_rows(table: UnitsTable, directory: Path, generation: Mapping[str, Gener
         name = _name_in(entry)
         given = None if name else generation.get(bus)  # the source's figures are those of all units of the bus
         figures = {column: _figure(entry, column, given) for column in ("rating_mva", "p_mw", "v_pu")}
-        missing = [column for column, value in figures.items() if value is None]
-        if missing:
+        if missing := [column for column, value in figures.items() if value is None]:
             raise InputError(
                 f"{place_of(entry)}: the unit at bus {entry['bus']} has no {', '.join(missing)}; add the column, or "
                 "take the network from a source with a generator at this bus"

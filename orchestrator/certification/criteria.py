@@ -193,8 +193,7 @@ def modal_test(times: NDArray[np.float64], signal: NDArray[np.float64], start: f
     oscillating = [m for m in found if m.eigenvalue.imag > 0]
     largest = max((m.amplitude for m in oscillating), default=0.0)
     judged = tuple(m for m in oscillating if is_judged(m.frequency_hz) and m.amplitude >= LEAST_AMPLITUDE * largest)
-    bad = [m for m in judged if not m.damping_percent > 100 * LEAST_DAMPING]
-    if bad:
+    if bad := [m for m in judged if not m.damping_percent > 100 * LEAST_DAMPING]:
         worst = min(bad, key=lambda m: m.damping_percent)
         return ModalTest(judged, False, f"{worst.frequency_hz:.3f} Hz has {worst.damping_percent:.2f} % ≤ 5 %")
     if not judged:

@@ -78,8 +78,7 @@ def _effect(point: PointResult, event: float, why: str) -> PodEffect:
         return PodEffect(point.off, modes)
     t, y = point.times[window], slow_part(point.times, signal.astype(np.float32).astype(float))[window]  # as it is kept
     with suppress(AnalysisError):  # it does not swing
-        found = [m.eigenvalue for m in identify_modes(t, y) if m.eigenvalue.imag > 0] if modes else []
-        if found:
+        if found := [m.eigenvalue for m in identify_modes(t, y) if m.eigenvalue.imag > 0] if modes else []:
             modes["response"] = complex(min(found, key=lambda x: abs(x - modes["on"])))
     with_it, without = (_misfit(t[::_EVERY] - t[0], y[::_EVERY], x) for x in (point.modes.eigenvalues, point.off))
     return PodEffect(point.off, modes, with_it / without if without > 0 else None)

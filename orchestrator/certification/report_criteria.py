@@ -63,8 +63,7 @@ def signal_name(signal: str) -> str:
 
 def converter_model(points: Iterable[PointResult]) -> str:
     known = [p for p in points if p.modes is not None]
-    boxes = [p for p in known if p.identified is not None]
-    if boxes:
+    if boxes := [p for p in known if p.identified is not None]:
         orders = ", ".join(dict.fromkeys(str(p.identified) for p in boxes))
         error = max(p.fit_errors.get(CONVERTER, 0.0) for p in boxes)
         return (f"Black box: a model identified at its port, of order {orders}; largest relative fitting error "
@@ -244,8 +243,7 @@ def _time_cells(time: TimeVerdict | None) -> list[str]:
 
 
 def _remark(c: Certificate) -> Iterator[str]:
-    lowered = [(m, v.X_L) for v in c.verdicts for m in v.lowered]
-    if lowered:
+    if lowered := [(m, v.X_L) for v in c.verdicts for m in v.lowered]:
         worst, X_L = min(lowered, key=lambda entry: entry[0].damping_percent)
         places = ", ".join(f"{X:g}" for X in dict.fromkeys(X for _, X in lowered))
         change = f"from {number(worst.before_percent or 0.0, 2)} to {damping(worst.damping_percent)} %"

@@ -90,8 +90,7 @@ def _ask(options: argparse.Namespace) -> None:
     if not options.files:
         raise InputError(f"no network is given; all in one line it is\n  {_EXAMPLE}")
     sources_of(options.files)  # what is wrong is said before the next question
-    bus = line("Bus of a converter, such as 9 [no converter]")
-    if bus:
+    if bus := line("Bus of a converter, such as 9 [no converter]"):
         parts = [f"bus {bus.removeprefix('bus ')}", _with_unit(line("Its rating in MVA, such as 300"), "MVA"),
                  _with_unit(line("Its power in MW, such as 200"), "MW")]  # fmt: skip
         less = line("Machine that feeds so much less, such as sg3 [the slack]")

@@ -183,8 +183,7 @@ def _outcomes(
 
 
 def _say_unfinished(folder: Path) -> None:
-    begun = [path.name for path in unfinished(folder)]
-    if begun:
+    if begun := [path.name for path in unfinished(folder)]:
         text = (
             f"{folder} holds recordings of runs that did not end, or still go on: {', '.join(begun)}; "
             "`gfor signal identify` and `compare` read them, and you may delete those that you do not need"

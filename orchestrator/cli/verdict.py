@@ -40,8 +40,7 @@ def stability_lines(verdicts: Mapping[str, Stability], outside: Mapping[str, str
 def _headline(verdicts: Mapping[str, Stability]) -> str:
     """One line on all of them; what is worst comes first."""
     for wanted, text in ((False, "UNSTABLE"), (None, "stability not known")):
-        found = [title for title, verdict in verdicts.items() if verdict.stable is wanted]
-        if found:
+        if found := [title for title, verdict in verdicts.items() if verdict.stable is wanted]:
             return f"[bold {COLOURS[wanted]}]{text}[/]: {escape(', '.join(found))} ({len(found)} of {len(verdicts)})"
     return f"[bold green]stable[/]: all {len(verdicts)}"
 

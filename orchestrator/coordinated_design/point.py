@@ -160,8 +160,7 @@ def _at(
     case: Case, bench: PointBench, master: Master, places: Sequence[PodPlace], warnings: tuple[str, ...]
 ) -> PointModes:
     find_operating_point(master, accept=ACCEPT)
-    silent = [name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)]
-    if silent:
+    if silent := [name for name, exchange in master.exchanges.items() if not gives_slopes(exchange)]:
         raise AnalysisError(
             f"components {', '.join(silent[:3])} do not give their derivatives; a design over operating points needs "
             "them of all FMUs"

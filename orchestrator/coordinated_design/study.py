@@ -120,8 +120,7 @@ def plan_points_design(case: Case, request: PointsDesignRequest) -> PointsDesign
             check_range(plans, group.components, f"{group.controller}.K", bound, "--gain-bounds")
     for place in candidates:
         check_tunable(place.component, plans[place.component].description, place.controller)
-    clash = {key for item in read.items for key in item.values} & {*off, *(f"{p.name}.K" for p in candidates)}
-    if clash:
+    if clash := {key for item in read.items for key in item.values} & {*off, *(f"{p.name}.K" for p in candidates)}:
         raise InputError(f"{request.points}: the column for {min(clash)} sets what is to be designed; leave it out")
     naming = partial(naming_of, case) if request.modes else None
     aim = Aim(tuple(request.modes), request.least_damping, naming)

@@ -43,8 +43,7 @@ class AdaptiveLoop:
             raise ValueError(f"schedule {schedule.name!r} has no tolerance")
         self._inner, self._y, self._tracks, self._tolerance = inner, y, tracks, schedule.tolerance
         self._turns = [exchange for group in groups for exchange in group]
-        stuck = [t.component.name for t in self._turns if not t.component.description.can_save_state]
-        if stuck:
+        if stuck := [t.component.name for t in self._turns if not t.component.description.can_save_state]:
             raise InputError(
                 f"tolerance = {self._tolerance:g}: steps that are too long are taken back, and component "
                 f"{', '.join(map(repr, stuck))} declares no canGetAndSetFMUstate; leave the tolerance out, and find a "

@@ -49,8 +49,7 @@ class CoupledComponents(Closing):
         self, system: System, schedule: Schedule, step_size: float, stop_time: float | None,
         opener: Callable[[str, ComponentPlan, Path], Component],
     ) -> None:  # fmt: skip
-        open_inputs = [str(endpoint) for endpoint in system.unconnected_inputs()]
-        if open_inputs:
+        if open_inputs := [str(endpoint) for endpoint in system.unconnected_inputs()]:
             raise InputError(
                 f"inputs that nothing feeds: {', '.join(open_inputs)}; connect them or give them a constant value"
             )

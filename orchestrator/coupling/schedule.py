@@ -114,8 +114,7 @@ class Schedule:
                 f"schedule {self.name!r}: {self.coupling} needs consistent first inputs, and no extrapolation, "
                 "wire_by_wire or ticks beside it"
             )
-        faults = [f"{what}: {', '.join(sorted(names))}" for what, names in wrong.items() if names]
-        if faults:
+        if faults := [f"{what}: {', '.join(sorted(names))}" for what, names in wrong.items() if names]:
             raise InputError(f"schedule {self.name!r}: {'; '.join(faults)}; list every component exactly once")
 
 

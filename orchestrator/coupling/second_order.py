@@ -178,8 +178,7 @@ class NewtonLoop(_LineLoop):
 
     def __init__(self, groups: Sequence[Sequence[Exchange]], y: Values, tracks: Tracks, schedule: Schedule) -> None:
         super().__init__(groups, y, tracks, schedule)
-        stuck = [t.component.name for t in self._turns if not t.component.description.can_save_state]
-        if stuck:
+        if stuck := [t.component.name for t in self._turns if not t.component.description.can_save_state]:
             raise InputError(
                 f"schedule 'newton' takes steps back and repeats them: component {', '.join(map(repr, stuck))} "
                 "declares no canGetAndSetFMUstate; take midpoint"

@@ -98,8 +98,7 @@ class FederatedComponent(Derived):
             self._known = dict(zip(self._published, self._exchanges.outputs(self.name), strict=True))
         known = self._known
         if self.inner is None:
-            missing = [r for r in references if r not in known and r not in self._inputs]
-            if missing:
+            if missing := [r for r in references if r not in known and r not in self._inputs]:
                 raise ComponentError(self.name, "reading", "nothing", f"reference {missing[0]} is not published")
             return [known[r] if r in known else self._inputs[r] for r in references]
         if not self._changed and all(r in known for r in references):
@@ -210,12 +209,10 @@ class FederatedComponent(Derived):
             self._exchanges.command(self.name, "set", dict(values))
             self._known = {}
             self._changed.update(self._inputs)
-        else:
-            other = [name for name, value in values.items() if self._part.start.get(name) != float(value)]
-            if other:
-                raise InputError(
-                    f"component {self.name!r} is a foreign federate, which takes no {other[0]!r} while it runs"
-                )
+        elif other := [name for name, value in values.items() if self._part.start.get(name) != float(value)]:
+            raise InputError(
+                f"component {self.name!r} is a foreign federate, which takes no {other[0]!r} while it runs"
+            )
 
     def read(self, batch: RealBatch) -> None:
         if self.inner is not None and not self._remote:

@@ -89,8 +89,7 @@ class Federation(Closing):
         else:
             broker = choice.broker
             require_broker(broker)
-        waited = [part.name for part in self.layout.parts if part.external]
-        if waited:
+        if waited := [part.name for part in self.layout.parts if part.external]:
             where = f"port {choice.port} of this machine" if choice.port is not None else f"the broker {broker}"
             self._announce(f"waiting {choice.to_join:g} s for the federates {', '.join(waited)} at {where}")
         with Door() as door:

@@ -191,8 +191,7 @@ class Hub:
             text := helics.helicsInputGetString(self._faults[name])
         ):
             raise _FederationError("a fault", text, name)
-        silent = [v for v, handle in self._outputs[name].items() if not helics.helicsInputIsUpdated(handle)]
-        if silent:
+        if silent := [v for v, handle in self._outputs[name].items() if not helics.helicsInputIsUpdated(handle)]:
             there = name in set(helics_calls.ask(self._federate, "root", "federates") or ()) and helics_calls.ask(
                 self._federate, name, "state"
             ) not in ("disconnected", "error", "finished", "finalize")

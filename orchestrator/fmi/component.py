@@ -120,8 +120,7 @@ class RealBatch:
     def __init__(self, component: Component, names: Sequence[str], values: NDArray[np.float64] | None = None) -> None:
         variables = component.description.variables
         self.names = tuple(names)
-        unknown = [name for name in self.names if name not in variables]
-        if unknown:
+        if unknown := [name for name in self.names if name not in variables]:
             raise InputError(
                 f"component {component.name!r} has no variable {', '.join(map(repr, unknown))}; `gfor fmu info` lists "
                 "them"

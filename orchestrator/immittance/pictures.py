@@ -23,8 +23,7 @@ def draw(result: CutResult, folder: Path, retuned: Sequence[Retuned] = (), goal:
     with mpl.rc_context(STYLE):
         save_figure(_eigenloci(result.judgement, f"{result.verdict}: {named(result.loop.device.name)}"), loci)
         save_figure(_matrices(result), matrices)
-        shown = [one for one in retuned if one.figures][:_PANELS]
-        if shown:
+        if shown := [one for one in retuned if one.figures][:_PANELS]:
             save_figure(_retuned(shown, goal, result.scr), folder / "retune.png")
     return [loci, matrices, *([folder / "retune.png"] if shown else [])]
 

@@ -91,8 +91,7 @@ def _points(path: Path, ports: tuple[str, ...]) -> dict[str, PortPoint]:
             found[cells[0].strip()].update(figures)
     points = {}
     for port in ports:
-        figures = found.get(port, found.get(re.sub(r"-[12]$", "", port), {}))
-        if figures:
+        if figures := found.get(port, found.get(re.sub(r"-[12]$", "", port), {})):
             points[port] = PortPoint(*(figures.get(column) for column in _COLUMNS))
     return points
 

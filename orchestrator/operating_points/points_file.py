@@ -156,8 +156,7 @@ def _point(
     name = _name_of(row, label)
     settings: dict[str, Setting] = {}
     for column, reading in readings.items():
-        text = (row[column] or "").strip()
-        if text:
+        if text := (row[column] or "").strip():
             try:
                 settings[column] = reading(text)
             except ValueError as error:

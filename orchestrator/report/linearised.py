@@ -16,8 +16,7 @@ def exceptions_in_words(sources: Mapping[str, str], fit_errors: Mapping[str, flo
     """One sentence about the components that were not perturbed; None where all were."""
     parts = []
     for source, how in _HOW.items():
-        names = [name for name, found in sources.items() if found == source]
-        if names:
+        if names := [name for name, found in sources.items() if found == source]:
             parts.append(f"{_named(names, fit_errors or {})} {how}")
     if not parts:
         return None

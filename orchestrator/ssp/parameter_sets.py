@@ -51,8 +51,7 @@ def write_units(parent: Element, name: str, used: Iterable[str], known: Mapping[
     ``parent``: takes the group of units as its last element.
     ``name``: name of the group of units, with its namespace.
     ``known``: attributes of ``BaseUnit`` by unit; a unit that is missing here gets no attributes."""
-    units = [(unit, known.get(unit, {})) for unit in used]
-    if units:
+    if units := [(unit, known.get(unit, {})) for unit in used]:
         group = SubElement(parent, name)
         for unit, base in units:
             SubElement(SubElement(group, tag("ssc:Unit"), name=unit), tag("ssc:BaseUnit"), dict(base))
@@ -94,8 +93,7 @@ def read_parameter_mapping(root: Element) -> dict[str, str]:
     mapping = {}
     for entry in children(root, "ssm:MappingEntry"):
         source, target = entry.get("source", ""), entry.get("target", "")
-        change = next((e.tag.rpartition("}")[2] for e in entry if e.tag.endswith("Transformation")), None)
-        if change:
+        if change := next((e.tag.rpartition("}")[2] for e in entry if e.tag.endswith("Transformation")), None):
             raise InputError(
                 f"the mapping of {source!r} to {target!r} has a {change}, which is not supported; give the value as "
                 "the component takes it"

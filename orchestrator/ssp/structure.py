@@ -170,8 +170,7 @@ class _Reader:
             raise InputError(f"only the type {expected}, with sources relative to the archive, is supported")
 
     def _content(self, element: Element, inline: str, name: str) -> Element:
-        source = element.get("source")
-        if source:
+        if source := element.get("source"):
             return self._archive.xml(self._archive.member(source))
         found = next((e for holder in children(element, inline) for e in children(holder, name)), None)
         if found is None:

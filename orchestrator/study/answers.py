@@ -121,8 +121,7 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
         return by_modes
     if not result.modes.prepared.events:
         return replace(by_modes, remark="; ".join(filter(None, ("no event disturbs it", by_modes.remark))))
-    forced = [e for e in result.modes.prepared.events if isinstance(e, Forcing) and (e.end or end) >= end]
-    if forced:
+    if forced := [e for e in result.modes.prepared.events if isinstance(e, Forcing) and (e.end or end) >= end]:
         names = ", ".join(dict.fromkeys(f"{e.component}.{e.variable}" for e in forced))
         remark = f"keeps synchronism until {end:g} s; {names}: forced until then, so settling is not judged"
         return ScenarioAnswer(title, None, "not known", mode, short(remark, _LONGEST))

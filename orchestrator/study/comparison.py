@@ -78,8 +78,7 @@ def open_trajectory(path: Path) -> xr.Dataset:
 
 
 def _hint(path: Path) -> str:
-    inside = sorted(p.parent.name for p in path.glob("*/trajectory.nc")) if path.is_dir() else []
-    if inside:
+    if inside := sorted(p.parent.name for p in path.glob("*/trajectory.nc")) if path.is_dir() else []:
         return f"choose a scenario in it: {', '.join(inside)}"
     if begun := [folder.name for folder in unfinished(path.parent) if folder.name.startswith(f"{path.name}{PARTIAL}")]:
         return f"its run did not end, or still goes on; what it recorded is in {', '.join(begun)} beside it"

@@ -39,8 +39,7 @@ def emulate(
     other masters do not support events.
     ``order``: order in which the components step, for a master that steps them one after the other; by default the
     order of the system."""
-    disturbed = [plan.name for plan in system.wires.values()] + [str(fault) for fault in faults_among(events)]
-    if disturbed:
+    if disturbed := [plan.name for plan in system.wires.values()] + [str(fault) for fault in faults_among(events)]:
         raise InputError(
             f"{rules.title} knows no imperfections of connections and no faults, but the case has some "
             f"({'; '.join(disturbed[:3])}); leave them out to see what it would record"

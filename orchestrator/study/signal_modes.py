@@ -70,8 +70,7 @@ class SignalModes:
             f"The samples used, every {self.interval:g} s, show nothing above {highest:.4g} Hz: "
             "a faster oscillation appears as a slower one."
         ]
-        near = [f"{m.frequency_hz:.4g} Hz" for m in self.modes if m.frequency_hz > highest / 2]
-        if near:
+        if near := [f"{m.frequency_hz:.4g} Hz" for m in self.modes if m.frequency_hz > highest / 2]:
             texts.append(
                 f"Above a quarter of the sampling frequency of {1 / self.interval:.4g} Hz, and perhaps no frequency "
                 f"of the system: {', '.join(near)}. To be sure, {self.used.remedy}."

@@ -189,10 +189,8 @@ def _trial(
     growth: float,
 ) -> TriedStep:  # fmt: skip
     schedule = prepared.rescheduled(name).schedule
-    if name == "newton":
-        stuck = [n for n, c in master.components.items() if not c.description.can_save_state]
-        if stuck:
-            raise AnalysisError(f"component {', '.join(stuck)} declares no canGetAndSetFMUstate")
+    if name == "newton" and (stuck := [n for n, c in master.components.items() if not c.description.can_save_state]):
+        raise AnalysisError(f"component {', '.join(stuck)} declares no canGetAndSetFMUstate")
     blocks = Blocks(master, step, schedule=schedule)
     model = compose(blocks, schedule)
     if name in SECOND_ORDER and master.system.wires:

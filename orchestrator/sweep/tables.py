@@ -101,8 +101,7 @@ def _turns(samples: Samples, sweep: ScenarioSweep) -> str:
 def remarks(samples: Samples) -> list[str]:
     result, texts = samples.result, [f"question: {question}" for question in samples.result.plan.idle]
     texts += [text for limit in result.limits for text in limit.remarks]
-    failures = list(result.failures())
-    if failures:
+    if failures := list(result.failures()):
         texts.append(f"{counted(len(failures), 'point')} of {result.plan.number_of_points} failed:")
         texts += [
             f"  {sweep.prepared.name}, {place_text(samples, place)}: {error}"

@@ -86,8 +86,7 @@ def delay(subject: Subject) -> CheckResult:
         if late and late == _shift(fine, fourfold, 4):
             says = f"the response{words} comes {late} communication step{'s' * (late > 1)} late, with any step size"
             return failed("delay", "delayed output", says, steps=late)
-    stale = _stale(subject, declared=True)
-    if stale:
+    if stale := _stale(subject, declared=True):
         return failed("delay", "delayed output", stale, steps=1)
     if stale := _stale(subject, declared=False):
         return remarked("delay", stale, "its partners see it one step late; ask for outputs that follow at once")

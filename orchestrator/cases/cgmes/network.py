@@ -42,8 +42,7 @@ class CgmesNetwork:
 
 
 def read_cgmes(path: Path, leaving_out: Sequence[str] = ()) -> CgmesNetwork:
-    unknown = [kind for kind in leaving_out if kind not in LEFT_OUT]
-    if unknown:
+    if unknown := [kind for kind in leaving_out if kind not in LEFT_OUT]:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown for CGMES; choose from {', '.join(LEFT_OUT)}")
     files = sorted(path.iterdir()) if path.is_dir() else [path] if path.exists() else []
     return _read(path, tuple((str(f.resolve()), f.stat().st_mtime_ns) for f in files), tuple(leaving_out))

@@ -200,8 +200,7 @@ class _Reading:
             self._branch(start, end, z, state, (charging + complex(gi, bi), charging + complex(gj, bj)))
         for record in self._raw.of("system switching device"):
             start, end = self._bus(record), self._bus(record, 1)
-            closed = record.whole(16, "STAT", 1)
-            if closed:
+            if closed := record.whole(16, "STAT", 1):
                 self._changes.note(record.line, "switching device: a branch of its reactance")
             self._branch(start, end, complex(0.0, record.number(3, "X", 1e-4)), closed)
         if self._raw.base_mva != _SBASE:

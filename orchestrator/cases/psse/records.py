@@ -213,8 +213,7 @@ _KNOWN = {"bus", "load", "fixed shunt", "generator", "branch", "system switching
 
 def leave_out(raw: RawFile, allowed: Sequence[str], changes: Changes) -> None:
     """Note the elements that our network does not have."""
-    unknown = [kind for kind in allowed if kind not in LEFT_OUT]
-    if unknown:
+    if unknown := [kind for kind in allowed if kind not in LEFT_OUT]:
         raise InputError(f"leave_out: {unknown[0]!r} is unknown; choose from {', '.join(LEFT_OUT)}")
     refused = []
     for section, records in raw.sections.items():

@@ -94,8 +94,7 @@ def _answers(results: Results) -> str:
 def _least_damped(results: Results) -> list[tuple[str, dict[str, str]]]:
     found = []
     for name, title in titles(results).items():
-        rows = [r for r in results.modes if r["scenario"] == name]
-        if rows:
+        if rows := [r for r in results.modes if r["scenario"] == name]:
             found.append((title, min(rows, key=lambda r: float(r["damping [%]"]))))
     return found
 
@@ -351,15 +350,13 @@ def step_sizes(results: Results) -> str:
 
 def provenance(results: Results) -> str:
     parts = []
-    attributes = next((d.attrs for d in results.trajectories.values()), {})
-    if attributes:
+    if attributes := next((d.attrs for d in results.trajectories.values()), {}):
         versions = json.loads(attributes["versions"])
         parts.append(f"<p>{escape(', '.join(f'{name} {v}' for name, v in versions.items()))}</p>")
     fmus: dict[str, tuple[str, str, str]] = {}
     for dataset in results.trajectories.values():
         fmus |= {n: (f["model"], f["guid"], f["tool"]) for n, f in json.loads(dataset.attrs["fmus"]).items()}
-    rows = [[escape(name), *map(escape, content)] for name, content in fmus.items()]
-    if rows:
+    if rows := [[escape(name), *map(escape, content)] for name, content in fmus.items()]:
         listed = table("FMUs", ["Component", "Model", "Guid", "Made by"], rows, left=4)
         parts.append(f"<details><summary>{len(rows)} FMUs with their guids</summary>{listed}</details>")
     text = f"<pre>{escape(results.case.text)}</pre>"

@@ -198,8 +198,7 @@ def _joint(path: Path) -> tuple[str, bytes, tuple[str, str]]:
             following = _SECTION.search(content, begin)
             position = following.start() if following else len(content)
         sections[kind] = content[begin:position]
-    missing = [kind for kind in ("CFG", "DAT") if kind not in sections]
-    if missing:
+    if missing := [kind for kind in ("CFG", "DAT") if kind not in sections]:
         raise InputError(f"{path}: it has no part '--- file type: {missing[0]} ---', so it is no recording in one file")
     return _decoded(sections["CFG"]), sections["DAT"], (f"{path} (CFG)", f"{path} (DAT)")
 
@@ -247,8 +246,7 @@ def _times(configuration: Configuration, stamps: Numbers, place: str) -> Numbers
 
 def _warn_of_skew(configuration: Configuration, times: Numbers) -> None:
     interval = float(np.diff(times).min()) if len(times) > 1 else np.inf
-    late = [c for c in configuration.analog if abs(c.skew) > 0.1 * interval]
-    if late:
+    if late := [c for c in configuration.analog if abs(c.skew) > 0.1 * interval]:
         shown = ", ".join(f"{c.name} ({c.skew:.3g} s)" for c in late[:5])
         text = f"{configuration.place}: samples are skewed by more than a tenth of a sample: {shown}; the times "
         warnings.warn(f"{text}of all channels are taken as equal", ResultsWarning, stacklevel=3)
