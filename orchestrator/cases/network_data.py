@@ -213,7 +213,7 @@ def misfit_of(network: ImportedNetwork, bus: Matrix, labels: Mapping[int, str], 
     ``bus``: MATPOWER's table with the voltages [pu, degrees]; ``labels``: names of its buses by number."""
     stated = {bus_of(labels[int(r[0])]): cmath.rect(r[_VM], np.radians(r[_VA])) for r in bus if r[_VM] > 0}
     if network.slack not in stated or not bus[:, _VA].any():
-        return unsolved
+        return "" if bus[:, _VA].any() else unsolved
     places = [place for place in network.buses if place in stated]
     stars = [place for place in network.buses if place not in stated]  # of transformers with an open winding
     buses = [*places, *stars, *(inner for x in network.transformers for inner in inner_buses(x))]

@@ -1,5 +1,6 @@
 """Operating point of a scenario: its power flow, and what is unusual about the solution."""
 
+import math
 from collections.abc import Iterator, Mapping
 
 from orchestrator.cases.draft import Draft
@@ -12,6 +13,7 @@ from orchestrator.cases.start_values import is_connected, start_from_power_flow
 from orchestrator.errors import ErrorKind, InputError, Problem, few
 
 _USUAL_VOLTAGES = (0.8, 1.2)  # magnitudes [pu] of bus voltages that are not questioned
+_CLOSE = 1e-3  # power [MW] by which a limit is not passed
 _SHOWN = 5  # buses that a question names; the others are counted
 
 
@@ -64,6 +66,12 @@ def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
     for name in (unit for unit in flow.balancing if f"{unit}.P_0" in draft.given.from_outside):
         fed = f"{flow.slack} is the slack and feeds what is left, here P_0 = {flow.powers[name].real:.4g} pu"
         yield Problem(draft.places.get(f"{name}.P_0", ""), f"{name}.P_0 cannot act: {fed}")
+    for name in flow.balancing if draft.given.from_outside else ():
+        fed_mw = flow.powers[name].real * draft.system.components[name].number("S_n")
+        least, most = draft.active_limits.get(name, (-math.inf, math.inf))
+        if not least - _CLOSE <= fed_mw <= most + _CLOSE:
+            text = f"{name} is the slack and feeds {fed_mw:.4g} MW, beyond its limits, {least:g} to {most:g} MW"
+            yield Problem(draft.places.get(f"{name}.P_0", ""), f"{text}; share what the values change among the units")
 
 
 def _reference(draft: Draft, units: Mapping[str, str], slack: str, grid: str) -> str:

@@ -175,7 +175,7 @@ def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable
 
 def _helps(equations: FlowEquations, with_stray: Callable[[float], FlowEquations] | None) -> str:
     """What makes it solvable: less stray capacitance, or less power."""
-    share, _ = grow(equations)
+    share, found = grow(equations)
     if with_stray is not None:
         for part in _SHARES:
             if solve(with_stray(part)).converged:
@@ -183,10 +183,10 @@ def _helps(equations: FlowEquations, with_stray: Callable[[float], FlowEquations
                     f"It has a solution with {part:.0%} of stray_B: stray capacitances raise the voltage behind large "
                     "reactances; lower stray_B. "
                 )
-    if share > 0:
+    if found is not None:
         return (
-            f"With all loads and all units' power at {share:.0%} it has a solution: the lines cannot carry the power "
-            "asked of them. Lower P_0 or the loads, or the line reactances. "
+            f"With all loads and all units' power at {min(share, 0.99):.0%} it has a solution: the lines cannot carry "
+            "the power asked of them. Lower P_0 or the loads, or the line reactances. "
         )
     return (
         "There is none without load and generation either: check line charging, shunts and reactances, which raise "

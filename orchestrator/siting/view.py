@@ -173,7 +173,7 @@ def remarks(result: SiteResult) -> list[str]:
 
 
 def as_json(result: SiteResult) -> dict[str, Any]:
-    here = result.intact.name
+    here, stable = result.intact.name, [at.found.stability.stable for at in result.situations]
     return {
         **result.prepared.about, "device": result.request.device,
         "units": {
@@ -183,8 +183,8 @@ def as_json(result: SiteResult) -> dict[str, Any]:
             "p, q": "the same for active and for reactive power; 1 pu of gain on 100 MVA is 100 MW by the rated Hz",
         },
         "answer": answer(result), "sure": sureness(result), "remarks": remarks(result), "agrees": result.agrees,
-        "stable": result.intact.found.stability.stable, "warnings": list(result.intact.found.warnings),
-        "code": code_hash(),
+        "stable": False if False in stable else None if None in stable else True,
+        "warnings": list(result.intact.found.warnings), "code": code_hash(),
         "modes": _modes(result.intact.modes),
         "buses": [
             {

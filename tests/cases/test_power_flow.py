@@ -140,6 +140,9 @@ def test_more_than_a_line_can_carry():
     assert "With all loads and all units' power at 99% it has a solution: the lines cannot carry the power" in text
     assert "Lower P_0 or the loads, or the line reactances" in text
     assert text.endswith("deg), X = 0.2 pu, which would carry 252 MW")
+    for times, share in ((1.0005, "99%"), (4000, "0%")):
+        with pytest.raises(InputError, match=f"power at {share} it has a solution"):
+            solve(times * 100 / (2 * X))
 
 
 def test_units_at_one_bus_that_want_two_voltages():

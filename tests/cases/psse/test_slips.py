@@ -101,6 +101,19 @@ def test_the_reference_may_be_named_in_the_case(tmp_path):
     assert "no bus of grid.raw is the reference (IDE = 3)" in "\n".join(texts(tmp_path, network=network))
     case = CASE.replace('grid = "grid"\n', 'grid = "grid"\nslack = "bus_1"\n')
     assert "IDE" not in "\n".join(texts(tmp_path, network=network, case=case))
+    solved = with_records("BUS", "16.5,3,1,1,1,1.04,0.0", "16.5,2,1,1,1,1.04,1.5")
+    assert "not solved" not in "\n".join(texts(tmp_path, network=solved))  # that nobody can tell without a reference
+
+
+def test_a_slack_that_values_bring_beyond_its_limits_is_questioned(tmp_path):
+    for name, text in (("grid.raw", raw(33)), ("grid.dyr", DYR), ("case.toml", CASE)):
+        (tmp_path / name).write_text(text)
+    case = load_case(tmp_path / "case.toml")
+    less, none = ({f"sg{n}.P_0": 0.0 for n in units} for units in ((3,), (2, 3)))
+    within, beyond = ("\n".join(map(str, case.prepare(["plain"], v)[0].questions)) for v in (less, none))
+    assert "sg1 is the slack and feeds 324.5 MW" in beyond
+    assert "beyond its limits, 0 to 247.5 MW" in beyond
+    assert "beyond its limits" not in within
 
 
 def test_a_misspelt_model_of_the_grid_is_one_error(tmp_path):
