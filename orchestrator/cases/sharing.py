@@ -125,10 +125,10 @@ def power_limits(plan: ComponentPlan, reactive: float = 0.0) -> tuple[float, flo
     return max(low) + _ROOM, min(high) - _ROOM - losses
 
 
-def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
+def shares(reserves: Sequence[Reserve], change: float, *, bare: bool = False) -> dict[str, float]:
     """Power of each unit [MW] after a change of the units' whole power; a unit at its limit leaves the rest to others.
 
-    ``change``: What they have to feed beside what they fed [MW]."""
+    ``change``: What they have to feed beside what they fed [MW]; ``bare``: without what the losses grow by."""
     found = {one.name: one.before for one in reserves}
     free = [one for one in reserves if one.gain > 0]
     rest = change
@@ -144,10 +144,12 @@ def shares(reserves: Sequence[Reserve], change: float) -> dict[str, float]:
         free = [one for one in free if one not in stopped]
     if abs(rest) <= _CLOSE:
         return found
-    raise InputError(_overload(reserves, change, rest), kind=ErrorKind.START)
+    raise InputError(
+        _overload(reserves, change, f"{abs(rest):.4g} MW{', before the losses grow,' * bare}"), kind=ErrorKind.START
+    )
 
 
-def _overload(reserves: Sequence[Reserve], change: float, rest: float) -> str:
+def _overload(reserves: Sequence[Reserve], change: float, left: str) -> str:
     able = [one for one in reserves if one.gain > 0] or list(reserves)
     step = change / (sum(one.gain for one in able) or 1.0)
     worst = max(able, key=lambda one: (one.before + step * one.gain) / one.most if one.most > 0 else 0.0)
@@ -157,7 +159,7 @@ def _overload(reserves: Sequence[Reserve], change: float, rest: float) -> str:
     else:
         first = f"{worst.name} would have to go down to {need:.4g} MW"
     return (
-        f"{first}: {abs(change):.4g} MW {'more' if change > 0 else 'less'} cannot be shared, {abs(rest):.4g} MW "
+        f"{first}: {abs(change):.4g} MW {'more' if change > 0 else 'less'} cannot be shared, {left} "
         "are left when all units with a governor or a droop are at their limits; give another dispatch, or lose load "
         "with the unit (unit+load)"
     )
@@ -175,8 +177,8 @@ def shared_flow(
     at_slack = {one.name for one in left if one.connected and one.bus == slack_bus and one.Q_0 is None}
     rating = {one.name: one.S_n for one in left}
     change, before = dispatch.change, (0.0, 0.0)
-    for _ in range(_ROUNDS):
-        found = shares(reserves, change)
+    for k in range(_ROUNDS):
+        found = shares(reserves, change, bare=not k)
         moved = {
             one.name: replace(one, P_0=found[one.name] / one.S_n) for one in left if one.name in found and one.connected
         }

@@ -20,6 +20,8 @@ from orchestrator.study.run import RunResult
 from orchestrator.watch.confirmation import PERIODS
 
 _LONGEST = 120  # of a remark [characters]; the whole text stands among the details
+_NEAR = 0.5  # damping after events [points] that is too near to 0: see `_near`
+_MANY = 30  # periods of such a mode in which a run shows whether it grows
 
 KINDS = {
     "growth": "grows", "growing_oscillation": "an oscillation grows", "sustained_oscillation": "oscillates on",
@@ -85,6 +87,9 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     if not isinstance(result.after, ModesResult):
         return answer
     left = of_modes(result.after)
+    if near := _near(result.after):
+        told = f"{answer.remark}; {near.damping_percent:+.2f} % after the events, by a power flow, decides nothing"
+        return replace(answer, after=near, remark=told if answer.good else answer.remark)
     if left.good is False and answer.good is not False:
         remark = short(f"the system that the events leave: {left.remark}", _LONGEST)
         answer = replace(answer, good=False, verdict="UNSTABLE", remark=remark)
@@ -138,9 +143,21 @@ def _seen_from(result: RunResult, mode: Mode | None) -> float:
     """Time from which on a growth shows where no modes of what the events leave are known [s]; 0 where they are, or
     nothing is left changed."""
     prepared = result.modes.prepared
-    if isinstance(result.after, ModesResult) or mode is None or not lasting_changes(prepared):
+    near = _near(result.after) if isinstance(result.after, ModesResult) else None
+    if mode is None or not (near if isinstance(result.after, ModesResult) else lasting_changes(prepared)):
         return 0.0
-    return ceil(10 * (max(event.time for event in prepared.events) + PERIODS / mode.frequency_hz)) / 10
+    needed = _MANY / near.frequency_hz if near else PERIODS / mode.frequency_hz
+    return ceil(10 * (max(event.time for event in prepared.events) + needed)) / 10
+
+
+def _near(after: ModesResult) -> Mode | None:
+    """The least damped mode after the events, where what a power flow leaves out decides its sign: it lets units hold
+    voltages and loads draw powers, where an event leaves references and admittances as they were."""
+    least = min(after.modes, key=lambda mode: mode.damping_percent, default=None)
+    grows = after.stability.mode if after.stability.stable is False else least
+    if least is None or grows is None or grows.eigenvalue != least.eigenvalue or not abs(least.damping_percent) < _NEAR:
+        return None
+    return least
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:

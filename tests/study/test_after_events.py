@@ -1,10 +1,13 @@
 """A run whose events leave a line open is judged by the system that is left as well, however short it is."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 import orchestrator as gfor_api
+from orchestrator.study import answers
 from orchestrator.study.after_events import lasting_changes, modes_after
 from orchestrator.study.modes import ModesResult
 from tests.screening.five_machines import five_machines
@@ -44,6 +47,31 @@ def test_a_network_that_is_unstable_after_the_fault_is_told(gfor, case):
     assert (code, answer["stable"], answer["verdict"]) == (1, False, "UNSTABLE")
     assert "the system that the events leave: grows at" in answer["remark"] or "grows from" in answer["remark"]
     assert answer["damping_percent"] > 7
+
+
+def test_modes_after_the_events_that_are_near_zero_leave_the_verdict_to_a_long_run(gfor, case):
+    """A power flow with a line open lets units hold their voltages; the event leaves their references."""
+    values = [word for key, value in VALUES.items() for word in ("--set", f"{key}={value}")]
+    values += ["--set", "sg[1235].governor.R=0.0285"]
+    _, found = run(gfor, case, "--fault", FAULT.replace("60", "5"), *values)
+    assert -0.4 < found["answer"]["after_events"]["damping_percent"] < -0.1
+    assert found["answer"]["stable"] is None
+    assert "too short to show whether what the events leave settles: --stop 42.6" in found["answer"]["remark"]
+
+
+@pytest.mark.parametrize(
+    ("damping", "fast", "good"), [(-0.4, 0, True), (0.4, 0, True), (-0.6, 0, False), (-0.4, 1, False), (0.6, 1, False)]
+)
+def test_what_is_near_zero_decides_nothing_and_a_fast_growth_beside_it_does(case, monkeypatch, damping, fast, good):
+    before = gfor_api.load(case).scenario("base").modes().result
+    least, other = (replace(before.modes[0], eigenvalue=value) for value in (complex(-damping / 20, 5), fast + 300j))
+    stable = damping > 0 and not fast
+    grows = None if stable else other if fast else least
+    after = replace(before, modes=[least], stability=replace(before.stability, stable=stable, mode=grows))
+    monkeypatch.setattr(answers, "_by_response", lambda _: answers.ScenarioAnswer("", True, "stable", None, "settles"))
+    found = answers.of_run(SimpleNamespace(after=after))
+    assert found.good is good
+    assert ("by a power flow, decides nothing" in found.remark) is (abs(damping) < 0.5 and not fast)
 
 
 def test_a_network_that_stays_stable_is_stable(gfor, case):
