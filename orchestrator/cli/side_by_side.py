@@ -44,6 +44,14 @@ class SideBySide:
         self._copies: dict[Connection, int] = {}  # the process of each, by our end of its pipe
 
     def __enter__(self) -> "SideBySide":
+        try:
+            self._make()
+        except BaseException as error:  # also a signal that waited until all were made
+            self.__exit__(type(error))
+            raise
+        return self
+
+    def _make(self) -> None:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGUSR1})
@@ -62,7 +70,6 @@ class SideBySide:
                 self._copies[ours] = process
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
-        return self
 
     def outcomes(self, count: int, report: Callable[[int, int, int], None]) -> list[tuple[int, Outcome]]:
         """What came of all that were begun, in order.

@@ -53,7 +53,7 @@ class Computing:
             while self._at_work is not None and self._newest.get(asker) == ticket:
                 self._state.wait()
             if self._newest.get(asker) != ticket:
-                return {"cancelled" if number < self._cancelled.get(page, 0) else "superseded": True}
+                return self._overtaken(page, number)
             begin = time.monotonic()
             self._at_work = (asker, begin)
             self._why = ""
@@ -67,7 +67,10 @@ class Computing:
                 if newest:
                     del self._newest[asker]
                 self._state.notify_all()
-        return found if newest or "cancelled" in found else {"superseded": True}
+        return found if newest else self._overtaken(page, number)
+
+    def _overtaken(self, page: str, number: float) -> Answer:
+        return {"cancelled" if number < self._cancelled.get(page, 0) else "superseded": True}
 
     def _end_what_is_outdated(self, asker: Asker) -> None:
         """End a computation that its own asker no longer wants, where that is sooner than to wait for its end."""
@@ -85,6 +88,11 @@ class Computing:
             if self._at_work is not None and self._at_work[0][0] == page:
                 self._end("cancelled")
             self._state.notify_all()
+
+    def welcome(self, page: str) -> None:
+        """A page that was left may be there again, by another stream of events."""
+        with self._state:
+            self._cancelled.pop(page, None)
 
     def close(self) -> None:
         with self._state:
@@ -130,10 +138,10 @@ class Computing:
 
     def _running(self) -> "subprocess.Popen[str]":
         with self._state:
-            if self._process is not None and self._process.poll() is None and not self._why:
+            if self._closed or self._why:  # it was ended before it began
+                raise OSError("nobody waits for it")
+            if self._process is not None and self._process.poll() is None:
                 return self._process
-            if self._closed:
-                raise OSError("the server ends")
             path = os.pathsep.join([_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "orchestrator.explore.worker"],

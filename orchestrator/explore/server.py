@@ -63,6 +63,8 @@ class Explorer:
 
     def opened(self, page: str) -> "queue.SimpleQueue[Answer]":
         self._last_seen = time.monotonic()
+        for computing in self.computing.values():
+            computing.welcome(page)
         self._pages[page] = queue.SimpleQueue()
         return self._pages[page]
 

@@ -3,12 +3,16 @@
 import secrets
 import socket
 import struct
+from contextlib import suppress
 from typing import Self
 
 _HEAD = struct.Struct("<cI")
 
 JOIN, COMMAND, FIRST, STEP, END, FAULT = b"J", b"C", b"1", b"S", b"E", b"F"
 """Kinds: wait for all federates; a command to one of them; outputs before the first step; a step; the end; an error."""
+
+
+_TO_SPEAK = 10.0  # for who has called to say the word [s]: the hub may wait for a processor meanwhile
 
 
 class Frames:
@@ -56,8 +60,9 @@ class Door:
         self._server.settimeout(seconds)
         while True:
             frames = Frames(self._server.accept()[0])
-            if frames.receive(seconds) == (JOIN, self.word.encode()):
-                return frames
+            with suppress(TimeoutError, EOFError):  # a stranger that says nothing
+                if frames.receive(_TO_SPEAK) == (JOIN, self.word.encode()):
+                    return frames
             frames.close()
 
     def __enter__(self) -> Self:

@@ -215,6 +215,21 @@ def test_an_interrupt_is_passed_on_once():
     assert isinstance(outcomes[2][1], KeyboardInterrupt)
 
 
+def test_a_signal_while_the_copies_are_made_leaves_none(monkeypatch):
+    before, fork = copies_of(os.getpid()), os.fork
+
+    def interrupted():
+        process = fork()
+        if process:
+            os.kill(os.getpid(), signal.SIGTERM)  # it waits until all are made
+        return process
+
+    monkeypatch.setattr(side_by_side.os, "fork", interrupted)
+    with calls.terminable(), pytest.raises(KeyboardInterrupt), SideBySide(1, lambda *_: None):
+        pass
+    assert copies_of(os.getpid()) == before
+
+
 def test_an_interrupt_when_all_is_done_is_not_lost():
     def work(index, report):
         try:

@@ -128,6 +128,13 @@ def test_it_waits_for_its_first_page():
     serving.join(60)
 
 
+def test_a_page_that_comes_again_is_answered(explorer):
+    """Its stream of events broke off; the browser opens another by itself."""
+    explorer.left("p", explorer.opened("p"))
+    explorer.opened("p")
+    assert "answer" in explorer.answer("p", {"ask": "open", "number": 1.0})
+
+
 # -- the files of the page -------------------------------------------------------------------------
 
 
@@ -215,11 +222,29 @@ def test_parameters_have_units_bounds_and_words(computing):
 @pytest.mark.slow
 def test_a_dead_process_ends_its_question_and_not_the_next(computing):
     assert "answer" in answer(computing)
-    done = in_background(computing, values={"grid.X_L": 0.2})
-    wait_until(lambda: computing._at_work is not None)
-    os.kill(computing._process.pid, signal.SIGKILL)
-    assert "signal 9" in done()["error"]
+    process = computing._process.pid
+    slopes = {"ask": "slopes", "parameter": "gfor.pod_p.K"}  # it tells how far it is
+    found = answer(computing, say=lambda part: os.kill(process, signal.SIGKILL), **slopes)
+    assert "signal 9" in found["error"]
     assert "answer" in answer(computing)
+
+
+@pytest.mark.parametrize("running", [False, True])
+def test_a_cancel_as_a_question_begins_ends_it(computing, monkeypatch, running):
+    """Before it is given to the process."""
+    assert "answer" in answer(computing)
+    begin, page = computing._running, f"cancels {running}"
+
+    def overtaken():
+        process = begin() if running else None
+        computing.cancel(page, 2)
+        return process or begin()
+
+    monkeypatch.setattr(computing, "_running", overtaken)
+    assert answer(computing, page, number=1) == {"cancelled": True}
+    assert computing._process is None
+    monkeypatch.undo()
+    assert "answer" in answer(computing, page, number=3)
 
 
 @pytest.mark.slow
@@ -250,11 +275,16 @@ def test_a_hanging_process_is_ended_after_a_while():
 
 @pytest.mark.slow
 def test_of_several_questions_of_a_page_the_last_one_wins(computing):
-    first = in_background(computing, values={"grid.X_L": 0.21})
-    wait_until(lambda: computing._at_work is not None)
-    second = in_background(computing, values={"grid.X_L": 0.22})
-    wait_until(lambda: computing._newest.get(("p", "modes"), 0) > 0 and second.begun())
-    third = in_background(computing, values={"grid.X_L": 0.23})
+    assert "answer" in answer(computing)
+    process = computing._process.pid
+    os.kill(process, signal.SIGSTOP)  # until all are asked
+    asked = []
+    for length in (0.21, 0.22, 0.23):
+        before = computing._newest.get(("p", "modes"))
+        asked.append(in_background(computing, values={"grid.X_L": length}))
+        wait_until(lambda before=before: computing._newest.get(("p", "modes")) != before)
+    os.kill(process, signal.SIGCONT)
+    first, second, third = asked
     assert first() == second() == {"superseded": True}
     assert "grid.X_L=0.23" in third()["answer"]["copied"]["command"]
 
@@ -275,10 +305,6 @@ class in_background:  # noqa: N801 - reads as what it does
         self._computing = computing
         self._thread = threading.Thread(target=lambda: self._found.append(answer(computing, **more)), daemon=True)
         self._thread.start()
-        self._from = time.monotonic()
-
-    def begun(self):
-        return time.monotonic() - self._from > 0.1
 
     def __call__(self):
         self._thread.join(60)

@@ -224,7 +224,9 @@ def test_what_is_read_while_it_is_written_and_after_a_kill(tmp_path):
         folder = tmp_path / str(number) / "recording"
         with subprocess.Popen([*command, str(folder)], stdout=subprocess.PIPE) as writer:
             assert writer.stdout.readline() == b"begin\n"
-            time.sleep(chance.uniform(0, 0.5))
+            count = int(chance.integers(0, 12))  # of parts: how long they take is the disk's
+            while len(parts_of(folder)) < count and writer.poll() is None:
+                time.sleep(0.002)
             lengths += [check_read(folder, rows)]
             time.sleep(chance.uniform(0, 0.2))
             writer.send_signal(signal.SIGKILL)
