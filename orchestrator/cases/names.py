@@ -57,7 +57,7 @@ def close_names(wanted: str, known: Iterable[str], otherwise: str = "") -> str:
 
 
 def _parts(name: str) -> list[str]:
-    return sorted(re.split(r"[_.]", name))
+    return sorted(re.split(r"[_.]", name.casefold()))
 
 
 def whose(part: str, variables: Mapping[str, Iterable[str]]) -> str:

@@ -52,6 +52,7 @@ def test_a_variable_of_a_part_is_found_without_the_part(tmp_path):
         ("gfor*.current_limit", "phasor and EMT models name it differently: here it is gfor*.current_demand"),
         ("gfor1.current_limit", "phasor and EMT models name it differently: here it is gfor1.current_demand"),
         ("gfor1.current_demands", "did you mean gfor1.current_demand?"),
+        ("GFOR1.Current_Demand", "did you mean gfor1.current_demand?"),
     ],
 )
 def test_an_output_of_the_other_kind_of_model_names_its_twin(wanted, hint):
