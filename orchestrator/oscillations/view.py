@@ -96,6 +96,10 @@ def sources_of(
     if models and prepared and (differ := own.unlike(dataset.attrs, prepared)):
         remark = f"the models that judge it are not of the recorded system; what differs: {differ}"
         measured = replace(measured, remarks=(*measured.remarks, remark))
+    units = {name.casefold() for name in models.units} if models else set()
+    if models and units.isdisjoint(p.name.casefold() for p in measured.places if p.kind == "unit"):
+        remark = f"the case's models judge nothing: no signal is named after its units, {', '.join(models.units)}"
+        measured = replace(measured, remarks=(remark, *measured.remarks))
     located = locate(measured, models)
     if models and prepared:
         from orchestrator.oscillations.levers import with_levers  # noqa: PLC0415 - only where there is a case

@@ -142,7 +142,11 @@ def test_a_run_is_compared_with_the_models_of_its_own_case(run, gfor, tmp_path):
     other = gfor_api.source(run.dataset, scenario=gfor_api.load("two_area_rms").scenario("pod_p"))
     assert other.remarks[-1].endswith("what differs: the scenario ('gfor', not 'pod_p')")
     assert not any("what differs" in remark for remark in run.source().remarks)
-    assert not any("--case" in remark for remark in run.source().remarks)
+    assert not any("--case" in remark or "judge nothing" in remark for remark in run.source().remarks)
+    buses = run.dataset.rename({name: name.replace("sg", "place") for name in run.dataset if name.startswith("sg")})
+    scenario = gfor_api.load("two_area_rms").scenario("gfor")
+    remark = gfor_api.source(buses.drop_vars([n for n in buses if n.startswith("gfor")]), scenario=scenario).remarks[0]
+    assert remark == "the case's models judge nothing: no signal is named after its units, gfor, sg1, sg2"
     foreign = run.dataset.assign_attrs(case_file="name = 'mine'", inputs='{"mine.toml": "1a"}')
     first = gfor_api.source(foreign).remarks[0]
     assert first.endswith("the units' models decide: give --case mine.toml --scenario gfor")
