@@ -13,6 +13,8 @@ from orchestrator.report.notebook import page
 from orchestrator.results.mode_json import eigenvalue_json
 from orchestrator.study.comparison import Comparison
 
+_RARE = 1.0  # samples [s] that are further apart show no swing of machines
+
 
 @dataclass(eq=False, repr=False)
 class SignalModes:
@@ -68,7 +70,7 @@ class SignalModes:
         highest = 0.5 / self.interval
         texts = [
             f"The samples used, every {self.interval:g} s, show nothing above {highest:.4g} Hz: "
-            "a faster oscillation appears as a slower one."
+            f"a faster oscillation appears as a slower one.{' Is the time in ms?' * (self.interval > _RARE)}"
         ]
         if near := [f"{m.frequency_hz:.4g} Hz" for m in self.modes if m.frequency_hz > highest / 2]:
             texts.append(

@@ -148,6 +148,10 @@ def test_identify_says_what_the_records_can_show(tmp_path, capsys, interval, nea
     captured = capsys.readouterr()
     assert isinstance(json.loads(captured.out), list)
     assert "show nothing above" in captured.err
+    assert "time in ms" not in captured.err
+    in_ms = save(tmp_path / "ms", complex(-0.02, 2 * np.pi * 0.5733) / 1e3, times=1e3 * np.arange(0, 100, interval))
+    assert main(["signal", "identify", str(in_ms), "a.omega"]) == 0
+    assert "Is the time in ms?" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("interval", "shown"), [(0.4, True), (0.45, False), (1.0, False)])
