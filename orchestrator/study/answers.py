@@ -143,8 +143,9 @@ def _seen_from(result: RunResult, mode: Mode | None) -> float:
     """Time from which on a growth shows where no modes of what the events leave are known [s]; 0 where they are, or
     nothing is left changed."""
     prepared = result.modes.prepared
-    near = _near(result.after) if isinstance(result.after, ModesResult) else None
-    if mode is None or not (near if isinstance(result.after, ModesResult) else lasting_changes(prepared)):
+    after = result.after if isinstance(result.after, ModesResult) else None
+    near, judged = after and _near(after), after is not None and after.stability.stable is not None
+    if mode is None or not (near or (not judged and lasting_changes(prepared))):
         return 0.0
     needed = _MANY / near.frequency_hz if near else PERIODS / mode.frequency_hz
     return ceil(10 * (max(event.time for event in prepared.events) + needed)) / 10
