@@ -13,7 +13,7 @@ from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.all_codes import NTS631
 from orchestrator.certification.codes.record import code_json, code_responses
 from orchestrator.certification.figures import damping_json, damping_responses
-from orchestrator.certification.form import case_files
+from orchestrator.certification.form import NORM, case_files
 from orchestrator.certification.report import page
 from orchestrator.errors import InputError
 from orchestrator.points.store import POINTS
@@ -46,11 +46,13 @@ def save(c: Certificate, folder: Path, *, pdf: bool = False) -> list[Path]:
 def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> None:
     """Refuse a folder with a certificate by another code, or with files of others, which this one would replace."""
     try:
-        there = read_record(folder / JSON).get("code", NTS631)
-    except (OSError, ValueError, AttributeError):
+        record = read_record(folder / JSON)
+        there = record.get("code") or {record["format"]: NTS631}[NORM]
+    except (OSError, ValueError, AttributeError, LookupError):
         if not (folder / POINTS).exists():  # none was begun there
             written = {FMU: fmu.read_bytes(), **({BINDING: binding.read_bytes()} if binding else {})}
-            check_free(folder, written | ({CASE: None} if code == NTS631 else {}))
+            cases = [CASE] if code == NTS631 else [path.name for path in folder.glob("row_*.toml")]
+            check_free(folder, dict.fromkeys([JSON, HTML, RESPONSES, *cases]) | written)
         return
     if there != code:
         raise InputError(f"{folder}: it holds a certificate by {there}, which one by {code} would replace; give "

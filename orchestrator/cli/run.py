@@ -30,6 +30,7 @@ from orchestrator.interop.rules import MASTERS, MasterRules, master_rules
 from orchestrator.late import xr
 from orchestrator.report.progress import progress_bar
 from orchestrator.results.lock import held
+from orchestrator.results.manifest import read_manifest
 from orchestrator.results.recorded import open_whole
 from orchestrator.results.recording import FOLDER, TRAJECTORY, RecordingFolder, require_room
 from orchestrator.results.staging import (
@@ -89,6 +90,7 @@ def _run_all(scenarios: Sequence[Scenario], folder: Path, options: argparse.Name
     """Run the scenarios; each is written as soon as it is done."""
     require_room([scenario.prepared for scenario in scenarios], folder, csv=options.csv)
     mend(folder)
+    read_manifest(folder)  # one that is somebody else's is refused
     check_free(folder, files_of_study(scenarios[0].prepared.case))
     for scenario in scenarios:
         require_results(folder / scenario.name)

@@ -15,7 +15,7 @@ from orchestrator.results.storage import save_json, versions_of
 
 MANIFEST = "manifest.json"
 _FORMAT = 1
-_AGAIN = "make the results again, into an empty folder or the same one"
+_AGAIN = "make the results again, into an empty folder"
 
 
 class ResultsWarning(UserWarning):

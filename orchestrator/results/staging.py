@@ -187,12 +187,9 @@ def _is_foreign(folder: Path, name: str, content: str | None) -> bool:
 def _is_listed(folder: Path, name: str) -> bool:
     """Whether a command has written the file, be it one that was killed while it put its files there."""
     for place in (folder, *folder.glob(f"{PARTIAL}*")):
-        try:
-            found = read_manifest(place)
-        except InputError:  # damaged, as the files may be
-            return True
-        if found and name in found.files:
-            return True
+        with suppress(InputError):  # one that is damaged lists nothing
+            if (found := read_manifest(place)) and name in found.files:
+                return True
     return False
 
 

@@ -20,8 +20,8 @@ from orchestrator.study.run import RunResult
 from orchestrator.watch.confirmation import PERIODS
 
 _LONGEST = 120  # of a remark [characters]; the whole text stands among the details
-_NEAR = 0.5  # damping after events [points] that is too near to 0: see `_near`
-_MANY = 30  # periods of such a mode in which a run shows whether it grows
+_NEAR, _FAR = 0.5, 4.0  # damping after events [%]: up to here it decides nothing, from here on no run need show it
+_MANY = 30  # periods in which a run shows whether a mode grows that hardly decays
 
 KINDS = {
     "growth": "grows", "growing_oscillation": "an oscillation grows", "sustained_oscillation": "oscillates on",
@@ -84,12 +84,13 @@ def _named_elsewhere(result: ModesResult, least: Mode | None) -> list[tuple[str,
 def of_run(result: RunResult) -> ScenarioAnswer:
     """By what the run showed, and by the eigenvalues before its events and after them."""
     answer = _by_response(result)
-    if not isinstance(result.after, ModesResult):
+    if not isinstance(after := result.after, ModesResult):
         return answer
-    left = of_modes(result.after)
-    if near := _near(result.after):
-        told = f"{answer.remark}; {near.damping_percent:+.2f} % after the events, by a power flow, decides nothing"
-        return replace(answer, after=near, remark=told if answer.good else answer.remark)
+    left, swing = of_modes(after), _deciding(after)
+    doubted = swing is not None and swing.damping_percent < _NEAR
+    if swing and doubted and (swing.damping_percent > -_NEAR or (answer.good and _whole(result, swing))):
+        told = f"{answer.remark}; {swing.damping_percent:+.2f} % after the events, by a power flow, decides nothing"
+        return replace(answer, after=swing, remark=told if answer.good else answer.remark)
     if left.good is False and answer.good is not False:
         remark = short(f"the system that the events leave: {left.remark}", _LONGEST)
         answer = replace(answer, good=False, verdict="UNSTABLE", remark=remark)
@@ -140,25 +141,34 @@ def _by_response(result: RunResult) -> ScenarioAnswer:
 
 
 def _seen_from(result: RunResult, mode: Mode | None) -> float:
-    """Time from which on a growth shows where no modes of what the events leave are known [s]; 0 where they are, or
-    nothing is left changed."""
-    prepared = result.modes.prepared
+    """Time from which on a growth shows [s], where the modes of what the events leave do not exclude it; else 0."""
     after = result.after if isinstance(result.after, ModesResult) else None
-    near, judged = after and _near(after), after is not None and after.stability.stable is not None
-    if mode is None or not (near or (not judged and lasting_changes(prepared))):
+    swing = _deciding(after) if after else None
+    judged = after is not None and after.stability.stable is not None
+    open_ = not judged or (swing is not None and swing.damping_percent < _FAR)
+    if mode is None or not open_ or not lasting_changes(result.modes.prepared):
         return 0.0
-    needed = _MANY / near.frequency_hz if near else PERIODS / mode.frequency_hz
-    return ceil(10 * (max(event.time for event in prepared.events) + needed)) / 10
+    return _after(result, swing or mode, _MANY if swing and abs(swing.damping_percent) < _NEAR else PERIODS)
 
 
-def _near(after: ModesResult) -> Mode | None:
-    """The least damped mode after the events, where what a power flow leaves out decides its sign: it lets units hold
-    voltages and loads draw powers, where an event leaves references and admittances as they were."""
+def _after(result: RunResult, mode: Mode, periods: float) -> float:
+    """So many periods of a mode after the last event [s]."""
+    return ceil(10 * (max(event.time for event in result.modes.prepared.events) + periods / mode.frequency_hz)) / 10
+
+
+def _whole(result: RunResult, swing: Mode) -> bool:
+    return result.modes.prepared.stop_time >= _after(result, swing, _MANY)
+
+
+def _deciding(after: ModesResult) -> Mode | None:
+    """The least damped mode after the events, where nothing else grows.
+
+    What is left has voltages and powers of a power flow, where an event leaves references and admittances as they were:
+    a mode's damping was up to 3 points off in systems that were tuned for it."""
     least = min(after.modes, key=lambda mode: mode.damping_percent, default=None)
     grows = after.stability.mode if after.stability.stable is False else least
-    if least is None or grows is None or grows.eigenvalue != least.eigenvalue or not abs(least.damping_percent) < _NEAR:
-        return None
-    return least
+    known = least is not None and grows is not None and grows.eigenvalue == least.eigenvalue
+    return least if known and least and least.is_oscillation else None
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:

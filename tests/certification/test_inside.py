@@ -89,7 +89,17 @@ def test_a_certificate_by_another_code_is_not_replaced(converter, tmp_path, gfor
     spare_another(tmp_path, "miso", converter, None)
 
 
-@pytest.mark.parametrize(("name", "code"), [("converter.fmu", "ercot"), ("case.toml", "nts631")])
+@pytest.mark.parametrize("name", ["certificate.json", "certificate.html", "responses.nc"])
+def test_what_is_no_certificate_is_not_replaced(converter, tmp_path, name):
+    (tmp_path / name).write_text('{"mine": 1}')
+    (tmp_path / "manifest.json").write_text("mine")
+    with pytest.raises(gfor.CosimError, match=f"{name}: this file would be written over"):
+        spare_another(tmp_path, "nts631", converter, None)
+
+
+@pytest.mark.parametrize(
+    ("name", "code"), [("converter.fmu", "ercot"), ("case.toml", "nts631"), ("row_dip.toml", "ercot")]
+)
 def test_files_of_others_in_the_folder_are_not_replaced(converter, tmp_path, gfor_command, name, code):
     out = tmp_path / "own"
     out.mkdir()
@@ -100,7 +110,7 @@ def test_files_of_others_in_the_folder_are_not_replaced(converter, tmp_path, gfo
     with pytest.raises(gfor.CosimError, match="no command has written it"):
         gfor.certify(converter, code, folder=out, check=False)
     assert (out / name).read_text() == "mine"
-    other = {"converter.fmu": "nts631", "case.toml": "ercot"}[name]
+    other = "ercot" if code == "nts631" else "nts631"
     (out / name).write_bytes(converter.read_bytes())
     spare_another(out, other, converter, None)  # the same FMU; a case that this code writes none over
 
