@@ -13,7 +13,7 @@ from orchestrator.cases.start_values import is_connected, start_from_power_flow
 from orchestrator.errors import ErrorKind, InputError, Problem, few
 
 _USUAL_VOLTAGES = (0.8, 1.2)  # magnitudes [pu] of bus voltages that are not questioned
-_CLOSE = 1e-3  # power [MW] by which a limit is not passed
+_CLOSE = 1e-3  # power [pu of the rating] by which a limit is not passed
 _SHOWN = 5  # buses that a question names; the others are counted
 
 
@@ -66,12 +66,13 @@ def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
     for name in (unit for unit in flow.balancing if f"{unit}.P_0" in draft.given.from_outside):
         fed = f"{flow.slack} is the slack and feeds what is left, here P_0 = {flow.powers[name].real:.4g} pu"
         yield Problem(draft.places.get(f"{name}.P_0", ""), f"{name}.P_0 cannot act: {fed}")
-    for name in flow.balancing if draft.given.from_outside else ():
-        fed_mw = flow.powers[name].real * draft.system.components[name].number("S_n")
+    for name in flow.balancing:
+        rating = draft.system.components[name].number("S_n")
+        fed_mw, close = flow.powers[name].real * rating, _CLOSE * rating
         least, most = draft.active_limits.get(name, (-math.inf, math.inf))
-        if not least - _CLOSE <= fed_mw <= most + _CLOSE:
+        if not least - close <= fed_mw <= most + close:
             text = f"{name} is the slack and feeds {fed_mw:.4g} MW, beyond its limits, {least:g} to {most:g} MW"
-            yield Problem(draft.places.get(f"{name}.P_0", ""), f"{text}; share what the values change among the units")
+            yield Problem(draft.places.get(f"{name}.P_0", ""), f"{text}; let other units feed more or less")
 
 
 def _reference(draft: Draft, units: Mapping[str, str], slack: str, grid: str) -> str:

@@ -155,6 +155,7 @@ def _shares(
 
 _SHARES = (0.9, 0.75, 0.5, 0.25, 0.0)  # parts of the stray capacitance that are tried
 _SHOWN = 6  # iterations whose mismatch is told
+_LITTLE = 0.01  # part of all powers below which they are likely of another unit
 
 
 def explain(equations: FlowEquations, failed: NewtonResult, with_stray: Callable[[float], FlowEquations] | None) -> str:
@@ -186,7 +187,8 @@ def _helps(equations: FlowEquations, with_stray: Callable[[float], FlowEquations
     if found is not None:
         return (
             f"With all loads and all units' power at {min(share, 0.99):.0%} it has a solution: the lines cannot carry "
-            "the power asked of them. Lower P_0 or the loads, or the line reactances. "
+            f"the power asked of them. {'Is a power in kW? ' * (share < _LITTLE)}Lower P_0 or the loads, or the line "
+            "reactances. "
         )
     return (
         "There is none without load and generation either: check line charging, shunts and reactances, which raise "

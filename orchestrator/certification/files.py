@@ -49,7 +49,8 @@ def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> N
         record = read_record(folder / JSON)
         there = record.get("code") or {record["format"]: NTS631}[NORM]
     except (OSError, ValueError, AttributeError, LookupError):
-        if not (folder / POINTS).exists():  # none was begun there
+        points = folder / POINTS
+        if not points.is_dir() or any(path.suffix != ".npz" for path in points.iterdir()):  # none was begun there
             written = {FMU: fmu.read_bytes(), **({BINDING: binding.read_bytes()} if binding else {})}
             cases = [CASE] if code == NTS631 else [path.name for path in folder.glob("row_*.toml")]
             check_free(folder, dict.fromkeys([JSON, HTML, RESPONSES, *cases]) | written)

@@ -181,7 +181,8 @@ def check_free(folder: Path, contents: Mapping[str, bytes | None]) -> None:
 def _is_foreign(folder: Path, name: str, content: str | None) -> bool:
     """Whether a file that is there is read by the command, or of somebody else, and other than the new one."""
     path = folder / name
-    return path.is_file() and (path.resolve() in inputs or not _is_listed(folder, name)) and sha256_of(path) != content
+    others = path.is_file() and (path.resolve() in inputs or not _is_listed(folder, name))
+    return path.is_dir() or (others and sha256_of(path) != content)
 
 
 def _is_listed(folder: Path, name: str) -> bool:

@@ -143,6 +143,8 @@ def test_more_than_a_line_can_carry():
     for times, share in ((1.0005, "99%"), (4000, "0%")):
         with pytest.raises(InputError, match=f"power at {share} it has a solution"):
             solve(times * 100 / (2 * X))
+    with pytest.raises(InputError, match="Is a power in kW"):
+        solve(4000 * 100 / (2 * X))
 
 
 def test_units_at_one_bus_that_want_two_voltages():

@@ -95,6 +95,12 @@ def test_what_is_no_certificate_is_not_replaced(converter, tmp_path, name):
     (tmp_path / "manifest.json").write_text("mine")
     with pytest.raises(gfor.CosimError, match=f"{name}: this file would be written over"):
         spare_another(tmp_path, "nts631", converter, None)
+    (tmp_path / name).unlink()
+    (tmp_path / name).mkdir()
+    (tmp_path / "points").mkdir()
+    (tmp_path / "points" / "mine.csv").touch()
+    with pytest.raises(gfor.CosimError, match=f"{name}: this file would be written over"):
+        spare_another(tmp_path, "nts631", converter, None)
 
 
 @pytest.mark.parametrize(

@@ -114,6 +114,11 @@ def test_a_slack_that_values_bring_beyond_its_limits_is_questioned(tmp_path):
     assert "sg1 is the slack and feeds 324.5 MW" in beyond
     assert "beyond its limits, 0 to 247.5 MW" in beyond
     assert "beyond its limits" not in within
+    for most, asked in (("71.64", False), ("70", True)):  # PG is 60 MW, and the slack feeds what is left
+        record = with_records("GENERATOR", "1,'1 ',71.64,0,300,-300,1.04,0,247.5,0,0.12,0,0,1,1,100,247.5",
+                              f"1,'1 ',60,0,300,-300,1.04,0,247.5,0,0.12,0,0,1,1,100,{most}")  # fmt: skip
+        said = "\n".join(texts(tmp_path, network=record))
+        assert (f"feeds 71.64 MW, beyond its limits, 0 to {most} MW" in said) is asked
 
 
 def test_a_misspelt_model_of_the_grid_is_one_error(tmp_path):
