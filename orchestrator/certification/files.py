@@ -52,8 +52,9 @@ def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> N
         points = folder / POINTS
         if not points.is_dir() or any(path.suffix != ".npz" for path in points.iterdir()):  # none was begun there
             written = {FMU: fmu.read_bytes(), **({BINDING: binding.read_bytes()} if binding else {})}
-            cases = [CASE] if code == NTS631 else [path.name for path in folder.glob("row_*.toml")]
-            check_free(folder, dict.fromkeys([JSON, HTML, RESPONSES, *cases]) | written)
+            cases = folder.glob(CASE if code == NTS631 else "row_*.toml")
+            others = [path.name for path in cases if path.is_dir() or b"gfor certify" not in path.read_bytes()]
+            check_free(folder, dict.fromkeys([JSON, HTML, RESPONSES, *others]) | written)
         return
     if there != code:
         raise InputError(f"{folder}: it holds a certificate by {there}, which one by {code} would replace; give "

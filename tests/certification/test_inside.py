@@ -119,6 +119,8 @@ def test_files_of_others_in_the_folder_are_not_replaced(converter, tmp_path, gfo
     other = "ercot" if code == "nts631" else "nts631"
     (out / name).write_bytes(converter.read_bytes())
     spare_another(out, other, converter, None)  # the same FMU; a case that this code writes none over
+    (out / "case.toml").write_text("# Damping test of gfor.fmu, written by `gfor certify`.")
+    spare_another(out, "nts631", converter, None)  # it was killed before its first point
 
 
 def test_a_second_code_joins_and_the_same_code_replaces_its_own(certified, converter, tmp_path, gfor_command):
