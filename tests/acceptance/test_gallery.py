@@ -244,7 +244,8 @@ def test_a_slight_leak_of_each_instance_is_a_remark(tmp_path):
     path = build(converter("leaking_slightly", FAULT_LEAK_INSTANCE=300), tmp_path)
     (_, found) = check_fmu(path, None, LIMITS, ("memory",), run_for=0.3).results
     assert found.verdict == "remark"
-    assert 200 < found.figures["instance"] < 500
+    # The interpreter keeps 2 to 4 kB a block besides; a busy machine has fewer instances in a block, ten at least.
+    assert 200 < found.figures["instance"] < 300 + 4096 / 10
 
 
 @pytest.mark.slow
