@@ -62,7 +62,7 @@ def power_flow_of(draft: Draft) -> PowerFlow | None:
 
 
 def _leftover(draft: Draft, flow: PowerFlow) -> Iterator[Problem]:
-    """Powers that were asked of units at the slack bus, which feeds what is left."""
+    """Powers that were asked of units at the slack bus, which feeds what is left, and limits that this exceeds."""
     for name in (unit for unit in flow.balancing if f"{unit}.P_0" in draft.given.from_outside):
         fed = f"{flow.slack} is the slack and feeds what is left, here P_0 = {flow.powers[name].real:.4g} pu"
         yield Problem(draft.places.get(f"{name}.P_0", ""), f"{name}.P_0 cannot act: {fed}")

@@ -11,12 +11,13 @@ from orchestrator.certification.acceptance import KEPT
 from orchestrator.certification.case_file import BINDING, CASE, FMU
 from orchestrator.certification.certificate import Certificate
 from orchestrator.certification.codes.all_codes import NTS631
+from orchestrator.certification.codes.bench_point import case_name
 from orchestrator.certification.codes.record import code_json, code_responses
 from orchestrator.certification.figures import damping_json, damping_responses
 from orchestrator.certification.form import NORM, case_files
 from orchestrator.certification.report import page
 from orchestrator.errors import InputError
-from orchestrator.points.store import POINTS
+from orchestrator.points.store import POINTS, holds_points_alone
 from orchestrator.report.pdf import print_pdf
 from orchestrator.results.staging import check_free
 from orchestrator.results.storage import save_netcdf
@@ -49,10 +50,9 @@ def spare_another(folder: Path, code: str, fmu: Path, binding: Path | None) -> N
         record = read_record(folder / JSON)
         there = record.get("code") or {record["format"]: NTS631}[NORM]
     except (OSError, ValueError, AttributeError, LookupError):
-        points = folder / POINTS
-        if not points.is_dir() or any(path.suffix != ".npz" for path in points.iterdir()):  # none was begun there
+        if not holds_points_alone(folder / POINTS):  # no certificate was begun there
             written = {FMU: fmu.read_bytes(), **({BINDING: binding.read_bytes()} if binding else {})}
-            cases = folder.glob(CASE if code == NTS631 else "row_*.toml")
+            cases = folder.glob(CASE if code == NTS631 else case_name("*"))
             others = [path.name for path in cases if path.is_dir() or b"gfor certify" not in path.read_bytes()]
             check_free(folder, dict.fromkeys([JSON, HTML, RESPONSES, *others]) | written)
         return

@@ -51,5 +51,10 @@ class PointStore:
         return self.folder / f"{key}{_KEPT}"
 
 
+def holds_points_alone(folder: Path) -> bool:
+    """Whether a folder is that of a study's points, be it before the first one."""
+    return folder.is_dir() and all(path.suffix == _KEPT for path in folder.iterdir())
+
+
 def any_kept(folder: Path) -> bool:
     return any(not path.name.startswith(PARTIAL) for path in folder.glob(f"*{_KEPT}"))

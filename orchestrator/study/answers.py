@@ -87,8 +87,7 @@ def of_run(result: RunResult) -> ScenarioAnswer:
     if not isinstance(after := result.after, ModesResult):
         return answer
     left, swing = of_modes(after), _deciding(after)
-    doubted = swing is not None and swing.damping_percent < _NEAR
-    if swing and doubted and (swing.damping_percent > -_NEAR or (answer.good and _whole(result, swing))):
+    if swing and swing.damping_percent < _NEAR and (swing.damping_percent > -_NEAR or _settles(result, answer, swing)):
         told = f"{answer.remark}; {swing.damping_percent:+.2f} % after the events, by a power flow, decides nothing"
         return replace(answer, after=swing, remark=told if answer.good else answer.remark)
     if left.good is False and answer.good is not False:
@@ -156,8 +155,9 @@ def _after(result: RunResult, mode: Mode, periods: float) -> float:
     return ceil(10 * (max(event.time for event in result.modes.prepared.events) + periods / mode.frequency_hz)) / 10
 
 
-def _whole(result: RunResult, swing: Mode) -> bool:
-    return result.modes.prepared.stop_time >= _after(result, swing, _MANY)
+def _settles(result: RunResult, answer: ScenarioAnswer, swing: Mode) -> bool:
+    """Whether a run that is long enough to show a growth of the mode shows none."""
+    return bool(answer.good) and result.modes.prepared.stop_time >= _after(result, swing, _MANY)
 
 
 def _deciding(after: ModesResult) -> Mode | None:
@@ -167,8 +167,9 @@ def _deciding(after: ModesResult) -> Mode | None:
     a mode's damping was up to 3 points off in systems that were tuned for it."""
     least = min(after.modes, key=lambda mode: mode.damping_percent, default=None)
     grows = after.stability.mode if after.stability.stable is False else least
-    known = least is not None and grows is not None and grows.eigenvalue == least.eigenvalue
-    return least if known and least and least.is_oscillation else None
+    if least is None or grows is None or grows.eigenvalue != least.eigenvalue or not least.is_oscillation:
+        return None
+    return least
 
 
 def _with_misfits(result: ModesResult, remark: str) -> str:
